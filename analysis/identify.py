@@ -35,6 +35,7 @@ from analysis.results.verdict import (
 )
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstated_gains
+from messages.message import message
 
 Progress = Callable[[float, str], None]
 _WITHOUT_STATIC = {FrictionLaw.STATIC: FrictionLaw.COULOMB, FrictionLaw.STATIC_TILT: FrictionLaw.COULOMB_TILT}
@@ -121,11 +122,14 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[R
     without = search.fit(plain, [*starts, asked.parameters])
     if without.bic > asked.bic:
         return []
-    message = (
-        f"the law {plain.value} explains the record as well (BIC {without.bic:.1f}, with f_s"
-        f" {asked.bic:.1f}): f_s may be as small as f_d, outside its interval too."
+    text = message(
+        "the law {plain} explains the record as well (BIC {bic:.1f}, with f_s {bic_2:.1f}): f_s may"
+        " be as small as f_d, outside its interval too.",
+        plain=plain.value,
+        bic=without.bic,
+        bic_2=asked.bic,
     )
-    return [ResultWarning("static-not-needed", message)]
+    return [ResultWarning("static-not-needed", text)]
 
 
 def _judge(problem: FitProblem, decay: FreeDecay, candidates: list[Fit], fits: list[Fit]) -> ModelSelection:
@@ -159,11 +163,13 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
     seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
     if decay.plateau is None:
         seen += ", unless it came before the record"
-    message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
-    warnings = [*decay.warnings, ResultWarning("no-slip", message)]
+    text = message("{seen}: period and damping are given, and the least f_s that prevents slip.", seen=seen)
+    warnings = [*decay.warnings, ResultWarning("no-slip", text)]
     if drawn:
-        message = "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
-        warnings.append(ResultWarning("nothing-to-draw", message))
+        text = message(
+            "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
+        )
+        warnings.append(ResultWarning("nothing-to-draw", text))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
         "two-mass", budget.results, budget=budget.lines, events=Events(release), warnings=warnings
@@ -256,8 +262,8 @@ def _constants(
     if decay.tail is not None:
         decay.warnings.extend(tail_warnings(decay))
         return decay, constants_from_tail(record, decay)
-    message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
-    decay.warnings.append(ResultWarning("tail-too-short", message))
+    text = message("the stick tail is shorter than two periods: period and damping come from the joint fit.")
+    decay.warnings.append(ResultWarning("tail-too-short", text))
     return decay, constants_from_joint_fit(chosen, fitted)
 
 

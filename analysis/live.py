@@ -20,7 +20,7 @@ from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.preparation.channels import Channel
 from analysis.preparation.drift import remove_drift
 from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
-from analysis.quantities import Quantity
+from analysis.quantities import BudgetSource, Quantity
 from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.results.decay_constants import DecayConstants, constants_from_joint_fit, constants_from_tail
 from analysis.results.fitted_quantities import joint_fit_uncertainty
@@ -298,7 +298,9 @@ def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -
 def _beside_clock(known: ParameterUncertainty, weights: Floats) -> float:
     """Standard uncertainty but for the time base: a longer run times the device's clock better, too."""
     shares = known.contributions(weights)
-    return float(np.sqrt(sum(share**2 for source, share in shares.items() if source != "time base")))
+    return float(
+        np.sqrt(sum(share**2 for source, share in shares.items() if source is not BudgetSource.TIME_BASE))
+    )
 
 
 def _friction(chosen: Fit, fitted: ParameterUncertainty) -> Quantity:

@@ -24,6 +24,7 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
 from analysis.results.fitted_quantities import add_systematic_uncertainty, msk64_degree
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
+from messages.message import message
 
 CLOCK_UNCERTAINTY = 5e-5
 """Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
@@ -332,27 +333,36 @@ def _warnings(
     found = [*_range_warnings(uses)]
     if motion.slip_end_s == 0.0:
         needed_mm = smallest_pullback_m(test.parameters) * 1e3
-        message = f"the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm."
-        return [*found, ResultWarning("no-slip", message)]
+        text = message(
+            "the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.",
+            needed_mm=needed_mm,
+        )
+        return [*found, ResultWarning("no-slip", text)]
     if motion.slip_end_s >= test.duration_s:
-        message = f"the plate will still slip after {test.duration_s:g} s. Record longer."
-        found.append(ResultWarning("slip-to-end", message))
+        text = message(
+            "the plate will still slip after {duration_s:g} s. Record longer.", duration_s=test.duration_s
+        )
+        found.append(ResultWarning("slip-to-end", text))
     elif test.duration_s < (needed_s := motion.slip_end_s + TAIL_PERIODS_MIN * test.period_s):
-        message = f"the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more."
-        found.append(ResultWarning("tail-too-short", message))
+        text = message(
+            "the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more.",
+            needed_s=needed_s,
+        )
+        found.append(ResultWarning("tail-too-short", text))
     if "friction_dynamic" not in ledger.results:
-        message = "the record will not tell f_d. Sample faster and longer, within the gauges' ranges."
-        found.append(ResultWarning("friction-undetermined", message))
+        text = message("the record will not tell f_d. Sample faster and longer, within the gauges' ranges.")
+        found.append(ResultWarning("friction-undetermined", text))
     unstated = [
         f"gauge {number}"
         for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
         if gauge.gain_relative is None
     ]
     if unstated:
-        message = (
-            f"the gain of {' and '.join(unstated)} has no stated uncertainty, so that its part is missing."
+        text = message(
+            "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
+            gauges=" and ".join(unstated),
         )
-        found.append(ResultWarning("gain-not-stated", message))
+        found.append(ResultWarning("gain-not-stated", text))
     return found
 
 
@@ -361,11 +371,15 @@ def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
     for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
         if use.range_m is not None and not use.fits():
             read = f"{use.lowest_m * 1e3:.2f} to {use.highest_m * 1e3:.2f} mm"
-            message = (
-                f"gauge {number} will read {read}, beyond its range of {use.range_m * 1e3:.2f} mm: clipped"
-                f" readings are left out. {remedy}"
+            text = message(
+                "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
+                " readings are left out. {remedy}",
+                number=number,
+                read=read,
+                range_m=use.range_m * 1e3,
+                remedy=remedy,
             )
-            found.append(ResultWarning(f"gauge-{number}-range", message))
+            found.append(ResultWarning(f"gauge-{number}-range", text))
     return found
 
 

@@ -1,6 +1,10 @@
 """A number that can be signed: value, standard uncertainty, 95 % interval, unit."""
 
 from dataclasses import dataclass
+from enum import Enum
+from typing import Self, TypeAlias
+
+from messages.message import Message, message
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +35,147 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class ResultWarning:
-    """Something that the reader of a result must know. `code` is stable, `message` is for people."""
+    """A fact that limits what a result is worth.
+
+    Attributes
+    ----------
+    code : str
+        Stable name, for programs.
+    message : Message
+        Sentence for people.
+    """
 
     code: str
-    message: str
+    message: Message
+
+
+class SharedBy(Enum):
+    """Which runs have the error of a source in common."""
+
+    NONE = "none"
+    """Each run has an error of its own: repeats average it."""
+    CALIBRATION = "calibration"
+    SERIES = "series"
+    STAND = "stand"
+
+
+class BudgetSource(Enum):
+    """Source of uncertainty. The value is its name in JSON and on screens.
+
+    Attributes
+    ----------
+    shared_by : SharedBy
+    is_rectangular : bool
+        The error has a rectangular distribution instead of a normal one.
+    """
+
+    NOISE = "noise", SharedBy.NONE
+    TABLE_MASS = "table mass"
+    PLATE_MASS = "plate mass"
+    MASS = "mass"
+    GRAVITY = "gravity"
+    TIME_BASE = "time base"
+    LEVELLING = "levelling of the plane", SharedBy.SERIES, True
+    GAUGE_1_GAIN = "gauge 1 gain", SharedBy.CALIBRATION
+    GAUGE_2_GAIN = "gauge 2 gain", SharedBy.CALIBRATION
+    GAUGE_1_GAIN_NOT_STATED = "gauge 1 gain (not stated)", SharedBy.CALIBRATION
+    GAUGE_2_GAIN_NOT_STATED = "gauge 2 gain (not stated)", SharedBy.CALIBRATION
+    GAUGE_1_NONLINEARITY = "gauge 1 non-linearity", SharedBy.CALIBRATION, True
+    GAUGE_2_NONLINEARITY = "gauge 2 non-linearity", SharedBy.CALIBRATION, True
+    GAUGE_2_LAG = "lag of gauge 2", SharedBy.CALIBRATION
+    UNDIVIDED = "not broken down"
+    """The whole uncertainty of a quantity that has no budget."""
+    READINGS = "readings", SharedBy.NONE
+    DIAL_GAUGE = "dial gauge"
+    ZERO_DRIFT = "zero drift"
+    NONLINEARITY = "non-linearity and hysteresis"
+    REPEATABILITY = "repeatability"
+    CALIBRATION_GAIN = "gain of the calibration"
+    KNOWN_DISPLACEMENT = "known displacement"
+
+    shared_by: SharedBy
+    is_rectangular: bool
+
+    def __new__(cls, name: str, shared_by: SharedBy = SharedBy.STAND, is_rectangular: bool = False) -> Self:
+        """Make a member whose value is its name."""
+        member = object.__new__(cls)
+        member._value_ = name
+        member.shared_by = shared_by
+        member.is_rectangular = is_rectangular
+        return member
+
+    @property
+    def label(self) -> Message:
+        """Name for people."""
+        return Message(self.value)
+
+    def __str__(self) -> str:
+        """Name in JSON."""
+        return str(self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class OtherLaw:
+    """The chance that another friction law than the chosen one is true: a source of uncertainty of its own.
+
+    Attributes
+    ----------
+    law : str
+        Name of that law.
+    """
+
+    law: str
+
+    @property
+    def shared_by(self) -> SharedBy:
+        """Each run chooses its law by its own readings."""
+        return SharedBy.NONE
+
+    @property
+    def is_rectangular(self) -> bool:
+        """The error counts as normal."""
+        return False
+
+    @property
+    def label(self) -> Message:
+        """Name for people."""
+        return message(_OTHER_LAW, law=self.law)
+
+    def __str__(self) -> str:
+        """Name in JSON."""
+        return str(self.label)
+
+
+_OTHER_LAW = "law may be {law}"
+Source: TypeAlias = BudgetSource | OtherLaw
+
+
+def parse_source(name: str) -> Source:
+    """Source of a name in JSON. Raises ValueError for a name that no version has written."""
+    if name in _SOURCES:
+        return _SOURCES[name]
+    beginning = _OTHER_LAW.partition("{")[0]
+    if not name.startswith(beginning):
+        raise ValueError(f"{name!r} is no source of uncertainty")
+    return OtherLaw(name.removeprefix(beginning))
+
+
+_SOURCES = {source.value: source for source in BudgetSource}
 
 
 @dataclass(frozen=True, slots=True)
 class BudgetLine:
-    """One source's share of the standard uncertainty of one result (same unit as that result).
+    """Contribution of one source to the standard uncertainty of one result.
 
-    NaN where the source is known to matter but its uncertainty is not stated.
+    Attributes
+    ----------
+    source : Source
+    contribution_to : str
+        Name of the result.
+    standard_uncertainty : float
+        In the unit of the result. NaN where the source matters but its uncertainty is not stated.
     """
 
-    source: str
+    source: Source
     contribution_to: str
     standard_uncertainty: float

@@ -11,19 +11,18 @@ from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, OtherLaw, Quantity, Source
 from analysis.record import Record
 
 Values = TypeVar("Values", float, Floats)
 
 _SOURCES = {
-    Parameter.TABLE_MASS: "table mass",
-    Parameter.PLATE_MASS: "plate mass",
-    Parameter.TABLE_GAIN: "gauge 1 gain",
-    Parameter.RELATIVE_GAIN: "gauge 2 gain",
-    Parameter.LAG: "lag of gauge 2",
+    Parameter.TABLE_MASS: BudgetSource.TABLE_MASS,
+    Parameter.PLATE_MASS: BudgetSource.PLATE_MASS,
+    Parameter.TABLE_GAIN: BudgetSource.GAUGE_1_GAIN,
+    Parameter.RELATIVE_GAIN: BudgetSource.GAUGE_2_GAIN,
+    Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
-LEVELLING = "levelling of the plane"
 LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
 """Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
 _SHARE_MIN = 1e-3
@@ -45,16 +44,18 @@ class ParameterUncertainty:
         Covariance from the readings' noise.
     """
 
-    shifts: dict[str, Floats]
+    shifts: dict[Source, Floats]
     noise_covariance: Floats
 
     def standard_uncertainty(self, weights: Floats) -> float:
         """Standard uncertainty of a linear form of the parameters."""
         return float(np.sqrt(sum(share**2 for share in self.contributions(weights).values())))
 
-    def contributions(self, weights: Floats) -> dict[str, float]:
+    def contributions(self, weights: Floats) -> dict[Source, float]:
         """Standard uncertainty of a linear form by source; "noise" is type A."""
-        shares = {"noise": float(np.sqrt(max(0.0, float(weights @ self.noise_covariance @ weights))))}
+        shares: dict[Source, float] = {
+            BudgetSource.NOISE: float(np.sqrt(max(0.0, float(weights @ self.noise_covariance @ weights))))
+        }
         shares.update({source: abs(float(column @ weights)) for source, column in self.shifts.items()})
         return shares
 
@@ -102,15 +103,15 @@ def propagate_with_model_choice(
     for fit, share in zip(candidates, shares, strict=True):
         if fit is not chosen and share > _SHARE_MIN:
             noise = noise + share * (propagate(problem, fit, block_s).noise_covariance - own.noise_covariance)
-            columns[f"law may be {fit.law.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
+            columns[OtherLaw(fit.law.value)] = np.sqrt(share) * (fit.parameters - chosen.parameters)
     return ParameterUncertainty(columns, noise)
 
 
 def unstated_gains(record: Record) -> list[BudgetLine]:
     """Budget lines of gauges whose gain has no stated uncertainty: their share of f_d is not known (NaN)."""
-    gauges = {"gauge 1 gain (not stated)": record.table_gauge}
+    gauges = {BudgetSource.GAUGE_1_GAIN_NOT_STATED: record.table_gauge}
     if record.relative_displacement_m is not None:
-        gauges["gauge 2 gain (not stated)"] = record.relative_gauge
+        gauges[BudgetSource.GAUGE_2_GAIN_NOT_STATED] = record.relative_gauge
     return [
         BudgetLine(source, "friction_dynamic", float("nan"))
         for source, gauge in gauges.items()
@@ -181,7 +182,7 @@ class UncertaintyBudget:
         name: str,
         value: float,
         unit: str,
-        contributions: dict[str, float],
+        contributions: dict[Source, float],
         half_widths: tuple[float, float] | None = None,
     ) -> None:
         """Note a quantity with the standard uncertainty from each source; zero shares are left out.
@@ -206,7 +207,7 @@ def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> Par
     systems = problem.normal_equations(fit.parameters, fit.law, fit.free)
     for system, factor in zip(systems, noise_factors, strict=False):
         noise += factor * inverse @ system[:-1, :-1] @ inverse
-    sources = {}
+    sources: dict[Source, Floats] = {}
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
         if 0.0 < deviation < np.inf:

@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.formatting import format_number
 from analysis.plan import PlannedTest, expected_budget, range_use
+from analysis.quantities import BudgetSource
 from analysis.record import GaugeUncertainty
 
 RATE_MAX_HZ = 100_000.0
@@ -74,8 +75,10 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
     if "friction_dynamic" not in ledger.results:
         return None
     shares = [line for line in ledger.lines if line.contribution_to == "friction_dynamic"]
-    noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source == "noise"))
-    stated = math.hypot(*(line.standard_uncertainty for line in shares if line.source != "noise"))
+    noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source is BudgetSource.NOISE))
+    stated = math.hypot(
+        *(line.standard_uncertainty for line in shares if line.source is not BudgetSource.NOISE)
+    )
     return UncertaintyParts(noise, stated)
 
 

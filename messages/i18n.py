@@ -55,5 +55,7 @@ def N_(text: str) -> str:  # noqa: N802 - the name that gettext recommends
 def translate(message: Message | str) -> str:
     """Render a message in the language in use."""
     if isinstance(message, Message):
-        return message.render(_translations)
+        if _translations.gettext(message.template) != message.template or message.plural:
+            return message.render(_translations)
+        message = str(message)
     return message if _language == ENGLISH else translate_sentence(message, _language)

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult, SeriesKey
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from config.files import load_stand, published_table
 
 FRICTION, VELOCITY = "friction_dynamic", "table_velocity_max_m_per_s"
@@ -29,7 +29,10 @@ def run(name: str, series: str | SeriesKey, values: dict[str, tuple[float, ...]]
     results, budget = {}, []
     for quantity, (value, own, shared) in values.items():
         results[quantity] = Quantity.normal(value, math.hypot(own, shared), "1")
-        budget += [BudgetLine("noise", quantity, own), BudgetLine("gauge 1 gain", quantity, shared)]
+        budget += [
+            BudgetLine(BudgetSource.NOISE, quantity, own),
+            BudgetLine(BudgetSource.GAUGE_1_GAIN, quantity, shared),
+        ]
     return RunResult(
         name, key, results, tuple(budget), calibration_id="A", stand_id="S", adequate=True, **fields
     )

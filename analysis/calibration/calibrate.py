@@ -11,7 +11,8 @@ from scipy.special import stdtrit
 from analysis.arrays import Floats
 from analysis.calibration.points import POLYNOMIAL_DEGREES, CalibrationError, CalibrationPoints
 from analysis.formatting import format_number
-from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
+from messages.message import message
 
 _REACH = 0.5
 """A polynomial is asked for its zero no further beyond the readings than this share of their span."""
@@ -352,16 +353,22 @@ def _budget(
     drift_m = abs(merits.zero_drift_m or 0.0) / _SQRT12
     at = np.linspace(curve.ends[0], curve.ends[1], 21)
     return (
-        BudgetLine("readings", "gain_m_per_count", scatter_m * curve.chord_standard_uncertainty() / span_m),
-        BudgetLine("dial gauge", "gain_m_per_count", math.sqrt(2.0) * certificate_m / span_m),
-        BudgetLine("readings", "zero", scatter_m * float(curve.standard_uncertainty(np.array([zero]))[0])),
-        BudgetLine("dial gauge", "zero", certificate_m),
-        BudgetLine("zero drift", "zero", drift_m),
-        BudgetLine("readings", "displacement", scatter_m * float(curve.standard_uncertainty(at).max())),
-        BudgetLine("dial gauge", "displacement", certificate_m),
-        BudgetLine("zero drift", "displacement", drift_m),
-        BudgetLine("non-linearity and hysteresis", "displacement", merits.nonlinearity_m / math.sqrt(3.0)),
-        BudgetLine("repeatability", "displacement", merits.repeatability_m or 0.0),
+        BudgetLine(
+            BudgetSource.READINGS, "gain_m_per_count", scatter_m * curve.chord_standard_uncertainty() / span_m
+        ),
+        BudgetLine(BudgetSource.DIAL_GAUGE, "gain_m_per_count", math.sqrt(2.0) * certificate_m / span_m),
+        BudgetLine(
+            BudgetSource.READINGS, "zero", scatter_m * float(curve.standard_uncertainty(np.array([zero]))[0])
+        ),
+        BudgetLine(BudgetSource.DIAL_GAUGE, "zero", certificate_m),
+        BudgetLine(BudgetSource.ZERO_DRIFT, "zero", drift_m),
+        BudgetLine(
+            BudgetSource.READINGS, "displacement", scatter_m * float(curve.standard_uncertainty(at).max())
+        ),
+        BudgetLine(BudgetSource.DIAL_GAUGE, "displacement", certificate_m),
+        BudgetLine(BudgetSource.ZERO_DRIFT, "displacement", drift_m),
+        BudgetLine(BudgetSource.NONLINEARITY, "displacement", merits.nonlinearity_m / math.sqrt(3.0)),
+        BudgetLine(BudgetSource.REPEATABILITY, "displacement", merits.repeatability_m or 0.0),
     )
 
 
@@ -373,7 +380,7 @@ def _combined(ledger: tuple[BudgetLine, ...], name: str) -> float:
 def _share(ledger: tuple[BudgetLine, ...], name: str) -> float:
     """Share of the readings, which alone have few degrees of freedom, in a standard uncertainty."""
     whole = _combined(ledger, name)
-    readings = _combined(tuple(line for line in ledger if line.source == "readings"), name)
+    readings = _combined(tuple(line for line in ledger if line.source is BudgetSource.READINGS), name)
     return readings / whole if whole else 0.0
 
 
@@ -391,8 +398,13 @@ def _warnings(
     cautions = [
         ResultWarning(
             "reading-doubtful",
-            f"reading {place + 1}, {readings.dial_m[place] * 1e3:.4g} mm, is"
-            f" {residual_m[place] * 1e3:+.3f} mm off the curve. Check it for a misread turn of the dial",
+            message(
+                "reading {place}, {dial_m:.4g} mm, is {residual_m:+.3f} mm off the curve. Check it for a"
+                " misread turn of the dial",
+                place=place + 1,
+                dial_m=readings.dial_m[place] * 1e3,
+                residual_m=residual_m[place] * 1e3,
+            ),
         )
         for place in np.flatnonzero(np.abs(residual_m) > _DOUBTFUL * usual_m)
     ]
@@ -400,13 +412,15 @@ def _warnings(
         cautions.append(
             ResultWarning(
                 "dial-uncertainty-not-stated",
-                "the dial gauge's own uncertainty is not stated and not counted.",
+                message("the dial gauge's own uncertainty is not stated and not counted."),
             )
         )
     if merits.hysteresis_m is None:
         cautions.append(
-            ResultWarning("one-way-only", "hysteresis cannot be told without readings up and down.")
+            ResultWarning("one-way-only", message("hysteresis cannot be told without readings up and down."))
         )
     if merits.repeatability_m is None:
-        cautions.append(ResultWarning("one-round-only", "repeatability cannot be told from one round."))
+        cautions.append(
+            ResultWarning("one-round-only", message("repeatability cannot be told from one round."))
+        )
     return cautions

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from analysis.calibration.points import CalibrationError
-from analysis.quantities import BudgetLine, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
+from messages.message import message
 
 COVERAGE: Final = 2.0
 """The tolerance is so many combined standard uncertainties: about 95 % (JCGM 100, 6.3)."""
@@ -163,15 +164,15 @@ def _budget(
     gain = math.nan if claim.gain_relative is None else claim.gain_relative
     known_m = math.nan if reference.standard_uncertainty_m is None else reference.standard_uncertainty_m
     lines = [
-        ("gain of the calibration", gain * abs(reference.displacement_m)),
-        ("known displacement", known_m),
-        ("readings", math.hypot(rest.standard_uncertainty_m, moved.standard_uncertainty_m)),
+        (BudgetSource.CALIBRATION_GAIN, gain * abs(reference.displacement_m)),
+        (BudgetSource.KNOWN_DISPLACEMENT, known_m),
+        (BudgetSource.READINGS, math.hypot(rest.standard_uncertainty_m, moved.standard_uncertainty_m)),
     ]
     if not reference.is_electric:
         nonlinearity_m = (claim.nonlinearity_m or 0.0) / math.sqrt(3.0)
         lines += [
-            ("non-linearity and hysteresis", _BOTH_ENDS * nonlinearity_m),
-            ("repeatability", _BOTH_ENDS * (claim.repeatability_m or 0.0)),
+            (BudgetSource.NONLINEARITY, _BOTH_ENDS * nonlinearity_m),
+            (BudgetSource.REPEATABILITY, _BOTH_ENDS * (claim.repeatability_m or 0.0)),
         ]
     return tuple(BudgetLine(source, _MEASURED, uncertainty_m) for source, uncertainty_m in lines)
 
@@ -180,7 +181,12 @@ def _warnings(
     reference: ReferenceDisplacement, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
 ) -> list[ResultWarning]:
     cautions = [
-        ResultWarning("not-stated", f"the uncertainty of the {line.source} is not stated and not counted.")
+        ResultWarning(
+            "not-stated",
+            message(
+                "the uncertainty of the {source} is not stated and not counted.", source=line.source.label
+            ),
+        )
         for line in budget
         if math.isnan(line.standard_uncertainty)
     ]
@@ -189,15 +195,20 @@ def _warnings(
         cautions.append(
             ResultWarning(
                 "check-blunt",
-                f"an error of {share:.0%} would pass. Take a larger displacement, or a surer one.",
+                message(
+                    "an error of {share:.0%} would pass. Take a larger displacement, or a surer one.",
+                    share=share,
+                ),
             )
         )
     if measured_m * reference.displacement_m < 0.0:
         cautions.append(
             ResultWarning(
                 "other-way",
-                "the gauge shows a displacement to the other side. Check its direction, its plugs and the"
-                " sign that was given.",
+                message(
+                    "the gauge shows a displacement to the other side. Check its direction, its plugs"
+                    " and the sign that was given."
+                ),
             )
         )
     return cautions

@@ -1,6 +1,5 @@
 """A campaign summed up: a row a series, and what was left out and why."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,8 +10,7 @@ from analysis.campaign.effects import Effects, find_effects
 from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow, pool_rows
 from analysis.campaign.series import RunResult, campaign_warnings, group_into_series, run_names
 from analysis.quantities import ResultWarning
-
-_GAUGE = re.compile(r"gauge \d")
+from messages.message import Message, message
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,21 +82,23 @@ def _velocity(row: SeriesRow) -> float:
 
 def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
     """What was said of single runs, once for each code and gauge, with the runs that it was said of."""
-    said: dict[tuple[str, ...], list[tuple[RunResult, str]]] = {}
+    groups: dict[tuple[str, object], list[tuple[RunResult, Message]]] = {}
     for run in runs:
-        for caution in run.warnings:
-            gauges = _GAUGE.findall(caution.message)
-            said.setdefault((caution.code, *gauges), []).append((run, caution.message))
-    return [ResultWarning(code, _alike(of_it)) for (code, *_), of_it in said.items()]
+        for warning in run.warnings:
+            key = warning.code, warning.message.values.get("gauge")
+            groups.setdefault(key, []).append((run, warning.message))
+    return [ResultWarning(code, _combined(group)) for (code, _), group in groups.items()]
 
 
-def _alike(said: Sequence[tuple[RunResult, str]]) -> str:
-    """What was said of each of some runs, in the words of the first where figures differ."""
-    runs = {run.name: run for run, _ in said}
-    messages = dict.fromkeys(message for _, message in said)
-    first = next(iter(messages))
-    told = f"{run_names(list(runs.values()))}: {first}"
-    return told if len(messages) == 1 else f"{told} (of the first; of the others with other figures)"
+def _combined(group: Sequence[tuple[RunResult, Message]]) -> Message:
+    """Message of the first run of a group, with the names of all runs."""
+    runs = {run.name: run for run, _ in group}
+    names, first = run_names(list(runs.values())), group[0][1]
+    if all(other == first for _, other in group):
+        return message("{runs}: {warning}", runs=names, warning=first)
+    return message(
+        "{runs}: {warning} (of the first; of the others with other figures)", runs=names, warning=first
+    )
 
 
 _UNITS_PRINTED = {"stiffness_n_per_m": KILOGRAM_FORCE_N}

@@ -262,7 +262,7 @@ def observations(rows: Sequence[SeriesRow]) -> Observations:
     pooled = [row.quantities[FRICTION] for row in rows]
     values = np.array([one.quantity.value for one in pooled])
     own = np.array([one.repeatable for one in pooled]) / values
-    keys = sorted({key for one in pooled for key in one.common})
+    keys = sorted({key for one in pooled for key in one.common}, key=str)
     shared = np.array([[one.common.get(key, 0.0) for key in keys] for one in pooled]) / values[:, None]
     return Observations(np.log(values), own**2, shared @ shared.T, _degrees(rows))
 

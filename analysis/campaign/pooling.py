@@ -10,16 +10,32 @@ from scipy.special import stdtrit
 
 from analysis.campaign.scatter import RepeatedValues, SeriesScatter, estimate_scatter, find_outliers
 from analysis.campaign.series import RunResult
-from analysis.quantities import BudgetLine, Quantity
-from analysis.uncertainty import COVERAGE_FACTOR_95, LEVELLING
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, SharedBy, Source
+from analysis.uncertainty import COVERAGE_FACTOR_95
 
-_OWN = ("noise", "law may be ")
-"""How the sources begin that each run has for itself."""
-_UNEXPLAINED = "not broken down"
 _SMALLEST = 1e-9
 """Relative uncertainty under which numbers decide, not readings."""
 _LARGEST = 1e100
 """What is farther from 0 has no square, and is no measured number."""
+
+
+@dataclass(frozen=True, slots=True)
+class SharedError:
+    """An error that several values have in common.
+
+    Attributes
+    ----------
+    source : Source
+    shared_by : str
+        Identity of the calibration, stand or series.
+    """
+
+    source: Source
+    shared_by: str
+
+    def __str__(self) -> str:
+        """Name in JSON: `gauge 1 gain of A`."""
+        return f"{self.source} of {self.shared_by}"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +58,7 @@ class RunValue:
     run: str
     value: float
     repeatable: float
-    common: dict[str, float]
+    common: dict[SharedError, float]
     half_widths: tuple[float, float]
     unit: str
 
@@ -58,7 +74,7 @@ def run_value(run: RunResult, name: str) -> RunValue | None:
     lines = [line for line in run.budget if line.contribution_to == name]
     stated = quantity.standard_uncertainty if quantity.standard_uncertainty < _LARGEST else 0.0
     if not lines and stated:
-        lines = [BudgetLine(_UNEXPLAINED, name, stated)]
+        lines = [BudgetLine(BudgetSource.UNDIVIDED, name, stated)]
     common, own = _split_budget(run, lines)
     low, high = quantity.interval_95
     reach = quantity.value - low, high - quantity.value
@@ -92,28 +108,28 @@ def is_fully_stated(run: RunResult, name: str) -> bool:
     )
 
 
-def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[str, float], float]:
-    common: dict[str, float] = {}
+def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedError, float], float]:
+    common: dict[SharedError, float] = {}
     own = 0.0
     for line in lines:
         if not line.standard_uncertainty < _LARGEST:
             continue
-        if line.source.startswith(_OWN):
+        if line.source.shared_by is SharedBy.NONE:
             own = math.hypot(own, line.standard_uncertainty)
         else:
-            key = f"{line.source} of {_shared_by(run, line.source)}"
+            key = SharedError(line.source, _shared_by(run, line.source))
             common[key] = math.hypot(common.get(key, 0.0), line.standard_uncertainty)
     return common, own
 
 
-def _shared_by(run: RunResult, source: str) -> str:
-    """Identity of what errs: the calibration, the stand, or the plane of one series."""
-    if source.startswith(("gauge ", "lag ")):
+def _shared_by(run: RunResult, source: Source) -> str:
+    """Identity of the calibration, the stand, or the series whose plane was levelled once."""
+    if source.shared_by is SharedBy.CALIBRATION:
         return run.calibration_id
-    return run.series.label if source == LEVELLING else run.stand_id
+    return run.series.label if source.shared_by is SharedBy.SERIES else run.stand_id
 
 
-def _own_by_interval(deviation: float, stated: float, common: dict[str, float]) -> float:
+def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, float]) -> float:
     """The run's own part where its interval is wider than a normal one; 0 where it is not."""
     if not deviation < _LARGEST or deviation <= stated * (1.0 + 1e-9):
         return 0.0
@@ -151,7 +167,7 @@ class PooledQuantity:
     quantity: Quantity
     runs: int
     repeatable: float
-    common: dict[str, float]
+    common: dict[SharedError, float]
     between_runs: float | None
     scatter: float | None
     birge_ratio: float | None
@@ -238,9 +254,9 @@ def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:
     return math.sqrt(max(0.0, scatter.factor * run - noise))
 
 
-def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[str, float]:
+def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[SharedError, float]:
     """Error of the mean from each shared source: readings with the same key err alike."""
-    common: dict[str, float] = {}
+    common: dict[SharedError, float] = {}
     for one, share in zip(readings, shares, strict=True):
         for key, deviation in one.common.items():
             common[key] = common.get(key, 0.0) + share * deviation

@@ -12,6 +12,7 @@ from analysis.campaign.pooling import PooledQuantity, RunValue, is_fully_stated,
 from analysis.campaign.series import Series, SeriesKey, run_names
 from analysis.quantities import Quantity, ResultWarning
 from analysis.results.fitted_quantities import msk64_degree
+from messages.message import message
 
 STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
 _POOLED = (*COLUMNS[1:], Column(STATIC_LOWER, "f_s >=", "1", ""), Column(STATIC_UPPER, "f_s <=", "1", ""))
@@ -100,16 +101,25 @@ def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> list[Res
     friction = quantities.get(_FRICTION)
     found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
     if friction is None:
-        found.append(ResultWarning("no-friction", f"{series.label}: no run determined f_d."))
+        found.append(
+            ResultWarning("no-friction", message("{label}: no run determined f_d.", label=series.label))
+        )
     elif friction.runs == 1:
         found.append(
             ResultWarning(
-                "single-run", f"{series.label}: one run alone determined f_d. Repeat the test twice at least"
+                "single-run",
+                message(
+                    "{label}: one run alone determined f_d. Repeat the test twice at least",
+                    label=series.label,
+                ),
             )
         )
     if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
-        message = f"{series.label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate"
-        found.append(ResultWarning("gain-not-stated", message))
+        text = message(
+            "{label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate",
+            label=series.label,
+        )
+        found.append(ResultWarning("gain-not-stated", text))
     return [caution for caution in found if caution is not None]
 
 
@@ -123,8 +133,12 @@ def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWa
     said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
     return ResultWarning(
         "outlying-run",
-        f"{series.label}: far from the other runs: {said}. All runs count; look at these, and leave out with"
-        " --exclude what there is a reason for",
+        message(
+            "{label}: far from the other runs: {said}. All runs count; look at these, and leave"
+            " out with --exclude what there is a reason for",
+            label=series.label,
+            said=said,
+        ),
     )
 
 
@@ -138,13 +152,24 @@ def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> Resul
     ]
     if not found:
         return None
-    message = f"{series.label}: runs differ by more than their noise explains in {', '.join(found)}."
-    return ResultWarning("runs-differ", f"{message} The uncertainties include these differences")
+    return ResultWarning(
+        "runs-differ",
+        message(
+            "{series}: runs differ by more than their noise explains in {quantities}. The uncertainties"
+            " include these differences",
+            series=series.label,
+            quantities=found,
+        ),
+    )
 
 
 def _inadequate(series: Series) -> ResultWarning | None:
     wrong = [run for run in series.runs if run.adequate is False]
     if not wrong:
         return None
-    message = f"{series.label}: no friction law explains {run_names(wrong)}. Look at it: slipstand analyze"
-    return ResultWarning("not-adequate", message)
+    text = message(
+        "{label}: no friction law explains {run_names}. Look at it: slipstand analyze",
+        label=series.label,
+        run_names=run_names(wrong),
+    )
+    return ResultWarning("not-adequate", text)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from messages.message import message
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,19 +169,23 @@ def _calibrations(runs: Sequence[RunResult]) -> ResultWarning | None:
     count = len({run.calibration_id for run in runs})
     if count < 2:
         return None
-    message = f"{count} calibrations were in use: their errors are taken as independent of each other."
-    return ResultWarning("several-calibrations", message)
+    text = message(
+        "{count} calibrations were in use: their errors are taken as independent of each other.", count=count
+    )
+    return ResultWarning("several-calibrations", text)
 
 
 def _without_series(runs: Sequence[RunResult]) -> ResultWarning | None:
     without = [run for run in runs if not run.series.code]
     if not without:
         return None
-    message = (
-        f"{len(without)} runs have no series ({run_names(without)}): they are sorted by contact, pullback and"
-        " masses. Name it: slipstand edit RUN --series CODE"
+    text = message(
+        "{count} runs have no series ({run_names}): they are sorted by contact, pullback and masses."
+        " Name it: slipstand edit RUN --series CODE",
+        count=len(without),
+        run_names=run_names(without),
     )
-    return ResultWarning("no-series", message)
+    return ResultWarning("no-series", text)
 
 
 def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[ResultWarning]:
@@ -191,8 +196,13 @@ def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[R
     return [
         ResultWarning(
             "unknown-contact",
-            f"contact {contact or 'not named'!r} ({run_names(of_it)}) is not one of the stand"
-            f" ({', '.join(known)}). It gets rows of its own; name it in stand.toml",
+            message(
+                "contact {contact!r} ({run_names}) is not one of the stand ({known}). It gets rows of its"
+                " own; name it in stand.toml",
+                contact=contact or "not named",
+                run_names=run_names(of_it),
+                known=", ".join(known),
+            ),
         )
         for contact, of_it in unknown.items()
     ]

@@ -30,6 +30,7 @@ from analysis.preparation.release import median_of_three
 from analysis.quantities import ResultWarning
 from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient
+from messages.message import message
 
 PERIODS_MIN = 2.0
 _BEFORE_CROSSING = 0.2
@@ -156,10 +157,12 @@ def _left_out(
     readings: Channel, spikes: "np.ndarray[tuple[int], np.dtype[np.bool_]]", warnings: list[ResultWarning]
 ) -> Channel:
     if spikes.any():
-        message = (
-            f"{int(spikes.sum())} spikes were left out of {len(spikes)} readings. Check cable and supply."
+        text = message(
+            "{sum} spikes were left out of {count} readings. Check cable and supply.",
+            sum=int(spikes.sum()),
+            count=len(spikes),
         )
-        warnings.append(ResultWarning("spikes-left-out", message))
+        warnings.append(ResultWarning("spikes-left-out", text))
     return Channel(readings.time_s[~spikes], readings.value_m[~spikes])
 
 
@@ -171,12 +174,13 @@ def _refit_above_rounding(
     above = readings_before_amplitude(limit, found.channel, found.parameters)
     if len(above) == len(found.channel):
         return found
-    message = (
-        f"readings come in steps of {format_with_unit(step, unit)}: what swings under {_STEPS_SEEN:g} of"
-        f" them was not"
-        " fitted, since rounding looks like friction there. Choose a finer range."
+    text = message(
+        "readings come in steps of {step}: what swings under {steps_seen:g} of them was not fitted,"
+        " since rounding looks like friction there. Choose a finer range.",
+        step=format_with_unit(step, unit),
+        steps_seen=_STEPS_SEEN,
     )
-    warnings.append(ResultWarning("coarse-steps", message))
+    warnings.append(ResultWarning("coarse-steps", text))
     return fit(above, found.parameters, found.order)
 
 
@@ -243,20 +247,22 @@ def _quiet_after(
     centred = abs(level - found.parameters.offset) <= 3.0 * (reach + found.rms) + unseen
     if quiet and centred:
         return True
-    message = (
-        f"after its decay the mass is {format_with_unit(level - found.parameters.offset, unit)} off and"
-        f" moves by"
-        f" {format_with_unit(spread, unit)}: it was touched, or released twice. Take one release only."
+    text = message(
+        "after its decay the mass is {level} off and moves by {spread}: it was touched, or released"
+        " twice. Take one release only.",
+        level=format_with_unit(level - found.parameters.offset, unit),
+        spread=format_with_unit(spread, unit),
     )
-    warnings.append(ResultWarning("moves-again", message))
+    warnings.append(ResultWarning("moves-again", text))
     return False
 
 
 def _second_mode(found: OneMassFit, line: SpectralLine, unit: str) -> ResultWarning:
-    message = (
-        f"the residual oscillates at {format_number(line.frequency_hz)} Hz with"
-        f" {format_with_unit(line.amplitude, unit)},"
-        f" beside the decay at {format_number(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
-        " damping of another law."
+    text = message(
+        "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at"
+        " {period_s} Hz: a second mode, hum, or damping of another law.",
+        frequency_hz=format_number(line.frequency_hz),
+        amplitude=format_with_unit(line.amplitude, unit),
+        period_s=format_number(1.0 / found.parameters.period_s),
     )
-    return ResultWarning("second-mode", message)
+    return ResultWarning("second-mode", text)

@@ -14,9 +14,10 @@ from analysis.one_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
 from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
 from analysis.one_mass.turning_points import classical_log_decrement, find_turning_points
 from analysis.preparation.channels import Channel, Channels, read_channels
-from analysis.quantities import Quantity, ResultWarning
+from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
+from messages.message import message
 
 MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
 
@@ -164,17 +165,19 @@ def _uncertainty_budget(
     noise = np.zeros((7, 7))
     noise[:6, :6] = _noise_factor(found) * found.covariance
     columns = _sources(found, record)
-    columns["mass"] = np.array([0.0] * 6 + [deviation])
+    columns[BudgetSource.MASS] = np.array([0.0] * 6 + [deviation])
     budget = UncertaintyBudget()
     for name, its_unit, function in _QUANTITIES + (() if mass is None else _WITH_MASS):
         weights = numerical_gradient(function, point)
-        shares = {"noise": math.sqrt(max(0.0, float(weights @ noise @ weights)))}
+        shares: dict[Source, float] = {
+            BudgetSource.NOISE: math.sqrt(max(0.0, float(weights @ noise @ weights)))
+        }
         shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
         budget.add(name, function(point), its_unit or unit, shares)
     return budget
 
 
-def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
+def _sources(found: OneMassFit, record: Record) -> dict[Source, Floats]:
     """Shift (7,) of parameters and mass by one standard uncertainty of each stated source."""
     parameters, gauge = found.parameters, record.table_gauge
     time_powers = np.array([1.0, float(found.order), -1.0, -1.0, float(found.order), 0.0, 0.0])
@@ -185,9 +188,9 @@ def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
     # A deviation from the calibration line that is odd and vanishes at both ends of the range in use.
     bend = gauge.nonlinearity_m / math.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
     return {
-        "time base": record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
-        "gauge 1 gain": (gauge.gain_relative or 0.0) * sizes,
-        "gauge 1 non-linearity": np.append(parameter_shift(found, bend), 0.0),
+        BudgetSource.TIME_BASE: record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
+        BudgetSource.GAUGE_1_GAIN: (gauge.gain_relative or 0.0) * sizes,
+        BudgetSource.GAUGE_1_NONLINEARITY: np.append(parameter_shift(found, bend), 0.0),
     }
 
 
@@ -217,30 +220,30 @@ def _classical_figures(
     if classical is None:
         return []
     value, deviation = classical
-    budget.add("log_decrement_classical", value, "1", {"noise": deviation})
+    budget.add("log_decrement_classical", value, "1", {BudgetSource.NOISE: deviation})
     if not significant:
         return []
     displacement = budget.results["coulomb_displacement_m"].unit
-    message = (
-        f"dry friction is significant (x_k = {format_with_unit(parameters.coulomb, displacement)}): the"
-        f" plain log"
-        f" decrement {format_number(value, 4)} is biased, its viscous part is"
-        f" {format_number(budget.results['log_decrement'].value, 4)}."
+    text = message(
+        "dry friction is significant (x_k = {coulomb}): the plain log decrement {value} is biased,"
+        " its viscous part is {results}.",
+        coulomb=format_with_unit(parameters.coulomb, displacement),
+        value=format_number(value, 4),
+        results=format_number(budget.results["log_decrement"].value, 4),
     )
-    return [ResultWarning("coulomb-biases-log-decrement", message)]
+    return [ResultWarning("coulomb-biases-log-decrement", text)]
 
 
 def _verdict(solution: FreeDecayFit, significant: bool, warnings: list[ResultWarning]) -> ModelSelection:
     verdict = solution.verdict
     if not solution.adequate:
-        message = (
-            f"one decay with viscous and dry friction leaves"
-            f" {format_with_unit(verdict.rms, solution.unit)} of residual"
-            f" for {format_with_unit(verdict.noise, solution.unit)} of noise, or a pattern in it: period"
-            f" and damping"
-            " may be biased."
+        text = message(
+            "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
+            " or a pattern in it: period and damping may be biased.",
+            rms=format_with_unit(verdict.rms, solution.unit),
+            noise=format_with_unit(verdict.noise, solution.unit),
         )
-        warnings.append(ResultWarning("model-inadequate", message))
+        warnings.append(ResultWarning("model-inadequate", text))
     name = "viscous+coulomb" if significant else "viscous"
     return ModelSelection(name, solution.adequate, verdict.rms, verdict.noise)
 

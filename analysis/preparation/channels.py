@@ -9,6 +9,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_number
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
+from messages.message import message
 
 DELAY_MAX_S = 0.5
 """A gauge later than this is not read in the same test."""
@@ -206,7 +207,10 @@ def _relative(
         valid = _valid(value_m, record.relative_overload, gauge.range_m, "gauge 2")
     except RecordError as error:
         warnings.append(
-            ResultWarning("gauge-2-absent", f"{error} The friction comes from the table channel alone.")
+            ResultWarning(
+                "gauge-2-absent",
+                message("{error} The friction comes from the table channel alone.", error=error),
+            )
         )
         return None
     return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))

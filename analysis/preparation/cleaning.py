@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.preparation.channels import Channel, quantisation_m
 from analysis.quantities import ResultWarning
+from messages.message import Message, message
 
 _SPIKE_SIGMAS = 9.0
 _SPIKE_SHARE_MAX = 0.02
@@ -39,8 +40,8 @@ def remove_invalid_readings(channel: Channel, gauge: str, warnings: list[ResultW
     clipped = _clipped(channel.value_m, repeated)
     frozen = _frozen(channel, repeated) & ~clipped
     kinds = (
-        ("clipped", clipped, "stand still at the end of its range"),
-        ("frozen", frozen, "repeat the one before exactly, at length"),
+        ("clipped", clipped, message("stand still at the end of its range")),
+        ("frozen", frozen, message("repeat the one before exactly, at length")),
     )
     bad = np.zeros(len(channel), dtype=bool)
     for code, found, what in kinds:
@@ -51,13 +52,24 @@ def remove_invalid_readings(channel: Channel, gauge: str, warnings: list[ResultW
     spikes = _spikes(channel)
     if not spikes.any():
         return channel
-    what = f"stand out from their neighbours by over {_SPIKE_SIGMAS:.0f} standard deviations"
+    what = message(
+        "stand out from their neighbours by over {sigmas:.0f} standard deviations", sigmas=_SPIKE_SIGMAS
+    )
     warnings.append(_warning("spikes", gauge, int(spikes.sum()), len(channel), what))
     return Channel(channel.time_s[~spikes], channel.value_m[~spikes])
 
 
-def _warning(code: str, gauge: str, count: int, total: int, what: str) -> ResultWarning:
-    return ResultWarning(code, f"{count} of {total} readings of {gauge} {what}: they are left out.")
+def _warning(code: str, gauge: str, count: int, total: int, what: Message) -> ResultWarning:
+    return ResultWarning(
+        code,
+        message(
+            "{count} of {total} readings of {gauge} {what}: they are left out.",
+            count=count,
+            total=total,
+            gauge=gauge,
+            what=what,
+        ),
+    )
 
 
 def _repeated(x: Floats) -> NDArray[np.bool_]:

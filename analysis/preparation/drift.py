@@ -5,6 +5,7 @@ import numpy as np
 from analysis.formatting import format_length
 from analysis.preparation.channels import Channel
 from analysis.quantities import ResultWarning
+from messages.message import message
 
 _DRIFT_SIGMAS = 6.0
 """So far from none the drift of all readings must be, ..."""
@@ -30,18 +31,21 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
 def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
     """Say how gauge 1 or 2 drifts, and what is made of it."""
     if drift_m_per_s is None:
-        message = (
-            f"gauge {gauge} drifts or jumps after slip, not steadily: f_d may be biased."
-            " Let the amplifier warm up."
+        text = message(
+            "gauge {gauge} drifts or jumps after slip, not steadily: f_d may be biased. Let the"
+            " amplifier warm up.",
+            gauge=gauge,
         )
     else:
         moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
-        message = (
-            f"gauge {gauge} drifts by {format_length(drift_m_per_s)}/s, {format_length(moved_m)} in this"
-            f" record:"
-            " the drift is taken off. Let the amplifier warm up."
+        text = message(
+            "gauge {gauge} drifts by {drift_m_per_s}/s, {moved_m} in this record: the drift is taken"
+            " off. Let the amplifier warm up.",
+            gauge=gauge,
+            drift_m_per_s=format_length(drift_m_per_s),
+            moved_m=format_length(moved_m),
         )
-    return ResultWarning(f"gauge-{gauge}-drifts", message)
+    return ResultWarning(f"gauge-{gauge}-drifts", text)
 
 
 def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:

@@ -22,6 +22,7 @@ from analysis.preparation.plausibility import check_rate, check_span, estimate_p
 from analysis.preparation.release import Release, find_last_slip, find_releases
 from analysis.quantities import ResultWarning
 from analysis.record import Record
+from messages.message import message
 
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
@@ -143,8 +144,8 @@ def _readable(record: Record) -> tuple[Channels, list[ResultWarning]]:
     """Readings that gauges can have seen, with what is said of the others."""
     channels, warnings = read_channels(record)
     if record.relative_displacement_m is None:
-        message = "the record has no gauge 2. The friction comes from the table channel alone."
-        warnings.append(ResultWarning("gauge-2-absent", message))
+        text = message("the record has no gauge 2. The friction comes from the table channel alone.")
+        warnings.append(ResultWarning("gauge-2-absent", text))
     check_span(channels.table)
     check_rate(channels.table)
     table, relative = remove_invalid_readings(channels.table, "gauge 1", warnings), channels.relative
@@ -161,11 +162,13 @@ def _most(readings: Channel, kept: Channel, warnings: list[ResultWarning]) -> Ch
     """What was kept of gauge 2, if that is most of it."""
     if len(kept) >= _KEPT_MIN * len(readings):
         return kept
-    message = (
-        f"only {len(kept)} of {len(readings)} readings of gauge 2 are sound: it is left out, and the friction"
-        " comes from the table channel alone. Re-centre gauge 2."
+    text = message(
+        "only {count} of {count_2} readings of gauge 2 are sound: it is left out, and the friction"
+        " comes from the table channel alone. Re-centre gauge 2.",
+        count=len(kept),
+        count_2=len(readings),
     )
-    warnings.append(ResultWarning("gauge-2-absent", message))
+    warnings.append(ResultWarning("gauge-2-absent", text))
     return None
 
 
@@ -173,15 +176,17 @@ def _choose(releases: list[Release], warnings: list[ResultWarning]) -> Release:
     """The release with the longest decay after it; one with a hold before it where there is one."""
     if len(releases) > 1:
         times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
-        message = (
-            f"the table was released or pushed, or gauge 1 jumped, {len(releases)} times (at {times});"
-            " the longest decay is used."
+        text = message(
+            "the table was released or pushed, or gauge 1 jumped, {count} times (at {times}); the"
+            " longest decay is used.",
+            count=len(releases),
+            times=times,
         )
-        warnings.append(ResultWarning("released-twice", message))
+        warnings.append(ResultWarning("released-twice", text))
     chosen = max(releases, key=_worth)
     if chosen.plateau_start_s is None:
-        message = "the record begins after the release: pullback and release time are extrapolated."
-        warnings.append(ResultWarning("release-not-recorded", message))
+        text = message("the record begins after the release: pullback and release time are extrapolated.")
+        warnings.append(ResultWarning("release-not-recorded", text))
     return chosen
 
 
@@ -195,8 +200,10 @@ def _oriented(decay: FreeDecay) -> FreeDecay:
     first = decay.table.between(decay.release.time_s, decay.release.time_s + 0.5 * decay.period_s)
     sign = -1 if decay.plateau is not None and first.value_m[0] < first.value_m[-1] else 1
     if sign < 0:
-        message = "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
-        decay.warnings.append(ResultWarning("pullback-negative", message))
+        text = message(
+            "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
+        )
+        decay.warnings.append(ResultWarning("pullback-negative", text))
     table = decay.table.scaled(sign)
     release = replace(decay.release, level_m=sign * decay.release.level_m)
     turned = replace(decay, table=table, sign=sign, relative_sign=sign, release=release)
@@ -308,11 +315,11 @@ def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
         return decay
     if decay.tail.rms_m <= _NEVER_SLIPS * third_difference_noise(decay.table) + NOISE_FLOOR_M:
         return decay
-    message = (
-        "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as dead."
-        " The friction comes from the table channel alone."
+    text = message(
+        "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as"
+        " dead. The friction comes from the table channel alone."
     )
-    decay.warnings.append(ResultWarning("gauge-2-dead", message))
+    decay.warnings.append(ResultWarning("gauge-2-dead", text))
     return _tail_of_table_alone(replace(decay, relative=None))
 
 

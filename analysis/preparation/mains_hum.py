@@ -6,6 +6,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length
 from analysis.preparation.channels import Channel
 from analysis.quantities import ResultWarning
+from messages.message import message
 
 MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
@@ -45,11 +46,14 @@ def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
 
 def hum_warning(gauge: str, hum: tuple[float, float]) -> ResultWarning:
     """Say that a gauge hums."""
-    message = (
-        f"{gauge} hums at {hum[0]:.0f} Hz by {format_length(hum[1])}: f_d may be biased. Check its shield and"
-        " the ground of the amplifier."
+    text = message(
+        "{gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
+        " of the amplifier.",
+        gauge=gauge,
+        hum=hum[0],
+        hum_2=format_length(hum[1]),
     )
-    return ResultWarning("mains-hum", message)
+    return ResultWarning("mains-hum", text)
 
 
 def _powers(channel: Channel) -> Floats | None:

@@ -8,6 +8,7 @@ from analysis.arrays import Floats
 from analysis.preparation.channels import Channel
 from analysis.preparation.release import local_slopes, median_of_three, white_noise
 from analysis.quantities import ResultWarning
+from messages.message import message
 
 _SURE = 0.1
 """Slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0 or 1 to within this."""
@@ -115,7 +116,7 @@ def _leads(table: Channel, relative: Channel, release_s: float, period_s: float)
 
 
 def _warning(code: str) -> ResultWarning:
-    return ResultWarning(code, _MOUNTINGS[code])
+    return ResultWarning(code, message(_MOUNTINGS[code]))
 
 
 _MOUNTINGS = {

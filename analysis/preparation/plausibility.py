@@ -8,6 +8,7 @@ from analysis.preparation.channels import Channel
 from analysis.preparation.release import Release
 from analysis.quantities import ResultWarning
 from analysis.record import RecordError
+from messages.message import message
 
 PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 """Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
@@ -108,11 +109,13 @@ def pullback_warnings(pullback_m: float, nominal_m: float | None) -> list[Result
     ratio = abs(pullback_m / nominal_m)
     if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
         return []
-    message = (
-        f"the table was pulled back by {format_length(abs(pullback_m))}, the series by"
-        f" {format_length(abs(nominal_m))}: check the unit of the readings, the calibration and the series."
+    text = message(
+        "the table was pulled back by {pullback_m}, the series by {nominal_m}: check the unit of the"
+        " readings, the calibration and the series.",
+        pullback_m=format_length(abs(pullback_m)),
+        nominal_m=format_length(abs(nominal_m)),
     )
-    return [ResultWarning("pullback-unlike-series", message)]
+    return [ResultWarning("pullback-unlike-series", text)]
 
 
 def check_friction(friction_dynamic: float) -> None:

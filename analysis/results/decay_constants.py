@@ -10,6 +10,7 @@ from analysis.damped_cosine import DampedCosine, damped_cosine
 from analysis.fitting.models import Parameter
 from analysis.fitting.search import Fit
 from analysis.preparation.free_decay import FreeDecay
+from analysis.quantities import BudgetSource, Source
 from analysis.record import Record
 from analysis.uncertainty import (
     ParameterUncertainty,
@@ -45,11 +46,13 @@ def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
         @ tail.covariance[:2, :2]
         @ by_shape.T
     )
-    columns = {
-        "table mass": np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
-        "plate mass": np.array([0.0, 0.0, 0.0, record.masses.plate_mass_uncertainty_kg]),
-        "time base": record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
-        "gauge 1 non-linearity": np.append(by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)),
+    columns: dict[Source, Floats] = {
+        BudgetSource.TABLE_MASS: np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
+        BudgetSource.PLATE_MASS: np.array([0.0, 0.0, 0.0, record.masses.plate_mass_uncertainty_kg]),
+        BudgetSource.TIME_BASE: record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
+        BudgetSource.GAUGE_1_NONLINEARITY: np.append(
+            by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)
+        ),
     }
     return DecayConstants(point, ParameterUncertainty(columns, noise))
 

@@ -15,10 +15,10 @@ from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import Profile
 from analysis.fitting.search import Fit
 from analysis.preparation.free_decay import FreeDecay
+from analysis.quantities import BudgetSource, Source
 from analysis.record import AnalysisError, Record
 from analysis.uncertainty import (
     COVERAGE_FACTOR_95,
-    LEVELLING,
     ParameterUncertainty,
     UncertaintyBudget,
     levelling_shift,
@@ -54,23 +54,25 @@ def add_systematic_uncertainty(
     columns = dict(own.shifts)
     _split(
         columns,
-        "gauge 1",
+        BudgetSource.GAUGE_1_GAIN,
+        BudgetSource.GAUGE_1_NONLINEARITY,
         nonlinearity_slope_error(record.table_gauge, range_m(problem.table.value_m)),
         record.table_gauge.gain_relative or 0.0,
     )
     if problem.relative is not None:
         _split(
             columns,
-            "gauge 2",
+            BudgetSource.GAUGE_2_GAIN,
+            BudgetSource.GAUGE_2_NONLINEARITY,
             nonlinearity_slope_error(record.relative_gauge, range_m(problem.relative.value_m)),
             record.relative_gauge.gain_relative or 0.0,
         )
-    columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
+    columns[BudgetSource.TIME_BASE] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
     gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
-    columns["gravity"] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
+    columns[BudgetSource.GRAVITY] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
     tilt = levelling_shift(problem, fit)
     if tilt is not None:
-        columns[LEVELLING] = tilt
+        columns[BudgetSource.LEVELLING] = tilt
     return ParameterUncertainty(columns, own.noise_covariance)
 
 
@@ -107,22 +109,22 @@ def add_fitted_quantities(
 
 
 def _by_profile(
-    problem: FitProblem, fit: Fit, place: Parameter, shares: dict[str, float]
-) -> tuple[dict[str, float], tuple[float, float] | None]:
+    problem: FitProblem, fit: Fit, place: Parameter, shares: dict[Source, float]
+) -> tuple[dict[Source, float], tuple[float, float] | None]:
     """Shares of the uncertainty, and the reach of the 95 % interval, by the shape of chi-square itself.
 
     Where that is no parabola, the part of the noise is taken from its profile.
     """
     profile = Profile.from_fit(
-        problem, fit, place, shares["noise"] ** 2 / white_noise_variance(problem, fit, place)
+        problem, fit, place, shares[BudgetSource.NOISE] ** 2 / white_noise_variance(problem, fit, place)
     )
     bent = profile.interval()
     if bent is None:
         return shares, None
     others = COVERAGE_FACTOR_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
-    noise = np.sqrt(max(0.0, shares["noise"] ** 2 - profile.deviation**2 + bent.deviation**2))
+    noise = np.sqrt(max(0.0, shares[BudgetSource.NOISE] ** 2 - profile.deviation**2 + bent.deviation**2))
     reach = float(np.hypot(bent.below, others)), float(np.hypot(bent.above, others))
-    return {**shares, "noise": float(noise)}, reach
+    return {**shares, BudgetSource.NOISE: float(noise)}, reach
 
 
 def _add_functions(
@@ -163,20 +165,26 @@ def _add_residual_displacement(
         rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
         value, gauge = float(rest.mean() - held.mean()), record.relative_gauge
         shares = {
-            "noise": decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
-            "gauge 2 gain": value * (gauge.gain_relative or 0.0),
-            "gauge 2 non-linearity": gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
+            BudgetSource.NOISE: decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
+            BudgetSource.GAUGE_2_GAIN: value * (gauge.gain_relative or 0.0),
+            BudgetSource.GAUGE_2_NONLINEARITY: gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
         }
     budget.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
 
 
-def _split(columns: dict[str, Floats], gauge: str, nonlinearity: float, gain: float) -> None:
+def _split(
+    columns: dict[Source, Floats],
+    gain_source: BudgetSource,
+    nonlinearity_source: BudgetSource,
+    nonlinearity: float,
+    gain: float,
+) -> None:
     """Divide the column of a gauge's slope between its gain and its non-linearity."""
-    column = columns.pop(f"{gauge} gain", None)
+    column = columns.pop(gain_source, None)
     total = float(np.hypot(nonlinearity, gain))
     if column is not None and total > 0.0:
-        columns[f"{gauge} gain"] = column * gain / total
-        columns[f"{gauge} non-linearity"] = column * nonlinearity / total
+        columns[gain_source] = column * gain / total
+        columns[nonlinearity_source] = column * nonlinearity / total
 
 
 def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:

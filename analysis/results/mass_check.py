@@ -19,6 +19,7 @@ from analysis.formatting import format_number
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
+from messages.message import message
 
 _LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
 """Table masses that are tried, as shares of the one given, and the step from one to the next."""
@@ -59,14 +60,15 @@ def mass_warnings(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Res
 def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
     """Say what table would explain the motion, and whether the ratio is that given, upside down."""
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
-    message = (
-        f"a table of {format_number(found, 4)} kg under the plate of {format_number(plate, 4)} kg would"
-        f" explain this"
-        f" motion, one of {format_number(given, 4)} kg does not. Check both masses"
-        + (", they look swapped" if swapped else "")
-        + ": friction and stiffness depend on them."
+    text = message(
+        "a table of {found} kg under the plate of {plate} kg would explain this motion, one of {given} kg"
+        " does not. Check both masses{swapped}: friction and stiffness depend on them.",
+        found=format_number(found, 4),
+        plate=format_number(plate, 4),
+        given=format_number(given, 4),
+        swapped=message(", they look swapped") if swapped else "",
     )
-    return ResultWarning("masses-contradict-motion", message)
+    return ResultWarning("masses-contradict-motion", text)
 
 
 def _loosened(problem: FitProblem, fit: Fit) -> Fit:

@@ -26,8 +26,6 @@ from analysis.uncertainty import ParameterUncertainty
 
 LINEAR_DRAWS = 100_000
 _STEPS = 6
-_RECTANGULAR = ("non-linearity", "levelling")
-"""Sources whose names hold one of these are drawn from a rectangle; all others are normal."""
 _SPREAD = float(np.sqrt(3.0))
 _PARAMETERS = {
     "friction_dynamic": Parameter.FRICTION_DYNAMIC,
@@ -149,7 +147,7 @@ def _drawn(point: Floats, known: ParameterUncertainty, rng: np.random.Generator,
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     result = point + rng.standard_normal((draws, len(point))) @ root.T
     for source, column in known.shifts.items():
-        if any(word in source for word in _RECTANGULAR):
+        if source.is_rectangular:
             result += rng.uniform(-_SPREAD, _SPREAD, (draws, 1)) * column
         else:
             result += rng.standard_normal((draws, 1)) * column

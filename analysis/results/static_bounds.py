@@ -9,11 +9,11 @@ from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import CHI_SQUARE_RISE_95
 from analysis.fitting.search import Fit
 from analysis.preparation.free_decay import FreeDecay
+from analysis.quantities import BudgetSource
 from analysis.record import Record
 from analysis.results.decay_constants import DecayConstants
 from analysis.uncertainty import (
     COVERAGE_FACTOR_95,
-    LEVELLING,
     LEVELLING_UNCERTAINTY_RAD,
     ParameterUncertainty,
     UncertaintyBudget,
@@ -80,9 +80,9 @@ def add_no_slip_bound(
 
     shares = constants.uncertainty.contributions(numerical_gradient(bound, constants.point))
     value = bound(constants.point)
-    shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
-    shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
-    shares[LEVELLING] = LEVELLING_UNCERTAINTY_RAD
+    shares[BudgetSource.GAUGE_1_GAIN] = value * (record.table_gauge.gain_relative or 0.0)
+    shares[BudgetSource.GRAVITY] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
+    shares[BudgetSource.LEVELLING] = LEVELLING_UNCERTAINTY_RAD
     budget.add(LOWER, value, "1", shares)
 
 
@@ -132,8 +132,8 @@ def _add_tied(
     budget.add(LOWER, friction, "1", shares)
     likeliest, end = largest_static_friction(problem, decay, chosen, candidates)
     likeliest, end = max(likeliest, friction), max(end, friction)
-    noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares["noise"]))
-    budget.add(UPPER, likeliest, "1", {**shares, "noise": noise})
+    noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares[BudgetSource.NOISE]))
+    budget.add(UPPER, likeliest, "1", {**shares, BudgetSource.NOISE: noise})
 
 
 def _unseen_slip_m(record: Record, decay: FreeDecay) -> float:

@@ -11,9 +11,10 @@ from analysis.formatting import format_length
 from analysis.identification import FittedModel, ModelSelection
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.noise import NOISE_FLOOR_M
-from analysis.quantities import ResultWarning
+from analysis.quantities import BudgetSource, ResultWarning
 from analysis.record import RecordError
-from analysis.uncertainty import LEVELLING, ParameterUncertainty
+from analysis.uncertainty import ParameterUncertainty
+from messages.message import message
 
 _BAND = 3.2905
 """99.9 % of a normal distribution lie within this many standard deviations."""
@@ -68,11 +69,14 @@ def assess_model(
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:
     """What a law that does not explain the record leaves."""
-    message = (
-        f"the law {judged.name} leaves {format_length(judged.residual_rms_m)} of residual for"
-        f" {format_length(judged.noise_rms_m)} of noise, or a pattern in it: f_d may be biased."
+    text = message(
+        "the law {name} leaves {residual_rms_m} of residual for {noise_rms_m} of noise, or a pattern"
+        " in it: f_d may be biased.",
+        name=judged.name,
+        residual_rms_m=format_length(judged.residual_rms_m),
+        noise_rms_m=format_length(judged.noise_rms_m),
     )
-    return ResultWarning("model-inadequate", message)
+    return ResultWarning("model-inadequate", text)
 
 
 def identifiability_warnings(
@@ -81,23 +85,23 @@ def identifiability_warnings(
     """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
     warnings = []
     if not ended:
-        message = (
-            "by the fitted motion the plate slips at the end of the record or again after it: u_s and the"
-            " end of slip are not known. Record until the plate sticks."
+        text = message(
+            "by the fitted motion the plate slips at the end of the record or again after it: u_s"
+            " and the end of slip are not known. Record until the plate sticks."
         )
-        warnings.append(ResultWarning("slip-not-ended", message))
+        warnings.append(ResultWarning("slip-not-ended", text))
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
-        message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
-        warnings.append(ResultWarning("friction-not-identified", message))
-    if LEVELLING in fitted.shifts:
-        message = (
-            "the plate slips one way only: tilt and f_d act alike."
-            " f_d holds for a plane level to 2 mrad, which its uncertainty includes."
+        text = message("f_d does not change the fitted motion, so that it has no value: no slip was fitted.")
+        warnings.append(ResultWarning("friction-not-identified", text))
+    if BudgetSource.LEVELLING in fitted.shifts:
+        text = message(
+            "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
+            " mrad, which its uncertainty includes."
         )
-        warnings.append(ResultWarning("tilt-not-identified", message))
+        warnings.append(ResultWarning("tilt-not-identified", text))
     if chosen.law.has_static_friction and not chosen.determines(Parameter.FRICTION_STATIC):
-        message = "no stick ends in a slip: f_s has bounds, but no value."
-        warnings.append(ResultWarning("static-not-identified", message))
+        text = message("no stick ends in a slip: f_s has bounds, but no value.")
+        warnings.append(ResultWarning("static-not-identified", text))
     return warnings
 
 
@@ -109,12 +113,16 @@ def tail_warnings(decay: FreeDecay) -> list[ResultWarning]:
     bend = envelope_curvature(decay.table.between(tail.start_s, np.inf), tail)
     if abs(bend) < _BEND_SIGMAS:
         return []
-    cause = "dry friction in the stand" if bend < 0.0 else "damping that grows with the swing"
-    message = (
-        f"the stick tail does not decay exponentially ({abs(bend):.0f} standard deviations), as from {cause}:"
-        " n1 is a mean. Identify a run of the bare table."
+    cause = (
+        message("dry friction in the stand") if bend < 0.0 else message("damping that grows with the swing")
     )
-    return [ResultWarning("tail-not-exponential", message)]
+    text = message(
+        "the stick tail does not decay exponentially ({bend:.0f} standard deviations), as from"
+        " {cause}: n1 is a mean. Identify a run of the bare table.",
+        bend=abs(bend),
+        cause=cause,
+    )
+    return [ResultWarning("tail-not-exponential", text)]
 
 
 def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:

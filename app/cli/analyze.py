@@ -243,12 +243,12 @@ def compute_table_mass(
 
 def _quantity(document: dict[str, Any], name: str) -> Any:
     """A result with its type A uncertainty."""
-    from analysis.quantities import Quantity
+    from analysis.quantities import BudgetSource, Quantity
 
     result = document["results"][name]
     noise = [
         line["standard_uncertainty"]
         for line in document["budget"]
-        if line["contribution_to"] == name and line["source"] == "noise"
+        if line["contribution_to"] == name and line["source"] == str(BudgetSource.NOISE)
     ]
     return Quantity.normal(result["value"], noise[0] if noise else 0.0, result["unit"])

@@ -261,7 +261,7 @@ def calibration_document(
         **{name: getattr(found.characteristics, name) for name, _ in _MERITS},
         "budget": [
             {
-                "source": line.source,
+                "source": str(line.source),
                 "contribution_to": line.contribution_to,
                 "standard_uncertainty": None
                 if math.isnan(line.standard_uncertainty)
@@ -276,7 +276,7 @@ def calibration_document(
             }
             for counts, dial_m, way, number, left in rows
         ],
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.warnings],
+        "warnings": [{"code": caution.code, "message": str(caution.message)} for caution in found.warnings],
     }  # fmt: skip
 
 

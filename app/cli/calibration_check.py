@@ -205,12 +205,12 @@ def check_document(found: "DisplacementCheck", entry: "GaugeCheck") -> dict[str,
         "tolerance_m": found.tolerance_m,
         "budget": [
             {
-                "source": line.source,
+                "source": str(line.source),
                 "standard_uncertainty": None
                 if math.isnan(line.standard_uncertainty)
                 else line.standard_uncertainty,
             }
             for line in found.budget
         ],
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.warnings],
+        "warnings": [{"code": caution.code, "message": str(caution.message)} for caution in found.warnings],
     }

@@ -9,6 +9,7 @@ from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from messages.i18n import N_, gettext, translate
+from messages.message import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +188,7 @@ def end_status(reason: str) -> Chip:
     return replace(known, text=gettext(known.text))
 
 
-def sentence(message: str) -> str:
+def sentence(message: Message | str) -> str:
     """Say a message in the window's language, each sentence of it with a capital letter.
 
     A path or a name at the beginning stays as it is.
@@ -195,7 +196,7 @@ def sentence(message: str) -> str:
     return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(translate(message)))
 
 
-def in_words(message: str) -> str:
+def in_words(message: Message | str) -> str:
     """A message of the analysis as a sentence, with micrometres as people write them."""
     return _MICROMETRES.sub("\u202fµm", sentence(message))
 

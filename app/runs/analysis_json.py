@@ -1,14 +1,18 @@
 """Parts of the JSON of an analysis that stand beside its results: classical figures, Monte Carlo, masses."""
 
 import datetime
+import math
+import sys
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
-from analysis.quantities import Quantity, ResultWarning
+from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
 from analysis.record import Record
+from messages.message import Message, joined, message
 
 if TYPE_CHECKING:
     from analysis.classical_estimates import ClassicalEstimates
@@ -46,7 +50,9 @@ def classical_document(checks: "ClassicalEstimates", result: Identification) -> 
 def one_mass_document(result: Identification) -> dict[str, Any]:
     """The plain log decrement of a decay, with a note where friction biases it."""
     plain = result.results.get("log_decrement_classical")
-    notes = [caution.message for caution in result.warnings if caution.code == "coulomb-biases-log-decrement"]
+    notes = [
+        str(caution.message) for caution in result.warnings if caution.code == "coulomb-biases-log-decrement"
+    ]
     return {"log_decrement": None if plain is None else quantity_document(plain), "notes": notes}
 
 
@@ -71,6 +77,48 @@ def monte_carlo_document(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict
     }
 
 
+def warning_documents(
+    warnings: Iterable[ResultWarning], *, with_templates: bool = False
+) -> list[dict[str, Any]]:
+    """Warnings with code and message; `with_templates` also template and values where there are any."""
+    return [
+        {"code": warning.code, "message": str(warning.message)}
+        | (msgspec.to_builtins(warning.message) if with_templates and warning.message.values else {})
+        for warning in warnings
+    ]
+
+
+def read_warning(document: dict[str, Any]) -> ResultWarning:
+    """Warning of a document. Without a template, the sentence itself is the template."""
+    if "template" not in document:
+        return ResultWarning(document["code"], Message(document["message"]))
+    return ResultWarning(document["code"], msgspec.convert(document, Message))
+
+
+def budget_documents(budget: Iterable[BudgetLine]) -> list[dict[str, Any]]:
+    """Budget lines with the names of their sources; what is not stated is null."""
+    return [
+        {
+            "source": str(line.source),
+            "contribution_to": line.contribution_to,
+            "standard_uncertainty": line.standard_uncertainty
+            if math.isfinite(line.standard_uncertainty)
+            else None,
+        }
+        for line in budget
+    ]
+
+
+def read_budget_line(document: dict[str, Any]) -> BudgetLine:
+    """Budget line of a document; NaN where the uncertainty is not stated."""
+    deviation = document["standard_uncertainty"]
+    return BudgetLine(
+        parse_source(document["source"]),
+        sys.intern(document["contribution_to"]),
+        math.nan if deviation is None else float(deviation),
+    )
+
+
 def quantity_document(quantity: Quantity) -> dict[str, Any]:
     """A quantity as in `results`."""
     document: dict[str, Any] = msgspec.to_builtins(quantity)
@@ -86,11 +134,16 @@ def mass_warnings(metadata: "RunMetadata", given: dict[str, float | None]) -> li
     }
     if not other:
         return []
-    said = " and ".join(
-        f"{name.split('_')[0]} mass {value:g} kg as given, not {getattr(metadata, name):g} kg as in the run"
+    masses = [
+        message(
+            "{body} mass {mass_kg:g} kg as given, not {run_mass_kg:g} kg as in the run",
+            body=message(name.removesuffix("_mass_kg")),
+            mass_kg=value,
+            run_mass_kg=getattr(metadata, name),
+        )
         for name, value in other.items()
-    )
-    return [ResultWarning("masses-given", f"analysed with {said}.")]
+    ]
+    return [ResultWarning("masses-given", message("analysed with {masses}.", masses=joined(masses, " and ")))]
 
 
 def calibration_warnings(gauges: "Gauges", day: datetime.date) -> list[ResultWarning]:
@@ -99,8 +152,13 @@ def calibration_warnings(gauges: "Gauges", day: datetime.date) -> list[ResultWar
     return [
         ResultWarning(
             "calibration-expired",
-            f"the calibration of {name} was valid until {gauge.valid_until}, the run is of {day}."
-            " Calibrate it again: slipstand calibrate",
+            message(
+                "the calibration of {gauge} was valid until {valid_until}, the run is of {day}. Calibrate"
+                " it again: slipstand calibrate",
+                gauge=message(name),
+                valid_until=gauge.valid_until,
+                day=day,
+            ),
         )
         for name, gauge in named
         if gauge.is_expired(day)
@@ -122,11 +180,13 @@ def zero_warnings(
     pulled_m = abs(ending.held_m - ending.zero_m)
     if abs(moved_m) <= max(_ZERO_MOVED * pulled_m, _ZERO_MOVED_M):
         return []
-    message = (
-        f"the table swings about a place {moved_m * 1e6:+.0f} um from where it rested before the pull: gauge"
-        " 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the swing alone."
+    text = message(
+        "the table swings about a place {moved_m:+.0f} um from where it rested before the pull:"
+        " gauge 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the"
+        " swing alone.",
+        moved_m=moved_m * 1e6,
     )
-    return [ResultWarning("zero-moved", message)]
+    return [ResultWarning("zero-moved", text)]
 
 
 def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
@@ -134,9 +194,16 @@ def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning
     return [
         ResultWarning(
             "gauge-check-failed",
-            f"{_GAUGE_NAMES[check.gauge]} was {check.deviation_m * 1e6:+.0f} um off at"
-            f" {check.expected_m * 1e3:g} mm in its last check ({check.at:%Y-%m-%d %H:%M}), where"
-            f" {check.tolerance_m * 1e6:.0f} um are allowed. Calibrate it again: slipstand calibrate",
+            message(
+                "{gauge} was {deviation_m:+.0f} um off at {expected_m:g} mm in its last check"
+                " ({at}), where {tolerance_m:.0f} um are allowed. Calibrate it again:"
+                " slipstand calibrate",
+                gauge=message(_GAUGE_NAMES[check.gauge]),
+                deviation_m=check.deviation_m * 1e6,
+                expected_m=check.expected_m * 1e3,
+                at=f"{check.at:%Y-%m-%d %H:%M}",
+                tolerance_m=check.tolerance_m * 1e6,
+            ),
         )
         for check in checks
         if not check.passed

@@ -8,6 +8,7 @@ from analysis.motion.two_mass import TwoMassParameters
 from analysis.plan import PlannedTest, RangeUse, plan, smallest_pullback_m
 from analysis.uncertainty_reduction import ReductionOption, reduction_options, uncertainty_parts
 from app.runs.analysis_input import gauge_uncertainty
+from app.runs.analysis_json import budget_documents, warning_documents
 from config.schema import Gauges, Stand
 
 Document = dict[str, Any]
@@ -61,9 +62,9 @@ def plan_document(test: PlannedTest) -> Document:
         "results": {name: msgspec.to_builtins(value) for name, value in found.results.items()},
         "noise_part": parts.noise if parts else None,
         "stated_part": parts.stated if parts else None,
-        "budget": msgspec.to_builtins(found.budget),
+        "budget": budget_documents(found.budget),
         "halved_by": [_way(way) for way in reduction_options(test)],
-        "warnings": msgspec.to_builtins(found.warnings),
+        "warnings": warning_documents(found.warnings),
     }
 
 

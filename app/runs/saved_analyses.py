@@ -15,6 +15,7 @@ from analysis.identification import Identification
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs import schema as names
+from app.runs.analysis_json import budget_documents, warning_documents
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import make_group, read_metadata
 from app.runs.rewrite import rewrite
@@ -54,9 +55,9 @@ def analysis_document(path: Path, series: str | None, losses: Losses, result: Id
         "kind": result.kind,
         "results": quantities | result.labels,
         "model": None if result.model is None else _finite(msgspec.to_builtins(result.model)),
-        "budget": _finite(msgspec.to_builtins(result.budget)),
+        "budget": budget_documents(result.budget),
         "events": _finite(msgspec.to_builtins(result.events)),
-        "warnings": msgspec.to_builtins(result.warnings),
+        "warnings": warning_documents(result.warnings, with_templates=True),
         "quality": {name: getattr(losses, name) for name in ("samples", "missing", "damaged", "overloaded")}
         | {"missing_estimated": losses.missing_estimated},
     }
@@ -157,7 +158,10 @@ def _write(file: h5py.File, number: int, document: Document, inputs: str, settin
     _write_table(make_group(group, "tried", "NXcollection"), model.get("tried", []))
     _write_table(make_group(group, "budget", "NXcollection"), document["budget"])
     _write_values(make_group(group, "events", "NXcollection"), document["events"])
-    _write_table(make_group(group, "warnings", "NXcollection"), document["warnings"])
+    _write_table(
+        make_group(group, "warnings", "NXcollection"),
+        [{name: warning[name] for name in ("code", "message")} for warning in document["warnings"]],
+    )
 
 
 def _write_results(group: h5py.Group, results: dict[str, Any]) -> None:

@@ -337,7 +337,7 @@ def test_a_record_that_begins_after_all_slip_says_that_slip_may_have_come_before
     found = identify(stretch(Truth(), 6.0))
 
     assert {"release-not-recorded", "no-slip"} == set(codes(found))
-    assert "before the record" in found.warnings[-1].message
+    assert "before the record" in str(found.warnings[-1].message)
     assert found.results["friction_static_lower"].value < 0.1
 
 

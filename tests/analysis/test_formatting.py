@@ -63,7 +63,7 @@ def one_mass_cautions(scale: float, unit: str, quantity: MeasuredQuantity = "dis
     for reading in (value + mode + touched + noise, np.round(value, 1), value + noise):
         found = identify_one_mass(single_channel(time_s, scale * reading), quantity=quantity, unit=unit)
         said += found.warnings
-    return {caution.code: caution.message for caution in said}
+    return {caution.code: str(caution.message) for caution in said}
 
 
 def test_warnings_of_one_mass_give_units() -> None:
@@ -95,7 +95,7 @@ def test_no_message_of_a_record_has_an_exponent() -> None:
     time_s, table_m, relative_m = simulate_readings(Truth())
     hum_m = 1.83e-3 * np.sin(2.0 * np.pi * 50.0 * time_s)
     drifting = Record(time_s, table_m - 1e-4 * time_s + hum_m, relative_m, masses, pullback_m=1e-3)
-    said = {caution.code: caution.message for caution in identify(drifting).warnings}
+    said = {caution.code: str(caution.message) for caution in identify(drifting).warnings}
 
     assert "hums at 50 Hz by 2.01 mm: f_d" in said["mains-hum"]
     assert "drifts by -101 µm/s, 1.11 mm in this record:" in said["gauge-1-drifts"]

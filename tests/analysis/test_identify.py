@@ -223,7 +223,7 @@ def test_calibration_and_masses_enter_the_budget():
     )
     friction = found.results["friction_dynamic"]
     shares = {
-        line.source: line.standard_uncertainty
+        str(line.source): line.standard_uncertainty
         for line in found.budget
         if line.contribution_to == "friction_dynamic"
     }
@@ -345,7 +345,7 @@ def test_the_budget_of_n1_has_what_a_bent_gauge_does_to_it():
     (stated,) = (
         line.standard_uncertainty
         for line in found.budget
-        if (line.contribution_to, line.source) == ("damping_n1_per_s", "gauge 1 non-linearity")
+        if (line.contribution_to, str(line.source)) == ("damping_n1_per_s", "gauge 1 non-linearity")
     )
     shift = other.results["damping_n1_per_s"].value - found.results["damping_n1_per_s"].value
     assert stated == pytest.approx(abs(shift), rel=0.4)  # the tail begins elsewhere too

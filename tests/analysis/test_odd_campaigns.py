@@ -7,7 +7,7 @@ from analysis.campaign.campaign import summarize
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.gauge_health import GaugeSamples, measure_health
 from analysis.one_mass.identify import identify_one_mass, single_channel
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from analysis.record import AnalysisError
 
 ODD = [0.0, -1.0, 0.1, np.nan, np.inf, 1e300, 1e-300]
@@ -37,7 +37,10 @@ def odd_run(random: np.random.Generator, name: str) -> RunResult:
         value = float(random.choice([*ODD, *random.normal(0.1, 1e-3, 20)]))
         deviation = float(random.choice([0.0, np.nan, np.inf, 1e300, *[1e-3] * 6]))
         results[quantity] = Quantity.normal(value, deviation, "1")
-        budget += [BudgetLine(source, quantity, deviation) for source in ("noise", "gauge 1 gain")]
+        budget += [
+            BudgetLine(source, quantity, deviation)
+            for source in (BudgetSource.NOISE, BudgetSource.GAUGE_1_GAIN)
+        ]
     return RunResult(name, key, results, tuple(budget) if random.random() < 0.7 else ())
 
 

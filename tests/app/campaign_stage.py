@@ -7,7 +7,7 @@ import numpy as np
 from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.series import RunResult, SeriesKey
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.presenters.campaign.next_test import PlannedTest
 from app.presenters.campaign.tasks import CampaignData, CampaignRun
 
@@ -32,7 +32,7 @@ def run(series: str, number: int, friction: float) -> RunResult:
     budget = tuple(
         BudgetLine(source, name, share * quantity.standard_uncertainty)
         for name, quantity in results.items()
-        for source, share in (("noise", 0.8), ("gauge 1 gain", 0.6))
+        for source, share in ((BudgetSource.NOISE, 0.8), (BudgetSource.GAUGE_1_GAIN, 0.6))
     )
     key = SeriesKey(series, series[1:-2], 0.012, mass_kg, 131.6)
     return RunResult(path_of(series, number), key, results, budget, "cal", "stand", adequate=True)

@@ -35,6 +35,7 @@ from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.stream_sender import TransmissionLog
+from messages.message import message
 
 RATE_HZ = 1000.0
 PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
@@ -220,7 +221,9 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
             ),
         ),
         "events": Events(RELEASED_S, SLIP_END_S, None),
-        "cautions": (ResultWarning("tail-not-exponential", "The tail does not decay exponentially."),),
+        "cautions": (
+            ResultWarning("tail-not-exponential", message("The tail does not decay exponentially.")),
+        ),
         "ended": "enough",
     }
     return AnalysedRun(**{**facts, **changes})

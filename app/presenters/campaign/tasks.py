@@ -10,6 +10,7 @@ from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest, plan_
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
 from messages.i18n import N_
+from messages.message import Message
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -96,7 +97,7 @@ class CampaignData:
         By path.
     failures : tuple of (str, str)
         Path, and why there is no result.
-    cautions : tuple of str
+    warnings : tuple of Message
         Of the gathering.
     left_out : frozenset of str
         Paths of runs that say themselves that they do not count, and can be taken in again.
@@ -111,7 +112,7 @@ class CampaignData:
     contact_names: dict[str, str]
     runs: dict[str, CampaignRun]
     failures: tuple[tuple[str, str], ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Message, ...]
     excluded_by_operator: frozenset[str]
     unsaved_count: int
     next_test: PlannedTest | None

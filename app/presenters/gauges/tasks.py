@@ -282,4 +282,6 @@ def _check_facts(found: "DisplacementCheck") -> Iterator[LabelledValue]:
         yield LabelledValue(words, with_unit(format_fixed(value_m * 1e3, 4), "mm"))
     for line in found.budget:
         value = line.standard_uncertainty
-        yield LabelledValue(line.source, gettext("not stated") if math.isnan(value) else _micrometres(value))
+        yield LabelledValue(
+            translate(line.source.label), gettext("not stated") if math.isnan(value) else _micrometres(value)
+        )

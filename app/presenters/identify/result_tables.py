@@ -9,7 +9,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.identify.plot_data import missing_share
 from app.presenters.identify.state import BudgetRow, ClassicalRow, ModelRow
 from app.presenters.identify.tasks import ClassicalFigures
-from messages.i18n import gettext
+from messages.i18n import gettext, translate
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 """Differences of BIC: up to the first nothing speaks against a law, above the second everything does."""
@@ -67,7 +67,7 @@ def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     largest = max((line.standard_uncertainty for line in stated), default=0.0)
     rows = [
         BudgetRow(
-            line.source,
+            translate(line.source.label),
             _contribution(line.standard_uncertainty, largest, shown),
             line.standard_uncertainty / largest,
         )
@@ -76,7 +76,11 @@ def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     ]
     return (
         *rows,
-        *(BudgetRow(line.source, gettext("not stated"), 0.0) for line in lines if line not in stated),
+        *(
+            BudgetRow(translate(line.source.label), gettext("not stated"), 0.0)
+            for line in lines
+            if line not in stated
+        ),
     )
 
 

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.quantities import Quantity
 from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, row_cells
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
+from app.runs.analysis_json import warning_documents
 from app.runs.disk import atomic_write
 from app.runs.exchange.csv_files import csv_cell
 from app.runs.exchange.json_files import json_value
@@ -157,7 +159,7 @@ def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
     yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
     for name in _QUANTITIES:
         yield from _flat_quantity(row.quantities.get(name))
-    yield from (row.msk64_degree, " | ".join(caution.message for caution in row.warnings))
+    yield from (row.msk64_degree, " | ".join(str(warning.message) for warning in row.warnings))
     if content.published is not None:
         yield from _flat_comparison(content.published.get(row.label))
 
@@ -195,7 +197,7 @@ def table_document(content: TableContent) -> dict[str, Any]:
             "msk64_degrees": list(campaign.msk64_degrees),
             "excluded": msgspec.to_builtins(campaign.excluded),
             "failures": [{"run": run, "error": error} for run, error in content.failures],
-            "warnings": msgspec.to_builtins(content.all_warnings()),
+            "warnings": warning_documents(content.all_warnings()),
         }
     )
     return document
@@ -209,7 +211,7 @@ def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dic
         "table_mass_kg": row.series.table_mass_kg,
         "runs": list(row.runs),
         **{name: _pooled_document(pooled) for name, pooled in row.quantities.items()},
-        "warnings": msgspec.to_builtins(row.warnings),
+        "warnings": warning_documents(row.warnings),
     }
     if row.msk64_degree:
         found["msk64_degree"] = row.msk64_degree
@@ -222,7 +224,8 @@ def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dic
 
 
 def _pooled_document(pooled: PooledQuantity) -> dict[str, Any]:
-    described: dict[str, Any] = msgspec.to_builtins(pooled)
+    shared = {str(error): deviation for error, deviation in pooled.common.items()}
+    described: dict[str, Any] = msgspec.to_builtins(replace(pooled, common={})) | {"common": shared}
     described.pop("quantity")
     return _quantity_document(pooled.quantity) | described
 

@@ -82,11 +82,11 @@ def _degrees(campaign: Campaign) -> list[str]:
 
 def _warnings(content: TableContent) -> Iterator[str]:
     """What must be known; what is said of many series is said of the first, and the others are named."""
-    yield from (caution.message for caution in (*content.warnings, *content.campaign.warnings))
+    yield from (str(caution.message) for caution in (*content.warnings, *content.campaign.warnings))
     by_code: dict[str, list[tuple[str, str]]] = {}
     for row in content.campaign.rows:
         for caution in row.warnings:
-            by_code.setdefault(caution.code, []).append((row.label, caution.message))
+            by_code.setdefault(caution.code, []).append((row.label, str(caution.message)))
     for said in by_code.values():
         if len(said) <= _SAID:
             yield from (message for _, message in said)

@@ -189,8 +189,8 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
 def _by_source(pooled: PooledQuantity) -> dict[str, float]:
     """Shared parts by source, whoever shares them."""
     found: dict[str, float] = {}
-    for key, deviation in pooled.common.items():
-        source = key.rpartition(" of ")[0] or key
+    for error, deviation in pooled.common.items():
+        source = str(error.source)
         found[source] = math.hypot(found.get(source, 0.0), deviation)
     return found
 

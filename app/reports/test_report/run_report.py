@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from analysis.identification import Identification
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
@@ -107,7 +107,9 @@ def _left_out(reason: str) -> list[Block]:
 def _expired(found: Identification) -> list[Block]:
     """An expired calibration is not left to the list of warnings: every result rests on it."""
     return [
-        Notice(caution.message, "warn") for caution in found.warnings if caution.code == "calibration-expired"
+        Notice(str(caution.message), "warn")
+        for caution in found.warnings
+        if caution.code == "calibration-expired"
     ]
 
 
@@ -241,7 +243,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     """A row a source, a column a result; the largest source of the first result first."""
     rows = {key: (symbol, scale, unit) for key, symbol, _, scale, unit in _RESULTS}
     shown = [key for key in _BUDGETED if key in found.results and key in rows]
-    shares = {(line.source, line.contribution_to): line.standard_uncertainty for line in found.budget}
+    shares = {(str(line.source), line.contribution_to): line.standard_uncertainty for line in found.budget}
     sources = _by_size(found.budget, shown)
     if not sources:
         yield Text("There is no result whose uncertainty could be broken down.")
@@ -250,7 +252,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     body: list[list[Cell]] = [
         [
             source,
-            "A" if source == "noise" else "B",
+            "A" if source == str(BudgetSource.NOISE) else "B",
             *(_share(shares.get((source, key)), rows[key][1]) for key in shown),
         ]
         for source in sources
@@ -269,7 +271,7 @@ def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
         lines.sort(
             key=lambda line: math.inf if math.isnan(line.standard_uncertainty) else line.standard_uncertainty
         )
-        found |= dict.fromkeys(line.source for line in reversed(lines))
+        found |= dict.fromkeys(str(line.source) for line in reversed(lines))
     return list(found)
 
 

@@ -20,6 +20,7 @@ from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
 from app.runs.trash import list_trash
 from config.schema import ConfigError, Gauges, Stand
+from messages.message import message
 
 Progress = Callable[[float, str], None]
 
@@ -205,7 +206,7 @@ def _with_reasons(
 
 def _shared(line: BudgetLine) -> BudgetLine:
     """A line whose names are held once for all runs."""
-    return BudgetLine(sys.intern(line.source), sys.intern(line.contribution_to), line.standard_uncertainty)
+    return BudgetLine(line.source, sys.intern(line.contribution_to), line.standard_uncertainty)
 
 
 _NAMED = 3
@@ -250,8 +251,12 @@ def _different_stands(
         said = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
         yield ResultWarning(
             "different-stands",
-            f"these runs are of {len(by_name)} stands ({said}). Give the runs of one stand at a time,"
-            " each in a folder of its own.",
+            message(
+                "these runs are of {count} stands ({said}). Give the runs of one stand at a time,"
+                " each in a folder of its own.",
+                count=len(by_name),
+                said=said,
+            ),
         )
 
 
@@ -273,14 +278,27 @@ def _contradictory_masses(
                 for (table_kg, plate_kg), of_them in masses.items()
             )
             yield ResultWarning(
-                "contradictory-masses", f"the runs of {code} say different masses ({said}). {remedy}"
+                "contradictory-masses",
+                message(
+                    "the runs of {code} say different masses ({said}). {remedy}",
+                    code=code,
+                    said=said,
+                    remedy=remedy,
+                ),
             )
         elif (nominal_kg := _nominal_mass_kg(stand, code)) not in (None, *(m2 for _, m2 in masses)):
             ((_, plate_kg), of_them) = next(iter(masses.items()))
             yield ResultWarning(
                 "mass-not-of-series",
-                f"the plate of {code} has {plate_kg:g} kg in {_listed(of_them)}, but {nominal_kg:g} kg by its"
-                f" series. {remedy}",
+                message(
+                    "the plate of {code} has {plate_kg:g} kg in {listed}, but {nominal_kg:g} kg by"
+                    " its series. {remedy}",
+                    code=code,
+                    plate_kg=plate_kg,
+                    listed=_listed(of_them),
+                    nominal_kg=nominal_kg,
+                    remedy=remedy,
+                ),
             )
 
 
@@ -299,8 +317,12 @@ def _stale(
         kept = "the new results are kept" if saved else "keep the new results with --save"
         yield ResultWarning(
             "results-stale",
-            f"masses, pullback or calibration were changed after the analysis of {_listed(stale)}: what is"
-            f" taken agrees with them now, {kept}.",
+            message(
+                "masses, pullback or calibration were changed after the analysis of {listed}: what"
+                " is taken agrees with them now, {kept}.",
+                listed=_listed(stale),
+                kept=kept,
+            ),
         )
 
 
@@ -323,8 +345,13 @@ def _series_without_runs(
     if missing:
         yield ResultWarning(
             "series-without-runs",
-            f"{len(missing)} of the stand's {len(wanted)} series have no run: {_listed(missing, 12)}."
-            " Record them, or look for their runs in another folder.",
+            message(
+                "{count} of the stand's {count_2} series have no run: {listed}. Record them, or"
+                " look for their runs in another folder.",
+                count=len(missing),
+                count_2=len(wanted),
+                listed=_listed(missing, 12),
+            ),
         )
 
 
@@ -333,14 +360,22 @@ def _left_out(folders: Sequence[Path]) -> Iterator[ResultWarning]:
         if thrown := list_trash(folder):
             yield ResultWarning(
                 "runs-in-trash",
-                f"{len(thrown)} runs in the trash of {folder} are left out. Bring one back:"
-                " slipstand trash --restore RUN.",
+                message(
+                    "{count} runs in the trash of {folder} are left out. Bring one back: slipstand"
+                    " trash --restore RUN.",
+                    count=len(thrown),
+                    folder=folder,
+                ),
             )
         if cut_short := unfinished_journals(folder):
             yield ResultWarning(
                 "runs-cut-short",
-                f"{len(cut_short)} recordings in {folder} were cut short and may hold more than is seen here."
-                f" Rebuild them: slipstand recover {folder}.",
+                message(
+                    "{count} recordings in {folder} were cut short and may hold more than is seen"
+                    " here. Rebuild them: slipstand recover {folder}.",
+                    count=len(cut_short),
+                    folder=folder,
+                ),
             )
 
 

@@ -11,7 +11,8 @@ import h5py
 import msgspec
 
 from analysis.campaign.series import RunResult, SeriesKey
-from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from analysis.quantities import BudgetSource, Quantity
+from app.runs.analysis_json import read_budget_line, read_warning
 from app.runs.analyze import AnalysisRequest, Progress, analyze_run
 from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
 from app.runs.metadata import Conditions, RunMetadata
@@ -187,17 +188,17 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
     """What a campaign takes of an analysed run."""
     mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
     mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
-    budget = [*document["budget"], _line("plate mass", "plate_mass_kg", mass_u_kg)]
+    budget = [*document["budget"], _line(str(BudgetSource.PLATE_MASS), "plate_mass_kg", mass_u_kg)]
     return RunResult(
         name=str(path),
         series=series_key(metadata),
         results={"plate_mass_kg": mass} | result_quantities(document),
-        budget=tuple(BudgetLine(**line | {"standard_uncertainty": _number(line)}) for line in budget),
+        budget=tuple(map(read_budget_line, budget)),
         calibration_id=calibration_identity(metadata.gauges),
         stand_id=stand_identity(metadata),
         adequate=(document["model"] or {}).get("adequate"),
         msk64_degree=document["results"].get("msk64_degree", ""),
-        warnings=tuple(ResultWarning(**caution) for caution in document["warnings"]),
+        warnings=tuple(map(read_warning, document["warnings"])),
     )
 
 

@@ -170,7 +170,7 @@ def test_a_misread_turn_of_the_dial_is_doubted() -> None:
     counts = counts_of(dial_m, noise_m=2e-6)
     dial_m[9] += 0.001
     found = calibrated(dial_m, counts)
-    assert [caution.message[:10] for caution in found.warnings] == ["reading 10"]
+    assert [str(caution.message)[:10] for caution in found.warnings] == ["reading 10"]
 
 
 def test_what_one_way_and_an_unknown_dial_cannot_tell_is_said() -> None:
@@ -179,7 +179,7 @@ def test_what_one_way_and_an_unknown_dial_cannot_tell_is_said() -> None:
     assert codes == ["dial-uncertainty-not-stated", "one-way-only", "one-round-only"]
     assert found.characteristics.hysteresis_m is None
     unstated = [line for line in found.budget if np.isnan(line.standard_uncertainty)]
-    assert {line.source for line in unstated} == {"dial gauge"}
+    assert {str(line.source) for line in unstated} == {"dial gauge"}
 
 
 GOOD = [100.0, 200.0, 300.0, 400.0]

@@ -77,7 +77,7 @@ def test_a_sound_gauge_passes_in_95_of_100() -> None:
 
 def test_a_shunt_does_not_ask_how_straight_the_gauge_is() -> None:
     found = checked(0.010, reference=ReferenceDisplacement(0.010, 0.0, is_electric=True))
-    assert {line.source for line in found.budget} == {
+    assert {str(line.source) for line in found.budget} == {
         "gain of the calibration", "known displacement", "readings"
     }  # fmt: skip
 

@@ -9,8 +9,9 @@ import pytest
 from analysis.audit import KILOGRAM_FORCE_N
 from analysis.campaign.campaign import compare_all_with_published, summarize
 from analysis.campaign.series import SeriesKey
-from analysis.quantities import BudgetLine, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
 from config.files import published_table
+from messages.message import message
 from tests.campaign_kit import FRICTION, VELOCITY, friction_run, key_of, run
 
 
@@ -84,7 +85,7 @@ def test_outlier_is_named_and_counts():
     runs = [one for code in published_table() for one in three(code)]
     runs[4] = friction_run(runs[4].name, runs[4].series, 0.12)
     row = summarize(runs).rows[1]
-    said = {caution.code: caution.message for caution in row.warnings}
+    said = {caution.code: str(caution.message) for caution in row.warnings}
 
     assert row.quantities[FRICTION].outliers == (runs[4].name,)
     assert row.quantities[FRICTION].runs == 3
@@ -118,7 +119,7 @@ def test_runs_without_a_series_are_sorted_by_what_they_are():
 
     assert [row.label for row in campaign.rows] == ["PTFE 12 mm 22.4 kg", "1SSM0"]
     assert codes(campaign) == ["no-series", "unknown-contact"]
-    assert "'PTFE'" in campaign.warnings[1].message
+    assert "'PTFE'" in str(campaign.warnings[1].message)
 
 
 def test_unknown_contact_without_a_name_stands_last():
@@ -129,7 +130,7 @@ def test_unknown_contact_without_a_name_stands_last():
 
 def test_several_calibrations_are_said_and_shrink_the_shared_part():
     runs = three("1FFM0")
-    campaign = summarize([runs[0], replace(runs[1], calibration="B")])
+    campaign = summarize([runs[0], replace(runs[1], calibration_id="B")])
 
     assert codes(campaign) == ["several-calibrations"]
     assert len(campaign.rows[0].quantities[FRICTION].common) == 2
@@ -137,16 +138,20 @@ def test_several_calibrations_are_said_and_shrink_the_shared_part():
 
 def test_what_is_said_of_runs_is_said_once_with_their_names():
     expired = (
-        ResultWarning("calibration-expired", "the calibration of gauge 1 was valid until 2025-01-01."),
+        ResultWarning(
+            "calibration-expired", message("the calibration of gauge 1 was valid until 2025-01-01.")
+        ),
     )
     campaign = summarize(three("1FFM0", warnings=expired))
 
     assert codes(campaign) == ["calibration-expired"]
-    assert campaign.warnings[0].message.startswith("1FFM0--1, 1FFM0-0, 1FFM0-1: the calibration of gauge 1")
+    assert str(campaign.warnings[0].message).startswith(
+        "1FFM0--1, 1FFM0-0, 1FFM0-1: the calibration of gauge 1"
+    )
 
 
 def test_doubts_of_a_row_are_said():
-    gain = BudgetLine("gauge 1 gain (not stated)", FRICTION, float("nan"))
+    gain = BudgetLine(BudgetSource.GAUGE_1_GAIN_NOT_STATED, FRICTION, float("nan"))
     one = friction_run("a", "1FFM0", 0.1)
     one = replace(one, adequate=False, budget=(*one.budget, gain))
     none = run("b", "2FFM0", {VELOCITY: (0.2, 1e-4, 0.0)})

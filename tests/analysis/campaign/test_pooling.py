@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.campaign.pooling import RunValue, pool, run_ratio, run_value
-from analysis.quantities import BudgetLine, Quantity
+from analysis.campaign.pooling import RunValue, SharedError, pool, run_ratio, run_value
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from tests.campaign_kit import FRICTION, run
 
@@ -178,7 +178,8 @@ def test_sources_are_parted():
     found = run_value(given, FRICTION)
 
     assert found.repeatable == pytest.approx(3e-4)
-    assert found.common == {"gauge 1 gain of A": 4e-4}
+    assert found.common == {SharedError(BudgetSource.GAUGE_1_GAIN, "A"): 4e-4}
+    assert [str(error) for error in found.common] == ["gauge 1 gain of A"]
     assert run_value(given, "period_s") is None
 
 
@@ -202,13 +203,13 @@ def test_shared_gain_cancels_in_a_ratio():
     found = run_ratio(given, "friction_static", FRICTION)
 
     assert found.value == pytest.approx(2.0)
-    assert found.common["gauge 1 gain of A"] == pytest.approx(0.0, abs=1e-12)
+    assert found.common[SharedError(BudgetSource.GAUGE_1_GAIN, "A")] == pytest.approx(0.0, abs=1e-12)
     assert found.repeatable == pytest.approx(2.0 * math.hypot(5e-4, 1e-3))
 
 
 def test_not_stated_sources_are_left_out_of_the_number():
     given = run("a", "1FFM0", {FRICTION: (0.1, 1e-4, 0.0)})
-    lines = (*given.budget, BudgetLine("gauge 1 gain (not stated)", FRICTION, math.nan))
+    lines = (*given.budget, BudgetLine(BudgetSource.GAUGE_1_GAIN_NOT_STATED, FRICTION, math.nan))
     object.__setattr__(given, "budget", lines)
 
     assert math.isfinite(run_value(given, FRICTION).repeatable)

@@ -199,7 +199,7 @@ def test_stated_uncertainties_reach_the_budget():
         clock_scale_uncertainty=1e-4, table_gauge=GaugeUncertainty(gain_relative=0.005, nonlinearity_m=1e-5)
     )
     result = identify_one_mass(record)
-    share = {(line.source, line.contribution_to): line.standard_uncertainty for line in result.budget}
+    share = {(str(line.source), line.contribution_to): line.standard_uncertainty for line in result.budget}
     assert share["time base", "period_s"] == pytest.approx(1e-4 * 0.4, rel=1e-3)
     assert share["time base", "damping_n_per_s"] == pytest.approx(1e-4 * 0.15, rel=1e-3)
     assert share["gauge 1 gain", "coulomb_displacement_m"] == pytest.approx(0.005 * 1e-4, rel=1e-3)
@@ -334,7 +334,7 @@ def test_what_one_decay_does_not_explain_is_never_a_bare_number(kind):
 
 def test_a_second_mode_is_named():
     result = identify_one_mass(single_channel(TIME_S, DOUBTFUL["weak second mode"]()))
-    message = next(caution.message for caution in result.warnings if caution.code == "second-mode")
+    message = next(str(caution.message) for caution in result.warnings if caution.code == "second-mode")
     assert "5.2" in message  # 1 / 0.19 s = 5.26 Hz
 
 

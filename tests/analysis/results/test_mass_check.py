@@ -12,7 +12,7 @@ def cautions_for(given_table_kg, given_plate_kg, **truth):
         Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3)
     )
     found = identify(made)
-    return found.model, {caution.code: caution.message for caution in found.warnings}
+    return found.model, {caution.code: str(caution.message) for caution in found.warnings}
 
 
 @pytest.mark.parametrize("truth", [{}, {"friction_static": 0.13, "tilt_rad": 1e-3}, {"noise_m": 1e-4}])

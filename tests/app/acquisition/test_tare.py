@@ -129,4 +129,4 @@ def test_the_fitted_zero_is_held_against_that_before_the_pull(pair: tuple[Told, 
     moved = ending.replace(zero_m=ending.zero_m - 0.3e-3, clock_scale=1.5)
     (caution,) = zero_warnings(moved, analysis.record, analysis.identification)
     assert caution.code == "zero-moved"
-    assert "place +30" in caution.message
+    assert "place +30" in str(caution.message)

@@ -80,8 +80,8 @@ def test_a_gauge_that_changed_by_2_percent_fails_and_later_runs_say_so(
     assert not check.passed
     (caution,) = gauge_check_warnings(run.gauge_checks)
     assert caution.code == "gauge-check-failed"
-    assert "gauge 2 (relative) was +12" in caution.message
-    assert "at 6 mm" in caution.message
+    assert "gauge 2 (relative) was +12" in str(caution.message)
+    assert "at 6 mm" in str(caution.message)
 
     check_run_settings(RunSettings(str(tmp_path), series="1FFM0"), gauges_file)
     assert "warning: gauge 2 (relative) was +12" in capsys.readouterr().err

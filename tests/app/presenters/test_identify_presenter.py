@@ -22,6 +22,7 @@ from app.presenters.identify.tasks import (
     SimulateFriction,
 )
 from app.presenters.worker import TaskDone, TaskFailed
+from messages.message import message
 
 RUN = str(analysed().path)
 LINE = DecimatedLine(np.array([5.0, 6.0]), np.array([0.012, 0.010]))
@@ -271,6 +272,6 @@ def test_cancelling_is_possible_only_while_something_goes_on(stage: Stage) -> No
 
 
 def test_a_caution_of_the_analysis_reaches_the_screen(stage: Stage) -> None:
-    stage.show(cautions=(ResultWarning("tilt-not-identified", "tilt and f_d act alike."),))
+    stage.show(cautions=(ResultWarning("tilt-not-identified", message("tilt and f_d act alike.")),))
     assert stage.presenter.state.result is not None
     assert stage.presenter.state.result.warnings == ("Tilt and f_d act alike. Level the plane.",)

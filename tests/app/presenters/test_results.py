@@ -8,6 +8,7 @@ from analysis.quantities import Quantity, ResultWarning
 from app.acquisition.messages import EndReason
 from app.presenters import results
 from app.presenters.base import Tone
+from messages.message import message
 
 
 def test_friction_stands_first_with_its_uncertainty() -> None:
@@ -70,7 +71,10 @@ def test_a_free_decay_of_one_mass_is_headed_by_its_period() -> None:
 
 
 def test_a_caution_says_what_to_do_and_says_it_once() -> None:
-    said = (ResultWarning("spikes", "3 readings are left out."), ResultWarning("no-slip", "nothing slips."))
+    said = (
+        ResultWarning("spikes", message("3 readings are left out.")),
+        ResultWarning("no-slip", message("nothing slips.")),
+    )
     assert results.make_result(analysed(cautions=said)).warnings == (
         "3 readings are left out. Check the cables for loose contacts.",
         "Nothing slips.",

@@ -100,7 +100,7 @@ def records() -> Iterator[tuple[str, Record, str]]:
     ("codes", "record", "model"), tuple(records()), ids=lambda value: value if isinstance(value, str) else ""
 )
 def test_what_is_said_of_a_record_is_retold(codes: str, record: Record, model: str) -> None:
-    said = {caution.code: caution.message for caution in identify(record, model=model).warnings}
+    said = {caution.code: str(caution.message) for caution in identify(record, model=model).warnings}
     assert set(codes.split()) <= said.keys()
     for message in said.values():
         assert_retold(message)
@@ -112,7 +112,7 @@ def test_what_is_said_of_one_mass_is_retold() -> None:
     mode = 0.1 * np.exp(-0.1 * time_s) * np.cos(2.0 * np.pi * 5.3 * time_s)
     noise = 0.002 * np.random.default_rng(3).standard_normal(len(time_s))
     said = [
-        caution.message
+        str(caution.message)
         for value in (decay + mode + noise, np.round(decay, 1))
         for caution in identify_one_mass(single_channel(time_s, value)).warnings
     ]

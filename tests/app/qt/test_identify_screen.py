@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 from stage import FakeWorker, analysed
 
 from analysis.identification import Events
-from analysis.quantities import BudgetLine
+from analysis.quantities import BudgetLine, BudgetSource
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
 from app.presenters.identify.cursors import Cursor
@@ -158,10 +158,10 @@ def with_scan() -> AnalysedRun:
         objective=Objective(friction, residual_m, 0.1003, (0.0990, 0.1016)),
         kinematics=Kinematics(4.8 + 10.0 * line, *(np.sin(9.0 * k * line) for k in range(1, 7))),
         budget=(
-            BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4),
-            BudgetLine("noise", "friction_dynamic", 6e-4),
-            BudgetLine("gauge 1 gain", "period_s", 1e-3),
-            BudgetLine("gauge 2 gain", "friction_dynamic", float("nan")),
+            BudgetLine(BudgetSource.GAUGE_1_GAIN, "friction_dynamic", 3e-4),
+            BudgetLine(BudgetSource.NOISE, "friction_dynamic", 6e-4),
+            BudgetLine(BudgetSource.GAUGE_1_GAIN, "period_s", 1e-3),
+            BudgetLine(BudgetSource.GAUGE_2_GAIN, "friction_dynamic", float("nan")),
         ),
     )
 
@@ -237,7 +237,10 @@ def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stag
 
 
 def test_the_budget_of_a_period_is_in_its_unit_to_the_digit_of_the_largest(stage: Stage) -> None:
-    lines = (BudgetLine("noise", "period_s", 6.7e-4), BudgetLine("time base", "period_s", 2.0e-6))
+    lines = (
+        BudgetLine(BudgetSource.NOISE, "period_s", 6.7e-4),
+        BudgetLine(BudgetSource.TIME_BASE, "period_s", 2.0e-6),
+    )
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(analysed(budget=lines, kind="one-mass"))
     assert [row.value for row in stage.presenter.state.budget] == ["0.67\u202fms", "< 0.01\u202fms"]

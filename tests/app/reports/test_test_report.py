@@ -108,7 +108,9 @@ def test_report_holds_the_whole_budget_largest_first(of_run, folder):
     *sources, total = shares.values()
     for line in found.budget:
         if line.contribution_to == "friction_dynamic":
-            assert shares[line.source] == pytest.approx(line.standard_uncertainty, rel=0.06), line.source
+            assert shares[str(line.source)] == pytest.approx(line.standard_uncertainty, rel=0.06), str(
+                line.source
+            )
     assert all(larger >= 0.99 * smaller for larger, smaller in pairwise(sources))
     assert total == pytest.approx(found.results["friction_dynamic"].standard_uncertainty, rel=0.05)
     assert {row[1] for row in grid.rows if row[0] == "noise"} == {"A"}

@@ -7,13 +7,14 @@ import pytest
 from runs_kit import ENDING, block
 
 from analysis.identification import Events, FittedModel, Identification, ModelSelection
-from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
 from app.runs.analysis_input import to_record
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.saved_analyses import analysis_document, inputs_hash, latest_valid, save_analysis
 from app.runs.writer import write_run
 from drivers.samples import Losses
+from messages.message import message
 
 RESULT = Identification(
     kind="two-mass",
@@ -31,9 +32,9 @@ RESULT = Identification(
         2e-5,
         (FittedModel("coulomb", -7.0, 2.1e-5, 0.1001), FittedModel("static", math.inf, 2e-5, 0.1)),
     ),
-    budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
+    budget=[BudgetLine(BudgetSource.GAUGE_1_GAIN, "friction_dynamic", 3e-4)],
     events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None, slip_end_uncertainty_s=0.002),
-    warnings=[ResultWarning("tail-too-short", "only 1.5 periods of tail")],
+    warnings=[ResultWarning("tail-too-short", message("only 1.5 periods of tail"))],
 )
 
 
