@@ -222,7 +222,7 @@ def wire_to_screen(app: QApplication, theme: Theme, frames: Frames, seconds: flo
     presenter.open_simulated(stand.series)
     record = presenter.record
     run_until(app, lambda: record.state.primary is Action.ARM)
-    record.arm()
+    record.dispatch(Action.ARM)
     frames.clear()
     before_kb, seen, end = memory_kb(), [], time.monotonic() + seconds
     shown = record.state.traces

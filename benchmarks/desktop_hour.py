@@ -66,10 +66,10 @@ def act(record: RecordPresenter) -> bool:
     state = record.state
     if state.result is None:
         if state.primary is Action.ARM:
-            record.arm()
+            record.dispatch(Action.ARM)
         return False
     if state.primary is Action.NEXT:
-        record.next()
+        record.dispatch(Action.NEXT)
         return True
     return False
 

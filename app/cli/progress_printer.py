@@ -98,23 +98,24 @@ class ProgressPrinter:
             out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
 
     def _sentence(self, event: "StateChanged") -> str:
-        from app.presenters.record.guidance import GuidanceInput, guidance_for
+        from app.acquisition.guidance import PullbackSituation, guidance_for
 
+        note = str(event.note)
         on_base_m = self._table_m if self._gauge_2_on_base else 0.0
         guidance = guidance_for(
-            GuidanceInput(
-                stage=event.state,
-                standing=event.position,
+            PullbackSituation(
+                state=event.state,
+                position=event.position,
                 table_m=self._table_m,
                 plate_m=self._relative_m + on_base_m,
                 simulated=self._simulated,
-                note=event.note,
+                note=note[:1].upper() + note[1:],
             )
         )
-        detail = guidance.detail
+        detail = str(guidance.detail)
         if detail[1:2].islower():  # it goes on as one sentence
             detail = detail[0].lower() + detail[1:]
-        return f"{guidance.instruction}: {detail}" if detail else guidance.instruction
+        return f"{guidance.instruction}: {detail}" if detail else str(guidance.instruction)
 
 
 _WAITING = ("recentre", "pulling", "held", "armed")

@@ -8,7 +8,7 @@ from app.presenters.analysis_task import analyse_run
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.launcher import ProcessLauncher
-from app.presenters.record.stand_context import StandContext
+from app.presenters.record.state import StandContext
 from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from app.acquisition.messages import Arm, Command, Event, Failed, PortSettings, RunSettings, Stop
+from app.acquisition.messages import Command, Event, Failed, PortSettings
 from app.acquisition.ring import RingRows
 from app.presenters.error_reports import ErrorReport, error_report
 from app.simulated_stand.options import SimulatedStandOptions
@@ -130,15 +130,10 @@ class Connection:
             self._disconnect()
         return events
 
-    def arm(self, run: RunSettings, count: int = 1) -> None:
-        """Record so many runs, one after another."""
+    def send(self, command: Command) -> None:
+        """Send a command to the engine, if one is connected."""
         if self._opened is not None:
-            self._opened.engine.send(Arm(run, count))
-
-    def stop(self) -> None:
-        """End the run and keep it."""
-        if self._opened is not None:
-            self._opened.engine.send(Stop())
+            self._opened.engine.send(command)
 
     def new_rows(self) -> RingRows | None:
         """Samples since the last call; None without any. Whoever listens gets them too."""

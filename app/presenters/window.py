@@ -17,7 +17,15 @@ from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.stand_context import StandContext
+from app.presenters.record.state import (
+    Connecting,
+    Disconnected,
+    IdentificationFailed,
+    IdentificationProgress,
+    RunsChanged,
+    ScreenEntered,
+    StandContext,
+)
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
@@ -118,9 +126,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._true_friction: float | None = None
         self._recorded: dict[str, float | None] = {}
         self.start = StartPresenter(start, self, ports)
-        self.record = RecordPresenter(
-            session, bench, files or Worker(), getpass.getuser(), lambda: self.show_screen(Screen.START)
-        )
+        self.record = RecordPresenter(session, bench, files or Worker(), getpass.getuser())
         self.identify = IdentifyPresenter(worker, self._poll_worker)
         self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
         session.add_row_listener(self.gauges.on_rows)
@@ -226,7 +232,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def set_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from now on."""
-        self.record.set_gauges(gauges)
+        self.record.dispatch(gauges)
 
     def ask_to_recover(self) -> None:
         """Ask what is to become of runs that a crash has left unfinished, if there are any."""
@@ -271,7 +277,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=Notice(sentence(said), Tone.WARN))
 
     def _apply_settings(self, settings: Settings) -> None:
-        self.record.set_settings(settings)
+        self.record.dispatch(settings)
         self.runs.set_author(settings.operator or getpass.getuser())
         self.campaign.set_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
@@ -282,7 +288,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._reconnect = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.set_busy(waiting_for)
-        self.record.on_connecting(device, waiting_for)
+        self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
         self._show(Screen.RECORD)
         self._update(notice=None)
@@ -295,7 +301,7 @@ class WindowPresenter(Presenter[WindowState]):
         else:
             self.gauges.leave()
         if screen is Screen.RECORD:
-            self.record.enter()
+            self.record.dispatch(ScreenEntered())
         self._update(screen=screen)
 
     def _refuse_while_recording(self) -> bool:
@@ -308,16 +314,14 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
-        self.record.on_disconnected()
+        self.record.dispatch(Disconnected())
         self.gauges.on_disconnected()
         self.start.set_connected("")
 
     def _on_engine_event(self, event: Event | SimulationStarted) -> None:
         if isinstance(event, SimulationStarted):
             self._true_friction = event.true_friction
-            self.record.on_simulation_started(event.series, event.true_friction)
-            return
-        self.record.on_event(event)
+        self.record.dispatch(event)
         if isinstance(event, Connected):
             self.start.set_connected(event.device)
             self.gauges.on_connected(event)
@@ -356,7 +360,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
         else:
             self._update(notice=recovery.recovery_outcome(news.answer))
-            self.record.count_completed()
+            self.record.dispatch(RunsChanged())
 
     def _on_worker_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
         if isinstance(news.argument, RecoverFolder):
@@ -364,11 +368,11 @@ class WindowPresenter(Presenter[WindowState]):
         elif isinstance(news.argument, IdentifyTask):
             self.identify.on_event(news)
         elif isinstance(news, TaskProgress):
-            self.record.on_progress(news.argument, news.progress)
+            self.record.dispatch(IdentificationProgress(news.argument, news.progress))
             self.identify.on_progress(news.argument, news.progress)
         elif isinstance(news, TaskFailed):
-            self.record.on_not_identified(news.argument, news.message)
+            self.record.dispatch(IdentificationFailed(news.argument, news.message))
             self.identify.on_failed(news.argument, news.message)
         elif news.answer is not None:
-            self.record.on_identified(news.answer)
+            self.record.dispatch(news.answer)
             self.identify.on_analysed(news.answer, self._recorded.get(news.argument))

@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import importlib
 import multiprocessing
 import time
 from collections import deque
@@ -22,6 +23,18 @@ _GRACE_S = 3.0
 """A process that is given up takes leave of its crew."""
 Task = Callable[[Any, ReportProgress], Any]
 """Module-level function of one argument; called in the other process."""
+
+
+@dataclass(frozen=True, slots=True)
+class LazyFunction:
+    """Module-level function that is imported where it is called: in the worker process, not in the window."""
+
+    module: str
+    name: str
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Import the function and call it."""
+        return getattr(importlib.import_module(self.module), self.name)(*arguments)
 
 
 @dataclass(frozen=True, slots=True)

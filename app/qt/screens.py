@@ -38,7 +38,7 @@ def _start(presenter: WindowPresenter, _theme: Theme, dialogs: WindowDialogs) ->
 def _record(presenter: WindowPresenter, theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.record.screen import RecordScreen
 
-    view = RecordScreen(theme, presenter.record)
+    view = RecordScreen(theme, presenter.record, lambda: presenter.show_screen(Screen.START))
     presenter.record.attach(view)
     return view
 

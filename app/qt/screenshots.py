@@ -22,7 +22,7 @@ from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
-from app.presenters.record.state import Action, RunForm, StepStatus
+from app.presenters.record.state import Action, PlanEdited, RunForm, StepStatus
 from app.presenters.window import Screen, WindowPresenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
@@ -110,16 +110,16 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.open_simulated(_STAND.series)
     wait = _Patience(presenter).wait
     wait(lambda: record.state.primary is Action.ARM, "the simulated stand is there")
-    record.set_plan(_PLAN)
-    record.set_form(_FORM)
-    record.arm()
+    record.dispatch(PlanEdited(_PLAN))
+    record.dispatch(_FORM)
+    record.dispatch(Action.ARM)
     wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
     camera.shoot("record-pull")
     wait(lambda: _step(presenter) == gettext("Slip") and _drawn_s(presenter) > 2.0, "the plate slips")
     camera.shoot("record-slip")
     wait(lambda: record.state.result is not None, "the friction is found")
     camera.shoot("record-result")
-    record.next()
+    record.dispatch(Action.NEXT)
     wait(lambda: record.state.plan.done == 1, "the run is kept and counted")
     camera.shoot("record-kept")
     _shoot_identify(presenter, camera, wait)

@@ -28,7 +28,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
-from app.presenters.record.stand_context import StandContext
+from app.presenters.record.state import StandContext
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -80,12 +80,12 @@ class FakeRecorder:
         self.stopped = 0
         self.rows: RingRows | None = None
 
-    def arm(self, run: RunSettings, count: int = 1) -> None:
-        self.armed.append(run)
-        self.counts.append(count)
-
-    def stop(self) -> None:
-        self.stopped += 1
+    def send(self, command: Command) -> None:
+        if isinstance(command, Arm):
+            self.armed.append(command.run)
+            self.counts.append(command.count)
+        elif isinstance(command, Stop):
+            self.stopped += 1
 
     def new_rows(self) -> RingRows | None:
         rows, self.rows = self.rows, None

@@ -1,22 +1,27 @@
-"""What the next tests are: series by the plan, conditions and operator, kept between starts; how many."""
+"""Next runs of the Record screen: series plan, chosen series, form of operator and conditions."""
 
+import re
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from app.acquisition.messages import RunSettings
 from app.presenters import number_text
-from app.presenters.base import EMPTY_CHIP, Chip, Tone
+from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
-from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_text
-from app.presenters.record.state import PlanState, RunChoices, RunForm
-from app.presenters.record.tasks import LoadedPlan, LoadPlan, SavePlan, Submit
+from app.presenters.record.decisions import LoadedPlan, SavePlan
+from app.presenters.record.state import NO_PLAN, PlanState, RunChoices, RunForm, SeriesProgress
 from app.presenters.results import sentence
 from app.runs.errors import MetadataError
-from app.runs.next_tests import REPEATS_MAX, NextTests
+from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
 from messages.i18n import gettext
 
+REPEATS_DEFAULT = 3
+"""Repeats of a planned series without a number: the fewest that show an outlier."""
+_PLAN_PART = re.compile(r"([0-9A-Z*?]+)(?:\s*[X×]\s*(\d+))?")
 _CONDITION_NAMES = {
     "temperature_c": "temperature in °C",
     "humidity_percent": "humidity in %",
@@ -26,251 +31,319 @@ _CONDITION_NAMES = {
     "run_in_number": "run-in number",
 }
 
+Plan = tuple[PlannedSeries, ...]
+CompletedRuns = tuple[tuple[str, str], ...]
+"""Path and series of each completed run."""
 
+
+@dataclass(frozen=True, slots=True)
 class NextRuns:
-    """Holds what was chosen and planned, and counts what is done.
+    """Choices for the next runs, the series plan and its progress.
 
-    Parameters
+    Attributes
     ----------
-    all_series : tuple of str
-        Series codes of the stand.
-    directory : Path
-        Where runs go.
-    submit : callable
-        Has a task done in another process.
-    show : callable
-        Takes choices and plan whenever they have changed.
+    choices : RunChoices
+    plan : PlanState
+    tests : NextTests
+        Plan, series, operator and conditions, as they are stored in the folder of runs.
+    saved : NextTests
+        As stored last.
+    is_requested, is_loaded : bool
+        The stored plan was asked for; was read.
+    is_edited : bool
+        The operator has changed form or plan before the stored ones were read.
+    completed : tuple of (str, str)
+        Path and series of each completed run.
+    undecided_path : str
+        Run that waits for a decision, and does not count until then; empty without one.
+    suggested_operator : str
+        Operator of the person's settings.
     """
 
-    def __init__(
-        self,
-        all_series: tuple[str, ...],
-        directory: Path,
-        submit: Submit,
-        show: Callable[[RunChoices, PlanState], None],
-    ) -> None:
-        self.choices = RunChoices(series=all_series[0], all_series=all_series)
-        self.plan = PlanState()
-        self._directory = directory
-        self._submit = submit
-        self._show = show
-        self._tests = self._saved = NextTests()
-        self._asked = self._known = self._touched = False
-        self._done: tuple[tuple[str, str], ...] = ()
-        self._counts: Counter[str] = Counter()
-        self._undecided = ""
-        self._suggested = ""
+    choices: RunChoices
+    plan: PlanState = NO_PLAN
+    tests: NextTests = field(default_factory=NextTests)
+    saved: NextTests = field(default_factory=NextTests)
+    is_requested: bool = False
+    is_loaded: bool = False
+    is_edited: bool = False
+    completed: CompletedRuns = ()
+    undecided_path: str = ""
+    suggested_operator: str = ""
 
-    # --- what the operator does ---
+    @classmethod
+    def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
+        """Begin with the first series and no plan."""
+        return cls(RunChoices(series=all_series[0], all_series=all_series))
 
-    def choose_series(self, code: str) -> None:
+    # --- choices ---
+
+    @property
+    def series(self) -> str:
         """Series of the next run."""
-        if self.choices.editable and not self.choices.series_fixed:
-            self._update_choices(series=code)
-            self._save()
+        return self.choices.series
 
-    def set_form(self, form: RunForm) -> None:
-        """Take what was filled in; what cannot be is said, and kept from being recorded."""
-        if not self.choices.editable:
-            return
-        self._touched = True
-        self._update_choices(form=form, form_error=_fault(form))
-        if not self.choices.form_error:
-            self._save()
+    @property
+    def can_choose_series(self) -> bool:
+        """Tell whether the series can be changed now."""
+        return self.choices.editable and not self.choices.series_fixed
 
-    def set_plan(self, text: str) -> bool:
-        """Plan anew; False, with words in `plan`, where the text is no plan."""
+    def with_choices(self, **changes: Any) -> "NextRuns":
+        """Change fields of `choices`."""
+        choices = replace(self.choices, **changes)
+        return replace(self, choices=replace(choices, summary=form_summary(choices.form)))
+
+    def with_form(self, form: RunForm) -> "NextRuns":
+        """Take an edited form; its error is in `choices.form_error`."""
+        return replace(self, is_edited=True).with_choices(form=form, form_error=_form_error(form))
+
+    def with_fixed_series(self, series: str, hint: str) -> "NextRuns":
+        """Allow one series only, for the reason in `hint`; an empty hint allows all."""
+        return self.with_choices(series=series or self.series, series_fixed=bool(hint), series_hint=hint)
+
+    def with_suggested_operator(self, name: str) -> "NextRuns":
+        """Fill in an operator, unless somebody else was typed."""
+        changed = replace(self, suggested_operator=name)
+        if self.choices.form.operator not in ("", self.suggested_operator):
+            return changed
+        return changed.with_choices(form=replace(self.choices.form, operator=name))
+
+    def after_recording(self) -> "NextRuns":
+        """Clear the note, which was of one run, and count the run-in number up."""
+        form = self.choices.form
+        number = form.run_in_number
+        number = str(int(number) + 1) if number.strip().isdecimal() else number
+        return self.with_choices(form=replace(form, note="", run_in_number=number))
+
+    # --- plan ---
+
+    def with_plan(self, text: str) -> "NextRuns":
+        """Take an edited plan; text that is no plan is in `plan.text`, the reason in `plan.error`."""
         try:
             plan = parse_plan(text, self.choices.all_series)
         except ValueError as error:
-            self._take_plan(replace(self.plan, text=text, error=sentence(str(error))))
-            return False
-        self._touched = True
-        self._tests = self._tests.replace(plan=plan)
-        self._count()
-        self.select_next_series()
-        self._save()
-        return True
+            return replace(self, plan=replace(self.plan, text=text, error=sentence(str(error))))
+        changed = replace(self, is_edited=True, tests=self.tests.replace(plan=plan))
+        return changed._counted().with_next_series()
 
-    # --- what happens elsewhere ---
+    def with_loaded_plan(self, loaded: LoadedPlan) -> "NextRuns":
+        """Take what is stored in the folder; what was edited before stays."""
+        changed = replace(self, is_loaded=True, saved=loaded.tests)
+        if not self.is_edited:
+            stored = loaded.tests
+            series = self.series
+            if stored.series in self.choices.all_series and not self.choices.series_fixed:
+                series = stored.series
+            changed = replace(changed, tests=stored).with_choices(
+                series=series, form=_stored_form(stored, self.choices.form)
+            )
+        return changed.with_completed(loaded.completed).with_next_series()
 
-    def load_plan(self) -> None:
-        """Ask what was planned here and what is there, once."""
-        if not self._asked:
-            self._asked = True
-            self._submit(LoadPlan(str(self._directory)))
+    def with_completed(self, completed: CompletedRuns) -> "NextRuns":
+        """Take the completed runs of the folder."""
+        return replace(self, completed=completed)._counted()
 
-    def on_plan_loaded(self, found: LoadedPlan) -> None:
-        """Take what was kept; what was typed meanwhile stays."""
-        self._known = True
-        tests = self._saved = found.tests
-        if not self._touched:
-            self._tests = tests
-            series = tests.series if tests.series in self.choices.all_series else self.choices.series
-            if self.choices.series_fixed:
-                series = self.choices.series
-            self._update_choices(series=series, form=_form_of(tests, self.choices.form))
-        self.count_done(found.done)
-        self.select_next_series()
-        self._save()
+    def with_kept_run(self, path: str, series: str) -> "NextRuns":
+        """Count a run that is being kept, before it is read from the folder."""
+        return self.with_completed((*(run for run in self.completed if run[0] != path), (path, series)))
 
-    def count_done(self, done: tuple[tuple[str, str], ...]) -> None:
-        """These runs, path and series each, count as done."""
-        self._done = done
-        self._count()
+    def with_removed_run(self, path: str) -> "NextRuns":
+        """Do not count a run that is being moved to the trash."""
+        return self.with_completed(tuple(run for run in self.completed if run[0] != path))
 
-    def count_kept(self, path: str, series: str) -> None:
-        """A run is being kept, so it counts before it is seen in the folder."""
-        self.count_done((*(one for one in self._done if one[0] != path), (path, series)))
+    def with_undecided(self, path: str) -> "NextRuns":
+        """Do not count the run at `path` until it is decided about; none if empty."""
+        return replace(self, undecided_path=path)._counted()
 
-    def count_removed(self, path: str) -> None:
-        """A run is being moved to the trash, so it no longer counts."""
-        self.count_done(tuple(one for one in self._done if one[0] != path))
-
-    def select_next_series(self) -> None:
-        """Go on to the next series of the plan if this one is full."""
-        if self.plan.progress and self.choices.editable and not self.choices.series_fixed:
-            self._update_choices(series=next_series(self.plan.progress, self.choices.series))
-
-    def fix_series(self, series: str, hint: str) -> None:
-        """Only this series can be recorded; an empty hint lets go of it."""
-        self._update_choices(series=series or self.choices.series, series_fixed=bool(hint), series_hint=hint)
-
-    def set_editable(self, editable: bool) -> None:
-        """Nothing of a run that is being recorded can be chosen otherwise."""
-        self._update_choices(editable=editable)
-
-    def set_undecided(self, path: str) -> None:
-        """The run at `path` is not decided about yet, so it does not count; none if empty."""
-        self._undecided = path
-        self._count()
-
-    def next_run(self) -> None:
-        """A run was recorded: its note was its own, and the surfaces have been run in once more."""
-        form = replace(self.choices.form, note="", run_in_number=_one_more(self.choices.form.run_in_number))
-        self._update_choices(form=form)
-        self._save()
-
-    def suggest_operator(self, name: str) -> None:
-        """Who records, as long as nobody has said otherwise."""
-        if self.choices.form.operator in ("", self._suggested):
-            self._update_choices(form=replace(self.choices.form, operator=name))
-        self._suggested = name
-
-    # --- what is known ---
+    def with_next_series(self) -> "NextRuns":
+        """Choose the next series of the plan if the current one is complete."""
+        if not (self.plan.progress and self.can_choose_series):
+            return self
+        return self.with_choices(series=next_series(self.plan.progress, self.series))
 
     def run_text(self, series: str) -> str:
-        """Which run of a series comes next, or is waited for."""
-        return run_text(self.plan.progress, series, self._counts[series])
+        """Number of the next run in its series: `1FFM0 run 2 of 3`."""
+        return run_text(self.plan.progress, series, self._counts()[series])
 
-    def form_chip(self) -> Chip:
-        """What is wrong with what was filled in; empty if nothing is."""
-        return Chip(self.choices.form_error, Tone.BAD)
+    # --- what is sent on ---
 
-    def moved_on_from(self, series: str) -> Chip:
-        """Say that the series is full and another one comes next; empty if it is still this one."""
-        now = self.choices.series
-        return (
-            EMPTY_CHIP
-            if now == series
-            else Chip(gettext("{series} is full: arm again for {next}", series=series, next=now), Tone.WARN)
+    def to_save(self, folder: str) -> tuple["NextRuns", SavePlan | None]:
+        """Prepare storing the choices; nothing is stored unless the stored plan could be read."""
+        if not self.is_loaded or self.choices.form_error:
+            return self, None
+        form = self.choices.form
+        tests = self.tests.replace(
+            series=self.series,
+            operator=form.operator.strip(),
+            conditions=parse_conditions(form, self.tests.conditions.other),
         )
+        if tests == self.saved:
+            return replace(self, tests=tests), None
+        return replace(self, tests=tests, saved=tests), SavePlan(folder, tests)
 
-    def settings(self, count: int | None = None) -> tuple[RunSettings, int]:
-        """The next run, and how many of it. Raises MetadataError, ValueError for what cannot be."""
-        choices, form = self.choices, self.choices.form
-        run = RunSettings(
-            directory=str(self._directory),
-            series=choices.series,
+    def run_settings(self, directory: Path) -> RunSettings:
+        """Settings of the next run. Raises MetadataError for conditions that cannot be."""
+        form = self.choices.form
+        return RunSettings(
+            directory=str(directory),
+            series=self.series,
             operator=form.operator.strip(),
             note=form.note.strip(),
-            conditions=parse_conditions(form, self._tests.conditions.other),
+            conditions=parse_conditions(form, self.tests.conditions.other),
         )
-        return run, count or _count_of(form)
+
+    @property
+    def run_count(self) -> int:
+        """Runs to record one after another. Raises MetadataError where the form says no number."""
+        return _parse_count(self.choices.form)
+
+    def why_not_armed(self, series: str) -> Chip:
+        """Reason not to arm a run that was asked for while `series` was shown; empty without one."""
+        if self.choices.form_error:
+            return Chip(self.choices.form_error, Tone.BAD)
+        if self.series == series:
+            return Chip("")
+        text = gettext("{series} is full: arm again for {next}", series=series, next=self.series)
+        return Chip(text, Tone.WARN)
 
     # --- inside ---
 
-    def _count(self) -> None:
-        self._counts = Counter(series for path, series in self._done if path != self._undecided)
-        plan = self._tests.plan
-        self._take_plan(PlanState(progress_of(plan, self._counts), plan_text(plan)))
+    def _counts(self) -> Counter[str]:
+        return Counter(series for path, series in self.completed if path != self.undecided_path)
 
-    def _save(self) -> None:
-        """Save what is known now, unless what was kept before could not be read."""
-        if not self._known or self.choices.form_error:
-            return
-        run, _ = self.settings()
-        self._tests = self._tests.replace(
-            series=self.choices.series, operator=run.operator, conditions=run.conditions
+    def _counted(self) -> "NextRuns":
+        plan = self.tests.plan
+        return replace(self, plan=PlanState(plan_progress(plan, self._counts()), format_plan(plan)))
+
+
+# --- the plan as text --------------------------------------------------------------------
+
+
+def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
+    """Parse a plan such as `1FF* x3, 2SSM0 x5`; empty text is an empty plan.
+
+    `*` and `?` match any part of a series code. A series without a number is repeated
+    `REPEATS_DEFAULT` times.
+
+    Raises
+    ------
+    ValueError
+        The text is no plan; the message is translated.
+    """
+    planned: dict[str, PlannedSeries] = {}
+    for part in filter(None, (part.strip().upper() for part in re.split(r"[,;\n]", text))):
+        found = _PLAN_PART.fullmatch(part)
+        if found is None:
+            raise ValueError(
+                gettext(
+                    "{part!r} is no part of a plan: write series and repeats, for example 1FFM0 x3", part=part
+                )
+            )
+        pattern, repeats = found[1], int(found[2] or REPEATS_DEFAULT)
+        if not 1 <= repeats <= REPEATS_MAX:
+            raise ValueError(
+                gettext("{part!r}: repeat a series 1 to {most} times", part=part, most=REPEATS_MAX)
+            )
+        for series in _matching(pattern, all_series):
+            if series in planned and "*" not in pattern and "?" not in pattern:
+                raise ValueError(
+                    gettext("{series} is planned twice: give it one number of repeats", series=series)
+                )
+            planned.setdefault(series, PlannedSeries(series, repeats))
+    return tuple(planned.values())
+
+
+def format_plan(plan: Plan) -> str:
+    """Write a plan as `parse_plan` reads it."""
+    return ", ".join(f"{one.series} x{one.repeats}" for one in plan)
+
+
+def plan_progress(plan: Plan, completed: Mapping[str, int]) -> tuple[SeriesProgress, ...]:
+    """Compare a plan with the number of completed runs of each series."""
+    return tuple(SeriesProgress(one.series, completed.get(one.series, 0), one.repeats) for one in plan)
+
+
+def next_series(progress: Sequence[SeriesProgress], current: str) -> str:
+    """Choose the current series unless it is complete, else the next that is not."""
+    names = [one.series for one in progress]
+    start = names.index(current) if current in names else 0
+    in_turn = [*progress[start:], *progress[:start]]
+    return next((one.series for one in in_turn if not one.is_full), current)
+
+
+def run_text(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
+    """Number of the next run in its series: `1FFM0 run 2 of 3`."""
+    planned = next((one.planned for one in progress if one.series == series), None)
+    if planned is None:
+        return gettext("{series} run {number}", series=series, number=done + 1)
+    if done >= planned:
+        return gettext("{series} full: {done} of {planned}", series=series, done=done, planned=planned)
+    return gettext("{series} run {number} of {planned}", series=series, number=done + 1, planned=planned)
+
+
+def _matching(pattern: str, all_series: Sequence[str]) -> list[str]:
+    found = [series for series in all_series if fnmatchcase(series, pattern)]
+    if not found:
+        raise ValueError(
+            gettext(
+                "{pattern} is no series of this stand: write one like {example}, or 1FF*",
+                pattern=pattern,
+                example=all_series[0],
+            )
         )
-        if self._tests != self._saved:
-            self._saved = self._tests
-            self._submit(SavePlan(str(self._directory), self._tests))
-
-    def _take_plan(self, plan: PlanState) -> None:
-        if plan != self.plan:
-            self.plan = plan
-            self._show(self.choices, self.plan)
-
-    def _update_choices(self, **changes: object) -> None:
-        choices = replace(self.choices, **changes)  # type: ignore[arg-type]
-        choices = replace(choices, summary=summary_of(choices.form))
-        if choices != self.choices:
-            self.choices = choices
-            self._show(self.choices, self.plan)
+    return found
 
 
-def summary_of(form: RunForm) -> str:
-    """The form in a line, as far as it is filled in."""
+# --- the form ----------------------------------------------------------------------------
+
+
+def form_summary(form: RunForm) -> str:
+    """Write the filled-in fields of a form on one line."""
+    count = form.count.strip()
     parts = (
         form.operator.strip(),
-        _with("", form.temperature_c, "°C"),
-        _with("", form.humidity_percent, "%"),
-        _with(gettext("plate "), form.plate_id),
-        _with(gettext("contact "), form.contact_id),
+        _labelled("", form.temperature_c, "°C"),
+        _labelled("", form.humidity_percent, "%"),
+        _labelled(gettext("plate "), form.plate_id),
+        _labelled(gettext("contact "), form.contact_id),
         form.surface_preparation.strip(),
-        _with(gettext("run-in "), form.run_in_number),
-        "" if form.count.strip() in ("", "1") else gettext("{count} runs in a row", count=form.count.strip()),
-        _with(gettext("note: "), form.note),
+        _labelled(gettext("run-in "), form.run_in_number),
+        "" if count in ("", "1") else gettext("{count} runs in a row", count=count),
+        _labelled(gettext("note: "), form.note),
     )
     return " · ".join(filter(None, parts))
 
 
-def _with(name: str, text: str, unit: str = "") -> str:
+def _labelled(name: str, text: str, unit: str = "") -> str:
     return name + number_text.with_unit(text.strip(), unit) if text.strip() else ""
 
 
-def _fault(form: RunForm) -> str:
-    """What is wrong with a form, in words; empty if nothing is."""
+def _form_error(form: RunForm) -> str:
+    """What is wrong with a form, as a sentence; empty if nothing is."""
     try:
         parse_conditions(form, {})
-        _count_of(form)
+        _parse_count(form)
     except ValueError as error:
-        words = str(error)
+        text = str(error)
         for name, title in _CONDITION_NAMES.items():
-            words = words.replace(f"condition {name}", title)
-        return sentence(words)
+            text = text.replace(f"condition {name}", title)
+        return sentence(text)
     return ""
 
 
-def _count_of(form: RunForm) -> int:
+def _parse_count(form: RunForm) -> int:
     text = form.count.strip() or "1"
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= REPEATS_MAX):
         raise MetadataError(f"runs in a row = {text!r} is no whole number from 1 to {REPEATS_MAX}")
     return int(text)
 
 
-def _form_of(tests: NextTests, form: RunForm) -> RunForm:
-    kept = {name: _text(getattr(tests.conditions, name)) for name in CONDITION_FIELDS}
-    operator = tests.operator or form.operator
-    return replace(form, **kept, operator=operator)
+def _stored_form(tests: NextTests, form: RunForm) -> RunForm:
+    stored = {name: _text(getattr(tests.conditions, name)) for name in CONDITION_FIELDS}
+    return replace(form, **stored, operator=tests.operator or form.operator)
 
 
 def _text(value: object) -> str:
     if value is None:
         return ""
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _one_more(text: str) -> str:
-    return str(int(text) + 1) if text.strip().isdecimal() else text

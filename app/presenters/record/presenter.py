@@ -1,295 +1,215 @@
-"""What the Record screen does: engine events and live rows in, one state out."""
+"""Presenter of the Record screen: dispatches events to the reducer, carries out effects, shows the state."""
 
-from collections.abc import Callable
-from dataclasses import replace
+import time
+from typing import Protocol
 
-from app.acquisition.messages import Event, PullbackState
-from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Presenter, Progress
-from app.presenters.record.ended_run import EndedRun
-from app.presenters.record.file_tasks import FileTasks
-from app.presenters.record.guidance import GuidanceInput, cue_for, guidance_for
-from app.presenters.record.live_display import LiveDisplay
-from app.presenters.record.live_traces import LiveTraces
-from app.presenters.record.pullback_session import PullbackSession
-from app.presenters.record.reducer import (
-    EngineEventReducer,
-    guidance_input,
-    shown_plate_range,
-    status_message,
+from app.acquisition.guidance import guidance_for
+from app.acquisition.messages import Arm, Command, PullbackState, Quit, Stop
+from app.acquisition.ring import RingRows
+from app.presenters.base import Chip, Presenter, Tone
+from app.presenters.record.decisions import KeepRun, MoveToTrash, RecordTask, RestoreFromTrash, SavePlan
+from app.presenters.record.model import RecordModel
+from app.presenters.record.reducer import Effect, reduce
+from app.presenters.record.state import (
+    Action,
+    ClockTicked,
+    Cue,
+    GuidanceState,
+    PullbackTarget,
+    RecordEvent,
+    RecordState,
+    StandContext,
+    Step,
+    StepStatus,
 )
-from app.presenters.record.stand_context import Recorder, StandContext
-from app.presenters.record.state import Action, PlanState, RecordState, RunChoices, RunForm
-from app.presenters.record.status_bar import StatusBarPresenter
-from app.presenters.worker import Worker
-from config.schema import Gauges, Settings
-from messages.i18n import gettext
+from app.presenters.results import sentence
+from app.presenters.worker import LazyFunction, TaskDone, TaskFailed, Worker
+from messages.i18n import N_, gettext, translate
+
+_EXECUTE = LazyFunction("app.presenters.record.tasks", "execute")
+_STEPS: tuple[tuple[str, frozenset[PullbackState]], ...] = (
+    (N_("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
+    (N_("Pull"), frozenset({PullbackState.PULLING})),
+    (N_("Hold"), frozenset({PullbackState.HELD})),
+    (N_("Armed"), frozenset({PullbackState.ARMED})),
+    (N_("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
+    (N_("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
+    (N_("Store"), frozenset({PullbackState.CLOSING})),
+    (N_("Result"), frozenset()),
+)
+_CUES = {
+    PullbackState.RECENTRE: Cue.TROUBLE,
+    PullbackState.PULLING: Cue.PULL,
+    PullbackState.HELD: Cue.HOLD,
+    PullbackState.ARMED: Cue.LET_GO,
+    PullbackState.RELEASED: Cue.RELEASED,
+}
+_TARGET_SHOWN = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
+
+
+class Recorder(Protocol):
+    """The engine as far as Record needs it."""
+
+    def send(self, command: Command) -> None:
+        """Send a command."""
+
+    def new_rows(self) -> RingRows | None:
+        """Samples since the last call; None without any."""
 
 
 class RecordPresenter(Presenter[RecordState]):
-    """Leads through one pullback after another.
+    """Leads the operator through one pullback test after another.
 
     Parameters
     ----------
     recorder : Recorder
-    bench : Bench
+    stand : StandContext
     files : Worker
-        Does what is to be done with run files. Closed by `close`.
+        Carries out tasks with run files. `close` closes it.
     author : str
         Who decides about runs, for their history.
-    connect_device : callable
-        Leads to where a device is connected.
     """
 
-    def __init__(
-        self,
-        recorder: Recorder,
-        bench: StandContext,
-        files: Worker,
-        author: str,
-        connect_device: Callable[[], None] = lambda: None,
-    ) -> None:
-        self._course = course = PullbackSession()
-        self._paperwork = FileTasks(
-            bench.all_series,
-            bench.directory,
-            files,
-            author,
-            self._show_desk,
-            lambda: course.is_free,
-            self._show_again,
-        )
-        self._desk, self._verdicts = self._paperwork.desk, self._paperwork.verdicts
-        super().__init__(RecordState(guidance=guidance_for(GuidanceInput()), choices=self._desk.choices))
+    CLOSE_S = 30.0
+    """Time for tasks that are under way when the window is closed; an analysis takes a second."""
+
+    def __init__(self, recorder: Recorder, stand: StandContext, files: Worker, author: str) -> None:
+        self._model = RecordModel.of_stand(stand, author)
+        super().__init__(record_state(self._model))
         self._recorder = recorder
-        self._bench = bench
-        self._connect_device = connect_device
-        self._heading = StatusBarPresenter(bench.gauges, bench.today, bench.clock)
-        live = LiveTraces(bench.gauges.table.range_m, bench.gauges.relative.range_m)
-        self._display = LiveDisplay(live)
-        self._ended_run = EndedRun(course, self._desk, self._verdicts, self._display)
-        self._engine = EngineEventReducer(course, self._heading, self._display, self._ended_run)
-        self._sounds = False
-        self._refresh()
+        self._files = files
+        self._unfinished: list[RecordTask] = []
 
     @property
     def is_recording(self) -> bool:
-        """Tell whether a run is under way, or is still being stored."""
-        return self._course.is_recording or self._course.engine is PullbackState.CLOSING
+        """Tell whether a run is being recorded or stored."""
+        session = self._model.session
+        return session.is_recording or session.engine is PullbackState.CLOSING
 
-    # --- what the operator does ---
-
-    def enter(self) -> None:
-        """The screen is shown: what is planned and done belongs onto it."""
-        self._desk.load_plan()
-
-    def tare(self) -> None:
-        """Read both gauges from where they stand; calibration and what is stored stay as they are."""
-        if Action.TARE in self.state.allowed:
-            self._verdicts.clear_last()
-            self._verdicts.status = self._display.tare()
-            self._refresh()
-
-    def untare(self) -> None:
-        """Read them by the calibration again."""
-        if Action.TARE in self.state.allowed:
-            self._display.untare()
-            self._verdicts.clear_last()
-            self._refresh()
-
-    def arm(self) -> None:
-        """Record the next pullback, also straight from the last result, which is kept then."""
-        if Action.ARM in self.state.allowed:
-            self._arm()
-
-    def stop(self) -> None:
-        """End the recording now and keep it."""
-        if Action.STOP in self.state.allowed:
-            self._course.is_command_pending = True
-            self._recorder.stop()
-            self._refresh()
-
-    def next(self) -> None:
-        """Keep the run with what was found in it, and make ready for the next."""
-        if Action.NEXT in self.state.allowed:
-            self._ended_run.close()
-            self._refresh()
-
-    def repeat(self) -> None:
-        """Move the run to the trash, and record the same series again at once."""
-        if Action.REPEAT in self.state.allowed:
-            self._ended_run.move_to_trash()
-            self._desk.choose_series(self._course.series)
-            self._arm(count=1)
-
-    def discard(self) -> None:
-        """Move the run to the trash."""
-        if Action.DISCARD in self.state.allowed:
-            self._ended_run.move_to_trash()
-            self._ended_run.close()
-            self._refresh()
-
-    def undo(self) -> None:
-        """Take the last decision back: the run is asked about again."""
-        if self.state.undo:
-            self._ended_run.undo()
-            self._refresh()
-
-    def set_note(self, note: str) -> None:
-        """Remark on the run that is to be decided about."""
-        self._verdicts.set_note(note)
-        self._update(decision=self._verdicts.decision)
-
-    def connect_device(self) -> None:
-        """Go where a device is connected."""
-        self._connect_device()
-
-    def choose_series(self, code: str) -> None:
-        """Series of the next run: its pullback becomes the target."""
-        self._desk.choose_series(code)
-        self._refresh()
-
-    def set_form(self, form: RunForm) -> None:
-        """Take what was filled in about the next tests."""
-        self._desk.set_form(form)
-        self._refresh()
-
-    def set_plan(self, text: str) -> bool:
-        """Plan anew; False, with words in the state, where the text is no plan."""
-        taken = self._desk.set_plan(text)
-        self._refresh()
-        return taken
-
-    def set_plot_width(self, pixels: int) -> None:
-        """Width of the plots."""
-        self._display.resized(pixels)
-
-    # --- what happens elsewhere ---
-
-    def on_connecting(self, device: str, waiting_for: str = "") -> None:
-        """A port is being opened; `waiting_for` says what is started before."""
-        self._ended_run.close()
-        self._course.true_friction = None
-        self._course.waiting_for = waiting_for
-        self._desk.load_plan()
-        self._start_over(PullbackState.CONNECTING, device)
-
-    def on_simulation_started(self, series: str, true_friction: float) -> None:
-        """The device is the simulated stand, which runs one series with a known truth."""
-        self._course.simulated = True
-        self._course.true_friction = true_friction
-        self._desk.fix_series(series, gettext("The simulated stand runs this series."))
-        self._refresh()
-
-    def set_settings(self, settings: Settings) -> None:
-        """Whether states are heard, and who records unless somebody else has been written."""
-        self._sounds = settings.sounds
-        self._desk.suggest_operator(settings.operator)
-        self._refresh()
-
-    def set_gauges(self, gauges: Gauges) -> None:
-        """These calibrations are in use from the next connection on; they tell of age and range at once."""
-        self._bench = replace(self._bench, gauges=gauges)
-        self._heading.set_gauges(gauges)
-
-    def on_disconnected(self) -> None:
-        """Nothing is connected any more; the result of the last run stays."""
-        self._course.simulated = False
-        self._desk.fix_series("", "")
-        self._start_over(None, "")
-
-    def on_event(self, event: Event) -> None:
-        """Take one event of the engine."""
-        self._engine.on_event(event)
-        self._refresh()
+    def dispatch(self, event: RecordEvent) -> None:
+        """Apply an event, carry out its effects and show the new state."""
+        if isinstance(event, TaskDone | TaskFailed) and event.argument in self._unfinished:
+            self._unfinished.remove(event.argument)
+        before = self._model
+        self._model, effects = reduce(before, event)
+        for effect in effects:
+            self._execute(effect)
+        is_drawn_only = self._model.live.read_s == before.live.read_s
+        if isinstance(event, ClockTicked | RingRows) and is_drawn_only:
+            self._update(status_bar=self._model.status_bar, traces=self._model.live.traces)
+        else:
+            self._set_state(record_state(self._model))
 
     def tick(self) -> None:
-        """Draw what has come since the last time, and take in what the worker has said."""
-        if self._paperwork.poll():
-            self._refresh()
-        if self._course.engine not in (None, PullbackState.CONNECTING):
-            self._heading.check_silence()
+        """Take answers of the worker and new samples; to be called some 60 times a second."""
+        self._poll_files()
+        self.dispatch(ClockTicked(self._model.stand.clock()))
         rows = self._recorder.new_rows()
         if rows is not None and len(rows):
-            self._heading.check_gauges(rows)
-            room = shown_plate_range(self._course, self._bench, self.state.choices.series)
-            if self._display.append(rows, self._pullback_m(), room):
-                self._refresh()
-        self._update(status_bar=self._heading.status_bar, traces=self._display.traces)
-
-    def on_progress(self, path: str, progress: Progress) -> None:
-        """The run is being identified."""
-        self._ended_run.identifying(path, progress)
-        self._update(progress=self._ended_run.progress)
-
-    def on_identified(self, run: AnalysedRun) -> None:
-        """A run that ended has been identified."""
-        self._ended_run.identified(run)
-        self._refresh()
-
-    def on_not_identified(self, path: str, message: str) -> None:
-        """A run that ended could not be identified."""
-        self._ended_run.not_identified(path, message)
-        self._refresh()
-
-    def count_completed(self) -> None:
-        """There are other runs in the folder than before."""
-        self._paperwork.count_completed()
+            self.dispatch(rows)
 
     def close(self) -> None:
-        """End the worker, as soon as what was decided is stored."""
-        self._paperwork.close()
+        """Wait until decisions are stored, then end the worker."""
+        until_s = time.monotonic() + self.CLOSE_S
+        while self._unfinished and self._files.is_busy and time.monotonic() < until_s:
+            self._poll_files()
+            time.sleep(0.005)
+        self._files.close()
 
-    # --- inside ---
+    def _poll_files(self) -> None:
+        for event in self._files.poll():
+            if isinstance(event, TaskDone | TaskFailed):
+                self.dispatch(event)
 
-    def _show_desk(self, choices: RunChoices, plan: PlanState) -> None:
-        self._update(choices=choices, plan=plan)
-
-    def _show_again(self, path: str) -> None:
-        self._ended_run.show_again(path)
-
-    def _arm(self, count: int | None = None) -> None:
-        """Ask the engine for it, unless there is a reason not to, which is said."""
-        series, reason = self._desk.choices.series, self._desk.form_chip()
-        if not reason.text:
-            self._ended_run.close()
-            reason = self._desk.moved_on_from(series)
-        if reason.text:
-            self._verdicts.status = reason
-            self._refresh()
+    def _execute(self, effect: Effect) -> None:
+        if isinstance(effect, Arm | Stop | Quit):
+            self._recorder.send(effect)
             return
-        run, count = self._desk.settings(count)
-        self._course.arm(run, count)
-        self._recorder.arm(run, count)
-        self._refresh()
+        if isinstance(effect, KeepRun | MoveToTrash | RestoreFromTrash | SavePlan):
+            self._unfinished.append(effect)
+        self._files.submit(_EXECUTE, effect)
 
-    def _start_over(self, engine: PullbackState | None, device: str) -> None:
-        self._engine.start_over(engine, device, self._pullback_m())
-        self._refresh()
 
-    def _pullback_m(self) -> float:
-        return self._bench.pullback_m(self.state.choices.series)
+def record_state(model: RecordModel) -> RecordState:
+    """Derive what the screen shows."""
+    session, ended, decisions, allowed = model.session, model.ended, model.decisions, model.allowed
+    primary = Action.ARM if ended is None else Action.NEXT
+    return RecordState(
+        guidance=_guidance(model),
+        cue=_cue(model) if model.sounds else None,
+        choices=model.next_runs.choices,
+        plan=model.next_runs.plan,
+        status_bar=model.status_bar,
+        traces=model.live.traces,
+        readings=model.live.readings,
+        live_estimate=session.live_estimate,
+        result=ended.result if ended else None,
+        progress=ended.progress if ended else None,
+        decision=decisions.shown,
+        status_message=_status_message(model),
+        undo=model.undo_text,
+        allowed=allowed,
+        primary=primary if primary in allowed and not (ended and ended.is_awaited) else None,
+        connected=session.engine is not None,
+    )
 
-    def _refresh(self) -> None:
-        course, verdicts = self._course, self._verdicts
-        self._desk.set_editable(not course.is_recording and not course.is_command_pending)
-        series = self._desk.choices.series
-        situation = guidance_input(course, self._bench, self._display.live, series)
-        self._heading.set_run(course.run_chip(self._desk.run_text, series))
-        allowed = course.allowed(decides=verdicts.decision is not None)
-        self._update(
-            status_bar=self._heading.status_bar,
-            guidance=guidance_for(situation),
-            cue=cue_for(situation) if self._sounds else None,
-            traces=self._display.traces,
-            readings=self._display.readings,
-            live_estimate=course.live_estimate,
-            result=self._ended_run.result,
-            progress=self._ended_run.progress,
-            decision=verdicts.decision,
-            status_message=status_message(course, verdicts.status),
-            undo=verdicts.undo_text(is_free=course.is_free),
-            allowed=allowed,
-            primary=course.next_action() if course.next_action() in allowed else None,
-            connected=course.engine is not None,
-        )
+
+def _guidance(model: RecordModel) -> GuidanceState:
+    session, ended = model.session, model.ended
+    steps = _steps(model)
+    if ended is not None and ended.is_awaited:
+        detail = gettext("The run is stored and is being compared with its simulation.")
+        return GuidanceState(gettext("Finding friction"), detail, steps=steps)
+    if ended is not None:
+        return GuidanceState(gettext("Done"), steps=steps)
+    if session.engine is None:
+        detail = gettext("Nothing is connected.")
+        return GuidanceState(gettext("Connect an amplifier"), detail, steps=steps)
+    situation = model.situation(session.engine)
+    if session.engine is PullbackState.CONNECTING and session.waiting_for and not situation.is_device_lost:
+        return GuidanceState(gettext("One moment"), sentence(session.waiting_for), steps=steps)
+    guidance = guidance_for(situation)
+    tone = Tone.BAD if situation.is_device_lost else Tone.WARN if guidance.is_warning else Tone.PLAIN
+    target = None if situation.is_device_lost else _target(model)
+    instruction = translate(guidance.instruction)
+    return GuidanceState(instruction, sentence(guidance.detail), tone, target, steps)
+
+
+def _target(model: RecordModel) -> PullbackTarget | None:
+    situation = model.situation(model.session.engine or PullbackState.IDLE)
+    position, pulled_m = situation.position, situation.pulled_m
+    if situation.state not in _TARGET_SHOWN or position.pullback_m is None or not pulled_m >= 0.0:
+        return None
+    return PullbackTarget(1e3 * position.pullback_m, 1e3 * pulled_m, 1e3 * position.tolerance_m)
+
+
+def _steps(model: RecordModel) -> tuple[Step, ...]:
+    names = [gettext(name) for name, _ in _STEPS]
+    if model.ended is not None and not model.ended.is_awaited:
+        return tuple(Step(name, StepStatus.DONE) for name in names)
+    now = next((i for i, (_, states) in enumerate(_STEPS) if model.session.engine in states), None)
+    if model.ended is not None:
+        now = len(_STEPS) - 1
+    if now is None:
+        return tuple(Step(name) for name in names)
+    statuses = [StepStatus.DONE] * now + [StepStatus.NOW] + [StepStatus.AHEAD] * (len(names) - now - 1)
+    return tuple(Step(name, status) for name, status in zip(names, statuses, strict=True))
+
+
+def _cue(model: RecordModel) -> Cue | None:
+    engine, ended = model.session.engine, model.ended
+    if ended is not None:
+        return None if ended.is_awaited else Cue.RESULT
+    if engine is None:
+        return None
+    return Cue.TROUBLE if model.situation(engine).is_device_lost else _CUES.get(engine)
+
+
+def _status_message(model: RecordModel) -> Chip:
+    """Outcome of the last action, and the note of an idle engine, which is no instruction then."""
+    message, session = model.decisions.message, model.session
+    if not (session.is_idle and session.note):
+        return message
+    tone = Tone.BAD if message.tone is Tone.BAD else Tone.WARN
+    parts = (message.text.rstrip("."), sentence(session.note))
+    return Chip(". ".join(filter(None, parts)), tone, message.hint)

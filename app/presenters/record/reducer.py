@@ -1,8 +1,12 @@
-"""What the engine says, and what it changes on Record: where the test stands, the header, the traces."""
+"""Reducer of the Record screen: model and event in, new model and effects out."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from app.acquisition.messages import (
+    Arm,
+    Command,
     Connected,
     Event,
     Health,
@@ -12,111 +16,492 @@ from app.acquisition.messages import (
     Reconnecting,
     RunEnded,
     RunStarted,
+    StandPosition,
     StateChanged,
+    Stop,
 )
-from app.acquisition.pullback.plan import AllowedPlateRange
-from app.presenters.base import Chip, Tone
-from app.presenters.record.ended_run import EndedRun
-from app.presenters.record.guidance import GuidanceInput
-from app.presenters.record.live_display import LiveDisplay
-from app.presenters.record.live_estimate import live_estimate
-from app.presenters.record.live_traces import LiveTraces
-from app.presenters.record.pullback_session import RECORDING, PullbackSession
-from app.presenters.record.stand_context import StandContext
-from app.presenters.record.status_bar import StatusBarPresenter
-from app.presenters.results import sentence
+from app.acquisition.ring import RingRows
+from app.presenters import results
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import Chip, Progress, Tone
+from app.presenters.connection import SimulationStarted
+from app.presenters.record.decisions import (
+    CountCompletedRuns,
+    KeepRun,
+    LoadPlan,
+    MoveToTrash,
+    RecordedRun,
+    RecordTask,
+    RestoreFromTrash,
+)
+from app.presenters.record.live import (
+    device_chip,
+    disk_chip,
+    live_estimate,
+    lost_samples_chip,
+    rate_text,
+    tare_chip,
+)
+from app.presenters.record.model import RECORDING_STATES, EndedRun, RecordModel, Snapshot, monitors_of
+from app.presenters.record.next_runs import NextRuns
+from app.presenters.record.state import (
+    Action,
+    ClockTicked,
+    Connecting,
+    Disconnected,
+    IdentificationFailed,
+    IdentificationProgress,
+    LiveEstimate,
+    NoteEdited,
+    PlanEdited,
+    PlotResized,
+    RecordEvent,
+    RunForm,
+    RunsChanged,
+    ScreenEntered,
+    SeriesChosen,
+    StatusBar,
+)
+from app.presenters.results import Result, sentence
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed
+from config.schema import Gauges, Settings
+from messages.i18n import gettext
+
+Effect = Command | RecordTask
+"""A command for the engine, or a task for the worker."""
+
+_NEW_MOTION = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
+"""States that end the live estimate: it was of another run, or of a table that was let down."""
 
 
-class EngineEventReducer:
-    """Hands each event to whom it concerns.
+def reduce(model: RecordModel, event: RecordEvent) -> tuple[RecordModel, tuple[Effect, ...]]:
+    """Apply an event.
 
-    Parameters
-    ----------
-    course : Course
-    heading : Heading
-    display : LiveDisplay
-    ended_run : EndedRun
+    Returns
+    -------
+    RecordModel, tuple of Effect
+        The new model, and what the presenter has to send.
     """
+    reduction = _Reduction(model)
+    reduction.apply(event)
+    if not isinstance(event, ClockTicked | RingRows):
+        reduction.finish()
+    return reduction.model, tuple(reduction.effects)
 
-    def __init__(
-        self, course: PullbackSession, heading: StatusBarPresenter, display: LiveDisplay, ended_run: EndedRun
+
+class _Reduction:
+    """Changes of one event: replaces `model` step by step, and collects `effects`."""
+
+    def __init__(self, model: RecordModel) -> None:
+        self.model = model
+        self.effects: list[Effect] = []
+
+    def apply(self, event: RecordEvent) -> None:
+        match event:
+            case RingRows():
+                self._on_samples(event)
+            case ClockTicked(now_s):
+                self._on_clock(now_s)
+            case Action():
+                self._on_action(event)
+            case ScreenEntered() | SeriesChosen() | RunForm() | PlanEdited() | NoteEdited() | PlotResized():
+                self._on_operator(event)
+            case TaskDone(task, answer):
+                self._on_task_done(task, answer)
+            case TaskFailed(task, message):
+                self._on_task_failed(task, message)
+            case AnalysedRun() | IdentificationFailed() | IdentificationProgress():
+                self._on_identification(event)
+            case Connecting() | Disconnected() | SimulationStarted():
+                self._on_connection(event)
+            case Settings():
+                next_runs = self.model.next_runs.with_suggested_operator(event.operator)
+                self._set(sounds=event.sounds, next_runs=next_runs)
+            case Gauges():
+                self._set(stand=replace(self.model.stand, gauges=event), monitors=monitors_of(event))
+            case RunsChanged():
+                self._count_completed()
+            case _:
+                self._on_engine(event)
+
+    def finish(self) -> None:
+        """Update what follows from everything else."""
+        model, session = self.model, self.model.session
+        editable = not session.is_recording and not session.is_command_pending
+        if editable is not model.next_runs.choices.editable:
+            self._set(next_runs=model.next_runs.with_choices(editable=editable))
+        self._set_bar(run=self._run_chip())
+
+    # --- the operator ---
+
+    def _on_action(self, action: Action) -> None:
+        model = self.model
+        match action:
+            case Action.UNDO if model.undo_text:
+                self._undo()
+            case Action.UNTARE if Action.TARE in model.allowed:
+                self._set(live=model.live.untared(), decisions=model.decisions.without_last())
+            case _ if action not in model.allowed:
+                return
+            case Action.TARE:
+                tared = model.live.tared()
+                self._set(live=tared or model.live, decisions=model.decisions.without_last())
+                self._say(tare_chip(tared))
+            case Action.ARM:
+                self._arm()
+            case Action.STOP:
+                self._set_session(is_command_pending=True)
+                self.effects.append(Stop())
+            case Action.NEXT:
+                self._close_ended()
+            case Action.REPEAT if model.ended is not None:
+                self._move_to_trash()
+                self._choose_series(model.ended.series)
+                self._arm(count=1)
+            case Action.DISCARD:
+                self._move_to_trash()
+                self._close_ended()
+
+    def _on_operator(
+        self, event: ScreenEntered | SeriesChosen | RunForm | PlanEdited | NoteEdited | PlotResized
     ) -> None:
-        self._course = course
-        self._heading = heading
-        self._display = display
-        self._ended_run = ended_run
+        model = self.model
+        match event:
+            case ScreenEntered():
+                self._load_plan()
+            case SeriesChosen(series):
+                self._choose_series(series)
+            case RunForm() if model.next_runs.choices.editable:
+                self._save(model.next_runs.with_form(event))
+            case PlanEdited(text):
+                next_runs = model.next_runs.with_plan(text)
+                self._set(next_runs=next_runs)
+                if not next_runs.plan.error:
+                    self._save(next_runs)
+            case NoteEdited(note):
+                self._set(decisions=model.decisions.with_note(note))
+            case PlotResized(width_px):
+                self._set(live=model.live.with_width(width_px))
 
-    def start_over(self, engine: PullbackState | None, device: str, pullback_m: float) -> None:
-        """Another engine speaks from now on, or none; the result of the last run stays in sight."""
-        self._course.connect(engine)
-        self._display.start_over()
-        self._heading.start(device)
-        if self._course.after_run is None:
-            self._ended_run.clear()
-            self._display.clear(pullback_m)
+    def _choose_series(self, series: str) -> None:
+        if self.model.next_runs.can_choose_series:
+            self._save(self.model.next_runs.with_choices(series=series))
 
-    def on_event(self, event: Event) -> None:
-        """Take one event."""
-        self._heading.on_event()
+    def _arm(self, count: int | None = None) -> None:
+        """Send the next run to the engine, unless there is a reason not to, which is shown."""
+        series = self.model.next_runs.series
+        reason = self.model.next_runs.why_not_armed(series)
+        if not reason.text:
+            self._close_ended()
+            reason = self.model.next_runs.why_not_armed(series)
+        if reason.text:
+            self._say(reason)
+            return
+        next_runs = self.model.next_runs
+        run, count = next_runs.run_settings(self.model.stand.directory), count or next_runs.run_count
+        self._set_session(
+            is_command_pending=True,
+            remaining_runs=count - 1,
+            series=run.series or "",
+            run_note=run.note,
+            run_name="",
+        )
+        self.effects.append(Arm(run, count))
+
+    # --- decisions about runs ---
+
+    def _decide(self) -> RecordedRun | None:
+        """Take the pending run, if there is one, as decided about."""
+        run = self.model.decisions.pending
+        self._set(decisions=self.model.decisions.decided())
+        return run
+
+    def _keep(self, run: RecordedRun) -> None:
+        self._set(decisions=self.model.decisions.keeping(run))
+        self.effects.append(run.keeping(self.model.author))
+
+    def _move_to_trash(self) -> None:
+        run = self._decide()
+        if run is not None:
+            self._set(decisions=self.model.decisions.moving(run))
+            self.effects.append(MoveToTrash(run.path, self.model.author, run.note_to_store))
+        if self.model.ended is not None and self.model.ended.result is not None:
+            self._set(next_runs=self.model.next_runs.with_removed_run(self.model.ended.result.path))
+
+    def _close_ended(self) -> None:
+        """Prepare the next run: the one that is shown is kept unless it was decided about."""
+        model, ended = self.model, self.model.ended
+        if ended is None:
+            return
+        if ended.result is None:
+            to_keep = model.decisions.to_keep | {ended.event.path}
+            self._set(decisions=replace(model.decisions, to_keep=to_keep))
+        elif ended.result.path:
+            self._set(snapshot=Snapshot(ended, model.live.traces, model.next_runs.series))
+        run = self._decide()
+        next_runs = model.next_runs.with_undecided("")
+        if run is not None:
+            self._keep(run)
+        if run is not None and run.has_results:
+            next_runs = next_runs.with_kept_run(run.path, ended.series).with_next_series()
+        self._set(next_runs=next_runs, live=self.model.live.restarted(), ended=None)
+        self._set_session(live_estimate=LiveEstimate())
+
+    def _undo(self) -> None:
+        decisions = self.model.decisions
+        run, trash_path = decisions.last, decisions.trash_path
+        self._set(decisions=decisions.undone())
+        if run is None:
+            return
+        if trash_path:
+            self._set(decisions=replace(self.model.decisions, restoring=run))
+            self.effects.append(RestoreFromTrash(trash_path))
+            return
+        self._set(decisions=self.model.decisions.again(run))
+        if self.model.snapshot is not None and self.model.snapshot.ended.result is not None:
+            self._show_again(self.model.snapshot.ended.result.path)
+
+    def _show_again(self, path: str) -> None:
+        """Show the run that was shown before, which is at `path` now, until it is decided about."""
+        snapshot = self.model.snapshot
+        if snapshot is None or snapshot.ended.result is None:
+            return
+        ended = replace(snapshot.ended, result=replace(snapshot.ended.result, path=path))
+        self._set(ended=ended, live=self.model.live.held(snapshot.traces))
+        self._choose_series(snapshot.next_series)
+        self._set(next_runs=self.model.next_runs.with_undecided(path))
+
+    # --- answers of the worker ---
+
+    def _on_task_done(self, task: RecordTask, answer: Any) -> None:
+        model = self.model
+        match task:
+            case LoadPlan():
+                self._save(model.next_runs.with_loaded_plan(answer))
+            case CountCompletedRuns():
+                self._set(next_runs=model.next_runs.with_completed(answer).with_next_series())
+            case KeepRun():
+                self._set(decisions=model.decisions.after_keeping(task))
+            case MoveToTrash():
+                self._set(decisions=model.decisions.after_moving(task, answer))
+            case RestoreFromTrash():
+                self._on_restored(answer)
+        if isinstance(task, KeepRun | MoveToTrash | RestoreFromTrash):
+            self._count_completed()
+
+    def _on_restored(self, path: str) -> None:
+        """Ask about a restored run again, or keep it if another one is shown."""
+        restoring = self.model.decisions.restoring
+        self._set(decisions=replace(self.model.decisions, restoring=None))
+        if restoring is None:
+            return
+        run = replace(restoring, path=path)
+        if self.model.is_run_shown:
+            self._keep(run)
+            self._say(Chip(gettext("Brought back {name}: it counts again", name=run.name), Tone.OK))
+        else:
+            self._set(decisions=self.model.decisions.again(run))
+            self._show_again(path)
+            self._say(Chip(gettext("Brought back {name}", name=run.name), Tone.OK))
+
+    def _on_task_failed(self, task: RecordTask, message: str) -> None:
+        if message == CANCELLED:
+            return
+        self._set(decisions=self.model.decisions.after_failure(task, message))
+        if isinstance(task, LoadPlan):  # the stored plan cannot be read; the runs can
+            self._count_completed()
+
+    def _load_plan(self) -> None:
+        if not self.model.next_runs.is_requested:
+            self._set(next_runs=replace(self.model.next_runs, is_requested=True))
+            self.effects.append(LoadPlan(str(self.model.stand.directory)))
+
+    def _save(self, next_runs: NextRuns) -> None:
+        next_runs, task = next_runs.to_save(str(self.model.stand.directory))
+        self._set(next_runs=next_runs)
+        if task is not None:
+            self.effects.append(task)
+
+    def _count_completed(self) -> None:
+        self.effects.append(CountCompletedRuns(str(self.model.stand.directory)))
+
+    # --- identification of the run ---
+
+    def _on_identification(self, event: AnalysedRun | IdentificationFailed | IdentificationProgress) -> None:
+        model = self.model
+        path = str(event.path)
+        ended = model.ended
+        if ended is None or ended.result is not None or ended.event.path != path:
+            self._on_late_identification(event, path)
+            return
+        match event:
+            case IdentificationProgress(_, progress):
+                self._set(ended=replace(ended, progress=progress))
+            case AnalysedRun():
+                self._set(decisions=replace(model.decisions, pending=RecordedRun.of(event)))
+                self._set_result(results.make_result(event, model.session.true_friction))
+            case IdentificationFailed(_, message):
+                pending = RecordedRun(path, ended.note, ended.note)
+                self._set(decisions=replace(model.decisions, pending=pending))
+                self._set_result(results.failed_result(message, path, ended.event.ended))
+
+    def _on_late_identification(
+        self, event: AnalysedRun | IdentificationFailed | IdentificationProgress, path: str
+    ) -> None:
+        """Keep a run that the operator has gone on from; without a result it stays as it is."""
+        decisions = self.model.decisions
+        if isinstance(event, IdentificationProgress) or path not in decisions.to_keep:
+            return
+        self._set(decisions=replace(decisions, to_keep=decisions.to_keep - {path}))
+        if isinstance(event, AnalysedRun):
+            self._set(decisions=self.model.decisions.undone())
+            self._keep(RecordedRun.of(event))
+
+    def _set_result(self, result: Result) -> None:
+        if self.model.ended is not None:
+            self._set(ended=replace(self.model.ended, result=result, progress=None))
+
+    # --- engine and connection ---
+
+    def _on_connection(self, event: Connecting | Disconnected | SimulationStarted) -> None:
+        match event:
+            case Connecting(device, waiting_for):
+                self._close_ended()
+                self._set_session(true_friction=None, waiting_for=waiting_for)
+                self._load_plan()
+                self._start_over(PullbackState.CONNECTING, device)
+            case Disconnected():
+                self._set_session(simulated=False)
+                self._set(next_runs=self.model.next_runs.with_fixed_series("", ""))
+                self._start_over(None, "")
+            case SimulationStarted(series, true_friction):
+                self._set_session(simulated=True, true_friction=true_friction)
+                hint = gettext("The simulated stand runs this series.")
+                self._set(next_runs=self.model.next_runs.with_fixed_series(series, hint))
+
+    def _start_over(self, engine: PullbackState | None, device: str) -> None:
+        """Another engine reports from now on, or none; the result of the last run stays."""
+        model = self.model
+        self._set_session(
+            engine=engine,
+            device=device,
+            position=StandPosition(),
+            is_command_pending=False,
+            remaining_runs=0,
+            note="",
+            loss_reason="",
+        )
+        bar = StatusBar(device_chip(device), run=model.status_bar.run) if device else StatusBar()
+        gauges = model.stand.gauges
+        self._set(status_bar=bar, monitors=monitors_of(gauges), live=model.live.reconnected(gauges))
+        if model.ended is None:
+            self._set(live=self.model.live.cleared(model.pullback_m))
+            self._set_session(live_estimate=LiveEstimate())
+
+    def _on_engine(self, event: Event) -> None:
+        self._set_session(heard_s=self.model.stand.clock())
         match event:
             case StateChanged():
-                self._came_to(event)
-            case Connected():
-                self._heading.on_connected(event.device, event.rate_hz)
-            case Reconnecting():
-                self._lose(sentence(event.message))
+                self._on_state(event)
+            case Connected(device, _, rate_hz):
+                self._set_session(device=device)
+                self._set_bar(device=device_chip(device), rate=rate_text(rate_hz))
+            case Reconnecting(message):
+                self._set_loss(sentence(message))
             case Reconnected():
-                self._lose("")
+                self._set_loss("")
             case Health():
-                self._heading.on_health(event)
+                self._set_bar(
+                    rate=rate_text(event.rate_hz),
+                    lost_samples=lost_samples_chip(event),
+                    disk=disk_chip(event.free_disk_bytes, event.bytes_per_s),
+                )
             case LiveResult():
-                self._course.live_estimate = live_estimate(event)
-            case RunStarted():
-                self._course.name = Path(event.path).stem
+                self._set_session(live_estimate=live_estimate(event))
+            case RunStarted(path):
+                self._set_session(run_name=Path(path).stem)
             case RunEnded():
-                self._ended_run.end(event)
+                self._on_run_ended(event)
 
-    def _came_to(self, event: StateChanged) -> None:
-        if event.state in RECORDING:
-            self._ended_run.close()
-        self._display.live.on_state_changed(event.state, event.since_s, event.position)
-        self._course.on_state_changed(event)
+    def _on_state(self, event: StateChanged) -> None:
+        if event.state in RECORDING_STATES:
+            self._close_ended()
+        session = self.model.session
+        remaining = session.remaining_runs
+        follows = not session.is_recording and not session.is_command_pending
+        if event.state in RECORDING_STATES and follows:  # without a command: the next run in a row
+            remaining = max(remaining - 1, 0)
+        self._set(live=self.model.live.on_state(event.state, event.since_s, event.position))
+        self._set_session(
+            engine=event.state,
+            position=event.position,
+            note=event.note,
+            remaining_runs=remaining,
+            live_estimate=LiveEstimate() if event.state in _NEW_MOTION else session.live_estimate,
+            is_command_pending=False,
+            waiting_for="",
+        )
 
-    def _lose(self, why: str) -> None:
-        self._course.loss_reason = why
-        self._heading.on_device_lost(why)
+    def _on_run_ended(self, event: RunEnded) -> None:
+        session = self.model.session
+        self._set_session(is_command_pending=False, remaining_runs=event.remaining)
+        progress = Progress(gettext("Identifying"))
+        self._set(
+            ended=EndedRun(event, session.series, session.run_name, session.run_note, progress=progress),
+            live=self.model.live.stopped(),
+            decisions=self.model.decisions.without_last(),
+        )
+        if event.path:
+            self._save(self.model.next_runs.with_undecided(event.path).after_recording())
+        else:
+            reason = event.message or gettext("nothing was recorded")
+            self._set_result(results.failed_result(reason, "", event.ended))
 
+    def _set_loss(self, reason: str) -> None:
+        self._set_session(loss_reason=reason)
+        self._set_bar(device=device_chip(self.model.session.device, reason))
 
-def guidance_input(
-    course: PullbackSession, bench: StandContext, live: LiveTraces, series: str
-) -> GuidanceInput:
-    """Put together where the test stands; `series` is that of the next run."""
-    gauge = bench.gauges.relative
-    table_m, relative_m = (float(value) for value in live.newest_m() + live.zero_m)
-    return GuidanceInput(
-        stage=course.stage,
-        standing=course.standing,
-        table_m=table_m,
-        plate_m=relative_m + table_m if gauge.measures == "plate" else relative_m,
-        plate_range=bench.allowed_plate_range(series),
-        simulated=course.simulated,
-        note="" if course.is_idle else course.note,
-        waiting_for=course.waiting_for,
-        loss_reason=course.loss_reason,
-    )
+    # --- time and samples ---
 
+    def _on_clock(self, now_s: float) -> None:
+        session = self.model.session
+        if session.engine in (None, PullbackState.CONNECTING) or session.loss_reason:
+            return
+        self._set_bar(device=device_chip(session.device, silent_s=now_s - session.heard_s))
 
-def status_message(course: PullbackSession, said: Chip) -> Chip:
-    """Add to what was `said` what the engine notes while nothing is recorded: it is no instruction then."""
-    if not (course.is_idle and course.note):
-        return said
-    tone = Tone.BAD if said.tone is Tone.BAD else Tone.WARN
-    parts = (said.text.rstrip("."), sentence(course.note))
-    return Chip(". ".join(filter(None, parts)), tone, said.hint)
+    def _on_samples(self, rows: RingRows) -> None:
+        model, today = self.model, self.model.stand.today()
+        first, second = model.monitors
+        monitors = first.with_rows(rows), second.with_rows(rows)
+        self._set(
+            monitors=monitors,
+            live=model.live.with_rows(rows, model.pullback_m, model.shown_plate_range),
+        )
+        self._set_bar(gauges=tuple(monitor.chip(rows, today) for monitor in monitors))
 
+    # --- changes of the model ---
 
-def shown_plate_range(course: PullbackSession, bench: StandContext, series: str) -> AllowedPlateRange | None:
-    """Where the plate may stand, while it has to be put back and gauge 2 can show where."""
-    measures_it = bench.gauges.relative.measures == "relative"
-    has_to = course.engine is PullbackState.RECENTRE
-    return bench.allowed_plate_range(series) if measures_it and has_to else None
+    def _run_chip(self) -> Chip:
+        model, session = self.model, self.model.session
+        if not model.is_run_shown:
+            return Chip(model.next_runs.run_text(model.next_runs.series))
+        shown = model.ended or session
+        name = model.ended.name if model.ended else session.run_name
+        text = model.next_runs.run_text(shown.series or model.next_runs.series)
+        if session.remaining_runs:
+            text += gettext(", {count} more by themselves", count=session.remaining_runs)
+        return Chip(text, hint=name)
+
+    def _say(self, message: Chip) -> None:
+        self._set(decisions=replace(self.model.decisions, message=message))
+
+    def _set(self, **changes: Any) -> None:
+        self.model = replace(self.model, **changes)
+
+    def _set_session(self, **changes: Any) -> None:
+        self.model = replace(self.model, session=replace(self.model.session, **changes))
+
+    def _set_bar(self, **changes: Any) -> None:
+        bar = replace(self.model.status_bar, **changes)
+        if bar != self.model.status_bar:
+            self.model = replace(self.model, status_bar=bar)

@@ -1,23 +1,73 @@
-"""What the Record screen shows, as values, and what its view must be able to do."""
+"""State of the Record screen: what the view draws, and the events that change it."""
 
+import datetime
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from pathlib import Path
+from typing import Any
 
+from app.acquisition.messages import Event
+from app.acquisition.pullback.plan import AllowedPlateRange, allowed_plate_range, default_excursion
+from app.acquisition.ring import RingRows
+from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.connection import SimulationStarted
 from app.presenters.decimated_history import Polyline
-from app.presenters.record.plan import SeriesProgress
 from app.presenters.results import Result, ResultRow
-from messages.i18n import N_
+from app.presenters.worker import TaskDone, TaskFailed
+from config.schema import Gauges, Settings, Stand
+from messages.i18n import N_, gettext
 
-NO_DEVICE = Chip(N_("no device"))
+_NO_DEVICE = Chip(N_("no device"))
+_DOTS_MAX = 6
+"""More dots cannot be counted at a glance: figures are shown instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class StandContext:
+    """Settings of the stand and the folder of its runs.
+
+    Attributes
+    ----------
+    all_series : tuple of str
+        Series codes.
+    directory : Path
+        Folder that runs are stored in.
+    today : callable
+        Current date, for the validity of calibrations.
+    clock : callable
+        Monotonic time (s).
+    """
+
+    stand: Stand
+    gauges: Gauges
+    all_series: tuple[str, ...]
+    directory: Path
+    today: Callable[[], datetime.date] = datetime.date.today
+    clock: Callable[[], float] = time.monotonic
+
+    def pullback_m(self, series: str) -> float:
+        """Nominal pullback of a series (m)."""
+        return self.stand.series(series).pullback_m
+
+    def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
+        """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
+        range_m = self.gauges.relative.range_m
+        if range_m is None:
+            return None
+        return allowed_plate_range(range_m, default_excursion(self.pullback_m(series)))
+
+
+# --- parts of the state ------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class StatusBar:
-    """Always in sight: device, true rate, losses, gauges, disk."""
+    """Status of device, stream, gauges, disk and run; always visible."""
 
-    device: Chip = NO_DEVICE
+    device: Chip = _NO_DEVICE
     rate: str = ""
     lost_samples: Chip = EMPTY_CHIP
     gauges: tuple[Chip, ...] = ()
@@ -25,8 +75,11 @@ class StatusBar:
     run: Chip = EMPTY_CHIP
 
 
+NO_STATUS = StatusBar()
+
+
 class StepStatus(StrEnum):
-    """Where a step of the stepper stands."""
+    """Position of a step relative to the current one."""
 
     DONE = "done"
     NOW = "now"
@@ -35,7 +88,7 @@ class StepStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One state of the pullback in the stepper."""
+    """One step of a pullback test in the stepper."""
 
     name: str
     status: StepStatus = StepStatus.AHEAD
@@ -43,7 +96,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class PullbackTarget:
-    """How far the table is pulled back, of how far it should be (mm, both positive)."""
+    """Nominal and current pullback (mm, both positive)."""
 
     target_mm: float
     now_mm: float
@@ -51,18 +104,18 @@ class PullbackTarget:
 
     @property
     def full_mm(self) -> float:
-        """End of the bar: a little beyond the target, so that too far can be seen."""
+        """End of the bar: beyond the target, so that overshoot is visible."""
         return 1.25 * self.target_mm
 
     @property
     def is_reached(self) -> bool:
-        """Tell whether it may be held here."""
+        """Tell whether the pullback is within its tolerance."""
         return abs(self.now_mm - self.target_mm) <= self.tolerance_mm
 
 
 @dataclass(frozen=True, slots=True)
-class Guidance:
-    """What the operator does now."""
+class GuidanceState:
+    """Next action of the operator."""
 
     instruction: str
     detail: str = ""
@@ -76,24 +129,24 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class TraceMarks:
-    """What is drawn over and under the traces. Times (s) on the axis shown, displacements in mm."""
+    """Marks over and under the traces. Times (s) on the shown axis, displacements in mm."""
 
     before_release: Span | None = None
     release_s: float | None = None
     slip: Span | None = None
     target_mm: Span | None = None
-    """Between which the table is to be held."""
+    """Allowed displacement of the table at the end of the pull."""
     table_range_mm: Span | None = None
     relative_range_mm: Span | None = None
-    plate_room_mm: Span | None = None
-    """Between which the plate is to stand before the pull, so that its slip fits gauge 2."""
+    plate_range_mm: Span | None = None
+    """Allowed position of the plate before the pull: its slip then fits the range of gauge 2."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Traces:
     """Both channels in mm against the shown time axis (s), from `span[0]` to `span[1]`.
 
-    `table_limit_mm` and `relative_limit_mm` are the halves of the vertical axes.
+    The value axes reach from minus to plus `table_limit_mm` and `relative_limit_mm`.
     """
 
     table: Polyline = field(default_factory=Polyline.empty)
@@ -107,29 +160,32 @@ class Traces:
 
 @dataclass(frozen=True, slots=True)
 class LiveReadings:
-    """The newest values, as text in mm."""
+    """Current readings of both gauges as text (mm), and the zero that they refer to."""
 
     table: str = "–"
     relative: str = "–"
     origin: str = ""
-    """From where they count."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveEstimate:
-    """What is known of the run while its motion dies away: rows as in a result, and what waiting brings."""
+    """Live identification during the decay: rows as in a result, and a note on its progress."""
 
     rows: tuple[ResultRow, ...] = ()
     note: str = ""
 
 
+NO_READINGS = LiveReadings()
+NO_ESTIMATE = LiveEstimate()
+
+
 @dataclass(frozen=True, slots=True)
 class RunForm:
-    """What the operator says about the next tests, as typed; conditions by the names of `Conditions`."""
+    """Form of the next runs, as typed; conditions by the field names of `Conditions`."""
 
     operator: str = ""
     note: str = ""
-    """Of the next run alone."""
+    """Of the next run only."""
     count: str = "1"
     temperature_c: str = ""
     humidity_percent: str = ""
@@ -141,7 +197,7 @@ class RunForm:
 
 @dataclass(frozen=True, slots=True)
 class RunChoices:
-    """What the next runs are."""
+    """Series and form of the next runs."""
 
     series: str
     all_series: tuple[str, ...]
@@ -149,14 +205,46 @@ class RunChoices:
     series_fixed: bool = False
     form: RunForm = RunForm()
     summary: str = ""
-    """The form in a line."""
+    """The form on one line."""
     form_error: str = ""
     editable: bool = True
 
 
 @dataclass(frozen=True, slots=True)
+class SeriesProgress:
+    """Completed and planned runs of a series."""
+
+    series: str
+    done: int
+    planned: int
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether all planned runs are completed."""
+        return self.done >= self.planned
+
+    @property
+    def dots(self) -> str:
+        """`●●○`, or `4/10` for many runs."""
+        if self.planned > _DOTS_MAX:
+            return f"{self.done}/{self.planned}"
+        done = min(self.done, self.planned)
+        return "●" * done + "○" * (self.planned - done)
+
+    @property
+    def description(self) -> str:
+        """Sentence for tool tips and screen readers."""
+        return gettext(
+            "{series}: {done} of {planned} runs are there",
+            series=self.series,
+            done=self.done,
+            planned=self.planned,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class PlanState:
-    """The series plan: each series with what is done of it, and the plan as typed."""
+    """Series plan: progress of each series, and the plan as text."""
 
     progress: tuple[SeriesProgress, ...] = ()
     text: str = ""
@@ -164,36 +252,42 @@ class PlanState:
 
     @property
     def planned(self) -> int:
-        """Runs in all."""
+        """Number of planned runs."""
         return sum(one.planned for one in self.progress)
 
     @property
     def done(self) -> int:
-        """Those of them that are there."""
+        """Number of completed runs, at most as many as planned of each series."""
         return sum(min(one.done, one.planned) for one in self.progress)
+
+
+NO_PLAN = PlanState()
 
 
 @dataclass(frozen=True, slots=True)
 class PendingDecision:
-    """A run waits for what is to become of it; `note` is to be stored with it, whatever that is."""
+    """A run waits for the decision to keep or to discard it; `note` is stored with either."""
 
     note: str = ""
 
 
 class Action(StrEnum):
-    """What can be done next."""
+    """Actions of the operator that need no further data."""
 
     TARE = "tare"
+    UNTARE = "untare"
     ARM = "arm"
     STOP = "stop"
     NEXT = "next"
-    """Keep the run, if there is one to decide about, and go on."""
+    """Keep the run, if one waits for a decision, and prepare the next."""
     REPEAT = "repeat"
+    """Move the run to the trash and record the same series again."""
     DISCARD = "discard"
+    UNDO = "undo"
 
 
 class Cue(StrEnum):
-    """What the operator may want to hear."""
+    """Sound for a state of the pullback test."""
 
     PULL = "pull"
     HOLD = "hold"
@@ -205,69 +299,126 @@ class Cue(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RecordState:
-    """The whole screen. `allowed` are the actions possible now, `primary` the one that comes next."""
+    """What the Record screen shows. `allowed` are the possible actions, `primary` the usual next one."""
 
-    guidance: Guidance
+    guidance: GuidanceState
     choices: RunChoices
-    status_bar: StatusBar = StatusBar()
+    status_bar: StatusBar = NO_STATUS
     traces: Traces = field(default_factory=Traces)
-    readings: LiveReadings = LiveReadings()
-    live_estimate: LiveEstimate = LiveEstimate()
+    readings: LiveReadings = NO_READINGS
+    live_estimate: LiveEstimate = NO_ESTIMATE
     result: Result | None = None
     decision: PendingDecision | None = None
     progress: Progress | None = None
-    plan: PlanState = PlanState()
+    plan: PlanState = NO_PLAN
     status_message: Chip = EMPTY_CHIP
-    """What became of the last run, or of what was asked for, and what is noted while nothing is recorded."""
+    """Outcome of the last action, and notes of the engine while nothing is recorded."""
     undo: str = ""
-    """What can be taken back."""
+    """What `Action.UNDO` takes back; empty where nothing can be."""
     cue: Cue | None = None
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
     connected: bool = False
 
 
-class RecordEvents(Protocol):
-    """What the Record screen tells its presenter."""
+# --- events ------------------------------------------------------------------------------
 
-    def tare(self) -> None:
-        """Read both gauges from where they stand."""
 
-    def untare(self) -> None:
-        """Read them by the calibration again."""
+@dataclass(frozen=True, slots=True)
+class ScreenEntered:
+    """The screen is shown."""
 
-    def arm(self) -> None:
-        """Record the next pullback."""
 
-    def stop(self) -> None:
-        """End the recording now."""
+@dataclass(frozen=True, slots=True)
+class SeriesChosen:
+    """The operator chose the series of the next run."""
 
-    def next(self) -> None:
-        """Keep the run, and make ready for the next."""
+    series: str
 
-    def repeat(self) -> None:
-        """Move the run to the trash and record the same series again."""
 
-    def discard(self) -> None:
-        """Move the run to the trash."""
+@dataclass(frozen=True, slots=True)
+class PlanEdited:
+    """The operator entered a series plan."""
 
-    def undo(self) -> None:
-        """Take the last decision back."""
+    text: str
 
-    def set_note(self, note: str) -> None:
-        """Remark on the run that is to be decided about."""
 
-    def connect_device(self) -> None:
-        """Go where a device is connected."""
+@dataclass(frozen=True, slots=True)
+class NoteEdited:
+    """The operator edited the note of the run that waits for a decision."""
 
-    def choose_series(self, code: str) -> None:
-        """Series of the next run."""
+    note: str
 
-    def set_form(self, form: RunForm) -> None:
-        """Take what was filled in about the next tests."""
 
-    def set_plan(self, text: str) -> bool:
-        """Plan anew; False where the text is no plan."""
+@dataclass(frozen=True, slots=True)
+class PlotResized:
+    """The plots have another width (pixels)."""
 
-    def set_plot_width(self, pixels: int) -> None:
-        """Width of the plots."""
+    width_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class Connecting:
+    """A device is being connected; `waiting_for` names a process that is started first."""
+
+    device: str
+    waiting_for: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnected:
+    """No device is connected any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockTicked:
+    """Time has passed; `now_s` on the clock of `StandContext`."""
+
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationProgress:
+    """The identification of a run has progressed."""
+
+    path: str
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationFailed:
+    """A run could not be identified; `message` is one line for people."""
+
+    path: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunsChanged:
+    """Runs were added to the folder or removed from it."""
+
+
+RecordEvent = (
+    Action
+    | ScreenEntered
+    | SeriesChosen
+    | RunForm
+    | PlanEdited
+    | NoteEdited
+    | PlotResized
+    | Connecting
+    | Disconnected
+    | SimulationStarted
+    | RingRows
+    | ClockTicked
+    | IdentificationProgress
+    | AnalysedRun
+    | IdentificationFailed
+    | Settings
+    | Gauges
+    | RunsChanged
+    | TaskDone[Any]
+    | TaskFailed
+    | Event
+)
+"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves."""

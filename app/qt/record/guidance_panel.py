@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Progress
-from app.presenters.record.state import Guidance, LiveEstimate, LiveReadings
+from app.presenters.record.state import GuidanceState, LiveEstimate, LiveReadings
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
@@ -68,7 +68,7 @@ class GuidancePanel(QWidget):
         layout.addLayout(row)
         layout.addWidget(self._origin)
 
-    def show_guidance(self, guidance: Guidance) -> None:
+    def show_guidance(self, guidance: GuidanceState) -> None:
         """Say what to do."""
         self._instruction.setText(guidance.instruction)
         self._detail.setText(guidance.detail)

@@ -128,7 +128,7 @@ class _PlotMarks:
 
     def show(self, marks: TraceMarks) -> None:
         ends_mm = marks.table_range_mm if self._is_first else marks.relative_range_mm
-        band_mm = marks.target_mm if self._is_first else marks.plate_room_mm
+        band_mm = marks.target_mm if self._is_first else marks.plate_range_mm
         place_region(self._before, marks.before_release)
         place_region(self._slip, marks.slip)
         place_region(self._band, band_mm)

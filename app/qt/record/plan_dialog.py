@@ -12,7 +12,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
-from app.presenters.record.state import PlanState, RecordEvents
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import PlanEdited, PlanState
 from app.qt.theme import TextRole
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.text import label, show_chip
@@ -29,9 +30,9 @@ _COLUMNS = 4
 class PlanDialog(QDialog):
     """Edits the plan, and shows all of it with what is done."""
 
-    def __init__(self, events: RecordEvents, parent: QWidget) -> None:
+    def __init__(self, presenter: RecordPresenter, parent: QWidget) -> None:
         super().__init__(parent)
-        self._events = events
+        self._presenter = presenter
         self._text = QPlainTextEdit()
         self._text.setAccessibleName(gettext("Series plan"))
         self._text.setMaximumHeight(96)
@@ -74,7 +75,8 @@ class PlanDialog(QDialog):
             self._all.addWidget(shown, number // _COLUMNS, number % _COLUMNS)
 
     def _use(self) -> None:
-        if self._events.set_plan(self._text.toPlainText()):
+        self._presenter.dispatch(PlanEdited(self._text.toPlainText()))
+        if not self._presenter.state.plan.error:
             self.close()
 
     def _lay_out(self) -> None:

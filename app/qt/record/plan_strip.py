@@ -4,8 +4,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from app.presenters.record.plan import SeriesProgress
-from app.presenters.record.state import PlanState
+from app.presenters.record.state import PlanState, SeriesProgress
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
 from messages.i18n import gettext, ngettext

@@ -45,7 +45,6 @@ class RunBar(QFrame):
     """Series, plan, fold; Tare, Arm, Stop, Keep."""
 
     acted = Signal(Action)
-    untared = Signal()
     series_chosen = Signal(str)
     filled = Signal(RunForm)
     plan_wanted = Signal()
@@ -142,7 +141,8 @@ class RunBar(QFrame):
         self._form.filled.connect(self.filled)
         self._form.left.connect(self.left_form)
         add_shortcut(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
-        add_shortcut(self, "Shift+T", gettext("Read both gauges by the calibration again"), self.untared.emit)
+        untare = gettext("Read both gauges by the calibration again")
+        add_shortcut(self, "Shift+T", untare, lambda: self.acted.emit(Action.UNTARE))
 
     def _lay_out(self) -> None:
         first = QHBoxLayout()

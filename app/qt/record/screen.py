@@ -1,6 +1,6 @@
 """The Record screen: header, live traces, the column that guides or tells the result, the run bar."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
@@ -14,7 +14,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.record.state import Action, RecordEvents, RecordState
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import Action, NoteEdited, PlotResized, RecordState, SeriesChosen
 from app.presenters.results import Result
 from app.qt.record.decision_panel import DecisionPanel
 from app.qt.record.guidance_panel import GuidancePanel
@@ -39,13 +40,19 @@ class RecordScreen(QWidget):
     Parameters
     ----------
     theme : Theme
-    events : RecordEvents
-        Told what the operator does.
+    presenter : RecordPresenter
+    connect_device : callable
+        Shows where a device is connected.
     """
 
-    def __init__(self, theme: Theme, events: RecordEvents) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        presenter: RecordPresenter,
+        connect_device: Callable[[], object] = lambda: None,
+    ) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._shown: RecordState | None = None
         self._header = StatusBarWidget()
         self._plots = LivePlots(theme)
@@ -58,7 +65,7 @@ class RecordScreen(QWidget):
         self._plan: PlanDialog | None = None
         self._sound = CuePlayer()
         self._lay_out()
-        self._connect(events)
+        self._connect(connect_device)
 
     def show_state(self, state: RecordState) -> None:
         """Draw what differs from what is shown."""
@@ -116,7 +123,7 @@ class RecordScreen(QWidget):
 
     def _edit_plan(self) -> None:
         if self._plan is None:
-            self._plan = PlanDialog(self._events, self)
+            self._plan = PlanDialog(self._presenter, self)
         if self._shown is not None:
             self._plan.open_with(self._shown.plan)
 
@@ -125,27 +132,19 @@ class RecordScreen(QWidget):
             self._result.show_result(result)
         self._column.show_second(result is not None)
 
-    def _connect(self, events: RecordEvents) -> None:
-        actions = {
-            Action.TARE: events.tare,
-            Action.ARM: events.arm,
-            Action.STOP: events.stop,
-            Action.NEXT: events.next,
-            Action.REPEAT: events.repeat,
-            Action.DISCARD: events.discard,
-        }
+    def _connect(self, connect_device: Callable[[], object]) -> None:
+        dispatch = self._presenter.dispatch
         for panel in (self._bar, self._decision):
-            panel.acted.connect(lambda action: actions[action]())
-        self._bar.untared.connect(events.untare)
-        self._bar.series_chosen.connect(events.choose_series)
-        self._bar.filled.connect(events.set_form)
+            panel.acted.connect(dispatch)
+        self._bar.series_chosen.connect(lambda series: dispatch(SeriesChosen(series)))
+        self._bar.filled.connect(dispatch)
         self._bar.plan_wanted.connect(self._edit_plan)
-        self._decision.noted.connect(events.set_note)
+        self._decision.noted.connect(lambda note: dispatch(NoteEdited(note)))
         self._decision.left_note.connect(self._take_focus)
         self._bar.left_form.connect(self._take_focus)
-        self._news.undone.connect(events.undo)
-        self._plots.resized.connect(events.set_plot_width)
-        self._guidance.connect_wanted.connect(events.connect_device)
+        self._news.undone.connect(lambda: dispatch(Action.UNDO))
+        self._plots.resized.connect(lambda width_px: dispatch(PlotResized(width_px)))
+        self._guidance.connect_wanted.connect(connect_device)
 
     def _lay_out(self) -> None:
         card = QFrame()

@@ -55,8 +55,8 @@ def wait_for(condition: Callable[[], bool]) -> None:
 def test_nothing_happens_before_something_is_opened(session: Connection) -> None:
     assert session.poll() == []
     assert session.new_rows() is None
-    session.arm(RunSettings("/recordings"))
-    session.stop()
+    session.send(Arm(RunSettings("/recordings")))
+    session.send(Stop())
     assert not session.is_active
 
 
@@ -64,8 +64,8 @@ def test_a_port_is_opened_and_takes_commands(session: Connection, launcher: Fake
     session.open_port(PORT)
     assert session.is_active
     poll_until(session, Connected)
-    session.arm(RunSettings("/recordings", series="1FFM0"), count=3)
-    session.stop()
+    session.send(Arm(RunSettings("/recordings", series="1FFM0"), 3))
+    session.send(Stop())
     assert launcher.ports == [PORT]
     assert launcher.engines[0].commands == [Arm(RunSettings("/recordings", series="1FFM0"), 3), Stop()]
 

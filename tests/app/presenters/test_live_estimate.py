@@ -3,7 +3,7 @@
 from stage import FakeRecorder, FakeWorker, bench
 
 from app.acquisition.messages import LiveResult, LiveValue, PullbackState, StateChanged
-from app.presenters.record.live_estimate import live_estimate
+from app.presenters.record.live import live_estimate
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import LiveEstimate
 
@@ -49,9 +49,9 @@ def test_an_end_of_the_live_identification_is_said() -> None:
 
 def test_the_next_run_begins_without_the_values_of_the_last() -> None:
     presenter = RecordPresenter(FakeRecorder(), bench(), FakeWorker(), "me")  # type: ignore[arg-type]
-    presenter.on_event(KNOWN)
+    presenter.dispatch(KNOWN)
     assert len(presenter.state.live_estimate.rows) == 3
-    presenter.on_event(StateChanged(PullbackState.TAIL, 7.0))
+    presenter.dispatch(StateChanged(PullbackState.TAIL, 7.0))
     assert len(presenter.state.live_estimate.rows) == 3
-    presenter.on_event(StateChanged(PullbackState.ZERO, 20.0))
+    presenter.dispatch(StateChanged(PullbackState.ZERO, 20.0))
     assert presenter.state.live_estimate == LiveEstimate()

@@ -20,8 +20,18 @@ from stage import (
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
 from app.presenters.base import Chip, Progress, Tone
+from app.presenters.connection import SimulationStarted
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, RunForm, StepStatus
+from app.presenters.record.state import (
+    Action,
+    Connecting,
+    Disconnected,
+    IdentificationFailed,
+    IdentificationProgress,
+    RunForm,
+    SeriesChosen,
+    StepStatus,
+)
 from app.runs.metadata import Conditions
 from drivers.samples import SampleStatus
 
@@ -39,14 +49,14 @@ def make(recorder: FakeRecorder) -> RecordPresenter:
 def presenter(recorder: FakeRecorder) -> RecordPresenter:
     """Connected and at rest, with two seconds of samples."""
     made = make(recorder)
-    made.on_connecting("/dev/ttyUSB0")
-    made.on_event(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+    made.dispatch(Connecting("/dev/ttyUSB0"))
+    made.dispatch(Connected("GSV-8", "1.2", 1000.0, "/ring"))
     came_to(made, PullbackState.IDLE, 0.0)
     return made
 
 
 def came_to(presenter: RecordPresenter, state: PullbackState, since_s: float) -> None:
-    presenter.on_event(StateChanged(state, since_s, "", standing(state)))
+    presenter.dispatch(StateChanged(state, since_s, "", standing(state)))
 
 
 def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end_s: float) -> None:
@@ -56,7 +66,7 @@ def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end
 
 def run_until(presenter: RecordPresenter, recorder: FakeRecorder, state: PullbackState, end_s: float) -> None:
     """Arm, and play the made-up pullback until `state` has been reached and drawn at `end_s`."""
-    presenter.arm()
+    presenter.dispatch(Action.ARM)
     played_s = 0.0
     for since_s, reached in STATES:
         feed(presenter, recorder, played_s, since_s)
@@ -69,9 +79,9 @@ def run_until(presenter: RecordPresenter, recorder: FakeRecorder, state: Pullbac
 
 def test_without_a_device_nothing_can_be_done(recorder: FakeRecorder) -> None:
     presenter = make(recorder)
-    presenter.arm()
-    presenter.stop()
-    presenter.next()
+    presenter.dispatch(Action.ARM)
+    presenter.dispatch(Action.STOP)
+    presenter.dispatch(Action.NEXT)
     assert recorder.armed == []
     assert presenter.state.allowed == frozenset()
     assert presenter.state.guidance.instruction == "Connect an amplifier"
@@ -86,9 +96,9 @@ def test_at_rest_arming_comes_next(presenter: RecordPresenter) -> None:
 def test_arming_hands_over_what_the_operator_chose(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
-    presenter.choose_series("2SSM1")
-    presenter.set_form(RunForm(operator="N. N.", note="third plate", temperature_c="21,5", run_in_number="7"))
-    presenter.arm()
+    presenter.dispatch(SeriesChosen("2SSM1"))
+    presenter.dispatch(RunForm(operator="N. N.", note="third plate", temperature_c="21,5", run_in_number="7"))
+    presenter.dispatch(Action.ARM)
     (run,) = recorder.armed
     assert (run.series, run.operator, run.note) == ("2SSM1", "N. N.", "third plate")
     assert run.directory == str(bench().directory)
@@ -98,8 +108,8 @@ def test_arming_hands_over_what_the_operator_chose(
 
 
 def test_a_key_pressed_twice_arms_once(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
-    presenter.arm()
-    presenter.arm()
+    presenter.dispatch(Action.ARM)
+    presenter.dispatch(Action.ARM)
     assert len(recorder.armed) == 1
     assert presenter.state.allowed == frozenset()
 
@@ -109,7 +119,7 @@ def test_series_operator_and_note_rest_while_a_run_is_recorded(
 ) -> None:
     run_until(presenter, recorder, PullbackState.ZERO, 1.0)
     assert not presenter.state.choices.editable
-    presenter.choose_series("3SSM3")
+    presenter.dispatch(SeriesChosen("3SSM3"))
     assert presenter.state.choices.series == "1FFM0"
 
 
@@ -206,7 +216,7 @@ def test_the_vertical_axes_hold_everything_that_is_drawn(
 
 def finish(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.CLOSING, END_S)
-    presenter.on_event(ended())
+    presenter.dispatch(ended())
     came_to(presenter, PullbackState.IDLE, END_S)
 
 
@@ -221,7 +231,7 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     assert presenter.state.traces.span == frozen.span
     assert presenter.state.guidance.instruction == "Finding friction"
     assert presenter.state.progress is not None
-    presenter.on_progress(RUN, Progress("Fitting coulomb", 0.4))
+    presenter.dispatch(IdentificationProgress(RUN, Progress("Fitting coulomb", 0.4)))
     assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
 
 
@@ -229,7 +239,7 @@ def test_the_result_takes_the_column_and_next_leaves_it(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    presenter.on_identified(analysed())
+    presenter.dispatch(analysed())
     result = presenter.state.result
     assert result is not None
     assert (result.headline.value, result.headline.uncertainty_text) == ("0.10030", "± 0.00064")
@@ -237,7 +247,7 @@ def test_the_result_takes_the_column_and_next_leaves_it(
     assert presenter.state.allowed == {Action.NEXT, Action.ARM, Action.REPEAT, Action.DISCARD}
     assert presenter.state.primary is Action.NEXT
     assert all(step.status is StepStatus.DONE for step in presenter.state.guidance.steps)
-    presenter.next()
+    presenter.dispatch(Action.NEXT)
     assert presenter.state.result is None
     assert presenter.state.primary is Action.ARM
     feed(presenter, recorder, END_S, END_S + 1.0)
@@ -248,8 +258,8 @@ def test_the_next_run_may_be_armed_straight_from_the_result(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    presenter.on_identified(analysed())
-    presenter.arm()
+    presenter.dispatch(analysed())
+    presenter.dispatch(Action.ARM)
     assert len(recorder.armed) == 2
     assert presenter.state.result is None
 
@@ -258,8 +268,8 @@ def test_a_result_that_comes_after_next_is_not_shown(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    presenter.next()
-    presenter.on_identified(analysed())
+    presenter.dispatch(Action.NEXT)
+    presenter.dispatch(analysed())
     assert presenter.state.result is None
     assert presenter.state.primary is Action.ARM
 
@@ -268,10 +278,12 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     run_until(presenter, recorder, PullbackState.ZERO, 1.5)
-    presenter.stop()
+    presenter.dispatch(Action.STOP)
     assert recorder.stopped == 1
-    presenter.on_event(ended(reason=EndReason.STOPPED))
-    presenter.on_not_identified(RUN, "no release in 1 s of record. Pull and release while recording")
+    presenter.dispatch(ended(reason=EndReason.STOPPED))
+    presenter.dispatch(
+        IdentificationFailed(RUN, "no release in 1 s of record. Pull and release while recording")
+    )
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
@@ -282,21 +294,21 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
 
 def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.TAIL, 9.0)
-    presenter.on_event(ended(reason=EndReason.DEVICE_LOST))
-    presenter.on_disconnected()
+    presenter.dispatch(ended(reason=EndReason.DEVICE_LOST))
+    presenter.dispatch(Disconnected())
     assert presenter.state.guidance.instruction == "Finding friction"
-    presenter.on_identified(analysed(ended="device-lost"))
+    presenter.dispatch(analysed(ended="device-lost"))
     assert presenter.state.result is not None
     assert presenter.state.result.end_status.tone is Tone.BAD
     assert presenter.state.allowed == {Action.NEXT, Action.DISCARD}
-    presenter.next()
+    presenter.dispatch(Action.NEXT)
     assert presenter.state.guidance.instruction == "Connect an amplifier"
     assert presenter.state.allowed == frozenset()
 
 
 def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> None:
-    presenter.on_event(health(missing=3, missing_estimated=1, damaged=2, free_disk_bytes=160_000_000))
-    presenter.on_event(RunStarted(RUN))
+    presenter.dispatch(health(missing=3, missing_estimated=1, damaged=2, free_disk_bytes=160_000_000))
+    presenter.dispatch(RunStarted(RUN))
     header = presenter.state.status_bar
     assert header.device == Chip("GSV-8")
     assert header.rate == "1000.02\u202fHz"
@@ -313,7 +325,7 @@ def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> No
     ],
 )
 def test_the_disk_tells_how_long_it_lasts(presenter: RecordPresenter, free_bytes: int, text: str) -> None:
-    presenter.on_event(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
+    presenter.dispatch(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
     assert presenter.state.status_bar.disk.text == text
 
 
@@ -347,16 +359,16 @@ def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, reco
 def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
-    presenter.on_simulation_started("3SSM0", 0.2)
+    presenter.dispatch(SimulationStarted("3SSM0", 0.2))
     assert presenter.state.guidance.instruction == "Arm at any time"
     assert presenter.state.choices.series_fixed
-    presenter.choose_series("1FFM0")
+    presenter.dispatch(SeriesChosen("1FFM0"))
     assert presenter.state.choices.series == "3SSM0"
     run_until(presenter, recorder, PullbackState.PULLING, 3.0)
     assert presenter.state.guidance.instruction == "The stand pulls back to 12.0\u202fmm"
     came_to(presenter, PullbackState.TAIL, 7.5)
-    presenter.on_event(ended())
-    presenter.on_identified(analysed())
+    presenter.dispatch(ended())
+    presenter.dispatch(analysed())
     assert presenter.state.result is not None
     assert presenter.state.result.comparison == "True value 0.20000: found −49.85\u202f%"
 
@@ -364,13 +376,13 @@ def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
 def test_the_truth_of_a_simulated_stand_is_not_held_against_a_real_one(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
-    presenter.on_simulation_started("1FFM0", 0.2)
-    presenter.on_disconnected()
-    presenter.on_connecting("COM7")
+    presenter.dispatch(SimulationStarted("1FFM0", 0.2))
+    presenter.dispatch(Disconnected())
+    presenter.dispatch(Connecting("COM7"))
     came_to(presenter, PullbackState.IDLE, 0.0)
     assert presenter.state.guidance.instruction == "Arm when the stand is at rest"
     finish(presenter, recorder)
-    presenter.on_identified(analysed())
+    presenter.dispatch(analysed())
     assert presenter.state.result is not None
     assert presenter.state.result.comparison == ""
 
@@ -387,7 +399,7 @@ def test_absent_samples_leave_a_dash_and_a_gap(presenter: RecordPresenter, recor
 
 def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     feed(presenter, recorder, 8.0, 10.0)
-    presenter.on_connecting("COM7")
+    presenter.dispatch(Connecting("COM7"))
     assert presenter.state.status_bar.device.text == "COM7"
     assert len(presenter.state.traces.table.value) == 0
     feed(presenter, recorder, 0.0, 1.0)  # its time begins at 0 again
@@ -395,7 +407,7 @@ def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, re
 
 
 def test_what_is_being_started_is_said_until_the_engine_speaks(presenter: RecordPresenter) -> None:
-    presenter.on_connecting("Simulated stand", "Starting the simulated stand")
+    presenter.dispatch(Connecting("Simulated stand", "Starting the simulated stand"))
     assert presenter.state.guidance.detail == "Starting the simulated stand"
     came_to(presenter, PullbackState.CONNECTING, 0.0)
     assert presenter.state.guidance.instruction == "Waiting for samples"
@@ -406,7 +418,7 @@ def test_a_table_that_was_let_down_is_said_and_pulled_again(
 ) -> None:
     run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
     assert presenter.state.traces.marks.release_s == 0.0
-    presenter.on_event(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
+    presenter.dispatch(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.guidance.detail.endswith("mm. The table was let down, not released")
     assert presenter.state.guidance.tone is Tone.WARN
@@ -418,7 +430,7 @@ def test_a_table_that_was_let_down_is_said_and_pulled_again(
 
 def test_a_run_of_which_nothing_was_kept_says_why(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.ZERO, 1.0)
-    presenter.on_event(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
+    presenter.dispatch(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
@@ -429,8 +441,8 @@ def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> No
     presenter = make(recorder)
     view = RecordingView()
     presenter.attach(view)
-    presenter.set_form(RunForm(note="a"))
-    presenter.set_form(RunForm(note="a"))
+    presenter.dispatch(RunForm(note="a"))
+    presenter.dispatch(RunForm(note="a"))
     presenter.tick()
     assert len(view.states) == 2
     assert view.states[-1] is presenter.state
@@ -441,7 +453,7 @@ def test_a_state_that_is_told_again_marks_nothing_anew(
 ) -> None:
     run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
     note = "the device was away and is back"
-    presenter.on_event(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
+    presenter.dispatch(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.traces.marks.slip == pytest.approx((0.0, 1.5), abs=0.01)
     assert presenter.state.guidance.detail == "The device was away and is back"
@@ -451,7 +463,7 @@ def test_what_is_noted_at_rest_is_news_and_no_instruction(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     note = "the device sends 704.62 samples a second instead of 2000"
-    presenter.on_event(StateChanged(PullbackState.IDLE, 1.0, note))
+    presenter.dispatch(StateChanged(PullbackState.IDLE, 1.0, note))
     state = presenter.state
     assert (state.guidance.instruction, state.guidance.detail, state.guidance.tone) == (
         "Arm when the stand is at rest",
@@ -460,13 +472,13 @@ def test_what_is_noted_at_rest_is_news_and_no_instruction(
     )
     assert state.status_message == Chip("The device sends 704.62 samples a second instead of 2000", Tone.WARN)
     feed(presenter, recorder, 0.0, 1.5)
-    presenter.tare()
+    presenter.dispatch(Action.TARE)
     assert presenter.state.status_message.text.startswith("Tared by ")
     assert presenter.state.status_message.text.endswith(
         ". The device sends 704.62 samples a second instead of 2000"
     )
-    presenter.arm()
-    presenter.on_event(StateChanged(PullbackState.PULLING, 11.0, note, standing(PullbackState.PULLING)))
+    presenter.dispatch(Action.ARM)
+    presenter.dispatch(StateChanged(PullbackState.PULLING, 11.0, note, standing(PullbackState.PULLING)))
     assert presenter.state.guidance.tone is Tone.WARN
     assert presenter.state.guidance.detail.endswith("instead of 2000")
     assert "704.62" not in presenter.state.status_message.text

@@ -10,7 +10,7 @@ import pytest
 from analysis.motion.two_mass import TwoMassParameters
 from app.__main__ import main
 from app.presenters.analysis_task import analyse_run
-from app.presenters.record.tasks import (
+from app.presenters.record.decisions import (
     CountCompletedRuns,
     KeepRun,
     LoadedPlan,
@@ -19,8 +19,8 @@ from app.presenters.record.tasks import (
     RecordTask,
     RestoreFromTrash,
     SavePlan,
-    execute,
 )
+from app.presenters.record.tasks import execute
 from app.runs.errors import RunError
 from app.runs.next_tests import NextTests, PlannedSeries
 from app.runs.reader import open_run

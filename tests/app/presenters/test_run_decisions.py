@@ -16,9 +16,8 @@ from app.acquisition.messages import (
 )
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Tone
-from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, Cue, PendingDecision, RunForm
-from app.presenters.record.tasks import (
+from app.presenters.connection import SimulationStarted
+from app.presenters.record.decisions import (
     CountCompletedRuns,
     KeepRun,
     LoadedPlan,
@@ -27,6 +26,18 @@ from app.presenters.record.tasks import (
     RecordTask,
     RestoreFromTrash,
     SavePlan,
+)
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import (
+    Action,
+    Connecting,
+    Cue,
+    IdentificationFailed,
+    NoteEdited,
+    PendingDecision,
+    PlanEdited,
+    RunForm,
+    ScreenEntered,
 )
 from app.presenters.worker import TaskDone, TaskFailed
 from app.runs.metadata import Conditions
@@ -46,15 +57,15 @@ class Desk:
         self.now_s = 0.0
         around = replace(bench(), clock=lambda: self.now_s)
         self.record = RecordPresenter(self.recorder, around, self.worker, "me")  # type: ignore[arg-type]
-        self.record.on_connecting("COM7")
+        self.record.dispatch(Connecting("COM7"))
         assert self.tasks() == [LoadPlan(str(bench().directory))]
         self.answer(LoadPlan("/recordings"), LoadedPlan(tests or NextTests(plan=PLAN), done))
-        self.record.on_event(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+        self.record.dispatch(Connected("GSV-8", "1.2", 1000.0, "/ring"))
         self.come_to(PullbackState.IDLE)
         self.tasks()
 
     def come_to(self, state: PullbackState, at_s: float = 0.0) -> None:
-        self.record.on_event(StateChanged(state, at_s))
+        self.record.dispatch(StateChanged(state, at_s))
 
     def tasks(self) -> list[RecordTask]:
         asked = [argument for _, argument in self.worker.submitted]
@@ -72,15 +83,15 @@ class Desk:
         self.come_to(PullbackState.TAIL)
         self.come_to(PullbackState.CLOSING)
         assert self.record.state.status_bar.run.text == before
-        self.record.on_event(msgspec.structs.replace(ended(path), remaining=remaining))
+        self.record.dispatch(msgspec.structs.replace(ended(path), remaining=remaining))
         if not remaining:
             self.come_to(PullbackState.IDLE)
         self.tasks()
 
     def result(self, note: str = "") -> None:
-        self.record.arm()
+        self.record.dispatch(Action.ARM)
         self.run()
-        self.record.on_identified(found(note=note))
+        self.record.dispatch(found(note=note))
 
 
 def found(path: str = RUN, note: str = "") -> AnalysedRun:
@@ -91,7 +102,7 @@ def test_keeping_stores_what_was_found_and_counts_again() -> None:
     desk = Desk()
     desk.result()
     assert desk.record.state.decision == PendingDecision("")
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
     assert task == KeepRun(RUN, "me", None, has_results=True)
     assert (
@@ -110,8 +121,8 @@ def test_a_new_note_goes_with_the_run_and_an_old_one_is_not_written_again() -> N
     desk = Desk()
     desk.result(note="third plate")
     assert desk.record.state.decision == PendingDecision("third plate")
-    desk.record.set_note("third plate, hand trembled")
-    desk.record.next()
+    desk.record.dispatch(NoteEdited("third plate, hand trembled"))
+    desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
     assert task.note == "third plate, hand trembled"
@@ -120,7 +131,7 @@ def test_a_new_note_goes_with_the_run_and_an_old_one_is_not_written_again() -> N
 def test_discarding_moves_to_the_trash_and_back() -> None:
     desk = Desk()
     desk.result()
-    desk.record.discard()
+    desk.record.dispatch(Action.DISCARD)
     (task,) = desk.tasks()
     assert task == MoveToTrash(RUN, "me", None)
     assert desk.record.state.result is None
@@ -129,7 +140,7 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     assert desk.record.state.status_message.text == "Moved 20260112_1FFM0_001 to the trash"
     assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
     desk.tasks()
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     assert desk.tasks() == [RestoreFromTrash(TRASHED)]
     assert desk.record.state.undo == ""
     desk.answer(RestoreFromTrash(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
@@ -139,24 +150,24 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     assert state.result is not None
     assert state.result.path == "/recordings/20260112_1FFM0_001-2.h5"
     assert state.status_message.text == "Brought back 20260112_1FFM0_001-2"
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     assert desk.tasks() == [KeepRun(state.result.path, "me", "", has_results=True)]
 
 
 def test_what_was_kept_can_be_decided_about_again() -> None:
     desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
-    desk.record.set_form(RunForm(note="third plate"))
+    desk.record.dispatch(RunForm(note="third plate"))
     desk.result()
     shown = desk.record.state
-    desk.record.set_note("hand trembled")
-    desk.record.next()
+    desk.record.dispatch(NoteEdited("hand trembled"))
+    desk.record.dispatch(Action.NEXT)
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     assert desk.record.state.choices.series == "1FFM1", "the plan has gone on"
     assert desk.record.state.plan.done == 2
     desk.answer(desk.tasks()[0], RUN)
     desk.answer(CountCompletedRuns("/recordings"), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
     desk.tasks()
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     again = desk.record.state
     assert again.decision == PendingDecision("hand trembled")
     assert again.result == shown.result
@@ -167,20 +178,20 @@ def test_what_was_kept_can_be_decided_about_again() -> None:
     desk.recorder.rows = rows_between(0.0, 0.5)
     desk.record.tick()
     assert desk.record.state.traces is shown.traces, "what the stand does now is not this run"
-    desk.record.discard()
+    desk.record.dispatch(Action.DISCARD)
     assert MoveToTrash(RUN, "me", "hand trembled") in desk.tasks()
 
 
 def test_a_run_on_its_way_to_the_trash_neither_counts_nor_is_asked_about() -> None:
     desk = Desk()
     desk.result()
-    desk.record.next()
-    desk.record.undo()
-    desk.record.discard()
+    desk.record.dispatch(Action.NEXT)
+    desk.record.dispatch(Action.UNDO)
+    desk.record.dispatch(Action.DISCARD)
     assert desk.record.state.plan.done == 0
     assert desk.record.state.status_message.text == "Moving 20260112_1FFM0_001 to the trash"
     assert desk.record.state.undo == ""
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     assert desk.record.state.result is None
     desk.answer(MoveToTrash(RUN, "me", ""), TRASHED)
     assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
@@ -189,24 +200,24 @@ def test_a_run_on_its_way_to_the_trash_neither_counts_nor_is_asked_about() -> No
 def test_keeping_is_taken_back_before_it_is_done_too() -> None:
     desk = Desk()
     desk.result()
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     desk.answer(task, RUN)
     assert desk.record.state.decision == PendingDecision("")
     assert desk.record.state.status_message.text == ""
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     assert isinstance(desk.tasks()[-1], KeepRun)
 
 
 def test_nothing_is_decided_again_while_the_next_run_is_recorded() -> None:
     desk = Desk()
     desk.result()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert desk.record.state.undo == ""
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     desk.come_to(PullbackState.ZERO)
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     assert desk.record.state.result is None
     assert [type(task) for task in desk.tasks()] == [KeepRun]
 
@@ -214,11 +225,11 @@ def test_nothing_is_decided_again_while_the_next_run_is_recorded() -> None:
 def test_a_repeated_run_that_is_brought_back_meanwhile_is_kept() -> None:
     desk = Desk()
     desk.result()
-    desk.record.repeat()
+    desk.record.dispatch(Action.REPEAT)
     desk.answer(desk.tasks()[0], TRASHED)
     desk.come_to(PullbackState.ZERO)
     desk.tasks()
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     desk.answer(desk.tasks()[0], RUN)
     assert desk.record.state.result is None
     assert desk.tasks() == [KeepRun(RUN, "me", None, has_results=True), CountCompletedRuns("/recordings")]
@@ -228,39 +239,39 @@ def test_a_repeated_run_that_is_brought_back_meanwhile_is_kept() -> None:
 def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
     desk = Desk()
     desk.result()
-    desk.record.discard()
+    desk.record.dispatch(Action.DISCARD)
     desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
     desk.record.tick()
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
-    desk.record.undo()
+    desk.record.dispatch(Action.UNDO)
     assert desk.record.state.decision == PendingDecision("")
 
 
 def test_closing_waits_until_what_was_decided_is_stored() -> None:
     desk = Desk()
     desk.result()
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
-    desk.worker.busy = True
+    desk.worker.is_busy = True
 
     def store() -> list[Any]:
         assert not desk.worker.closed
-        desk.worker.busy = False
+        desk.worker.is_busy = False
         return [TaskDone(task, RUN)]
 
     desk.worker.poll = store  # type: ignore[method-assign]
     desk.record.close()
     assert desk.worker.closed
-    assert not desk.worker.busy
+    assert not desk.worker.is_busy
     assert isinstance(desk.tasks()[-1], CountCompletedRuns)
 
 
 def test_repeating_puts_aside_and_arms_the_same_series_once() -> None:
     desk = Desk()
-    desk.record.set_form(RunForm(count="3"))
+    desk.record.dispatch(RunForm(count="3"))
     desk.tasks()
     desk.result()
-    desk.record.repeat()
+    desk.record.dispatch(Action.REPEAT)
     assert desk.tasks()[0] == MoveToTrash(RUN, "me", None)
     assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM0"]
     assert desk.recorder.counts == [3, 1]
@@ -269,7 +280,7 @@ def test_repeating_puts_aside_and_arms_the_same_series_once() -> None:
 def test_arming_from_the_result_keeps_it() -> None:
     desk = Desk()
     desk.result()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert isinstance(desk.tasks()[0], KeepRun)
     assert len(desk.recorder.armed) == 2
 
@@ -277,22 +288,22 @@ def test_arming_from_the_result_keeps_it() -> None:
 def test_another_series_is_not_armed_unseen() -> None:
     desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
     desk.result()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert isinstance(desk.tasks()[0], KeepRun)
     assert len(desk.recorder.armed) == 1
     assert desk.record.state.choices.series == "1FFM1"
     assert desk.record.state.status_message.text == "1FFM0 is full: arm again for 1FFM1"
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM1"]
 
 
 def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
     desk = Desk()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     desk.run()
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     assert desk.tasks() == []
-    desk.record.on_identified(found())
+    desk.record.dispatch(found())
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
     assert task.has_results
@@ -305,9 +316,9 @@ def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
 
 def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk = Desk()
-    desk.record.set_form(RunForm(count="2", run_in_number="7"))
+    desk.record.dispatch(RunForm(count="2", run_in_number="7"))
     desk.tasks()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert desk.recorder.counts == [2]
     assert desk.record.state.status_bar.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
     first, second = "/recordings/a.h5", "/recordings/b.h5"
@@ -316,21 +327,21 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     assert desk.record.state.status_bar.run.text.endswith(", 1 more by themselves")
     desk.come_to(PullbackState.ZERO)
     assert not desk.record.state.status_bar.run.text.endswith("by themselves")
-    desk.record.on_identified(found(first))
+    desk.record.dispatch(found(first))
     assert [type(task) for task in desk.tasks()] == [KeepRun]
     desk.run(second)
-    desk.record.on_identified(found(second))
+    desk.record.dispatch(found(second))
     assert desk.record.state.decision is not None
     assert desk.tasks() == []
 
 
 def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk = Desk()
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     desk.run()
-    desk.record.on_not_identified(RUN, "no release")
+    desk.record.dispatch(IdentificationFailed(RUN, "no release"))
     assert {Action.NEXT, Action.REPEAT, Action.DISCARD} <= desk.record.state.allowed
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
     assert not task.has_results
@@ -339,7 +350,7 @@ def test_a_run_without_a_result_can_be_put_aside_too() -> None:
 def test_what_could_not_be_done_is_said() -> None:
     desk = Desk()
     desk.result()
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
     desk.record.tick()
     assert desk.record.state.status_message.tone is Tone.BAD
@@ -352,7 +363,7 @@ def test_the_plan_counts_and_the_next_series_is_chosen_when_one_is_full() -> Non
     assert desk.record.state.status_bar.run.text == "1FFM0 run 2 of 2"
     desk.result()
     assert desk.record.state.status_bar.run.text == "1FFM0 run 2 of 2"
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     done = (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0"))
     desk.answer(CountCompletedRuns("/recordings"), done)
     assert [one.dots for one in desk.record.state.plan.progress] == ["●●", "○"]
@@ -365,23 +376,23 @@ def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
     desk.result()
     desk.answer(CountCompletedRuns("/recordings"), ((RUN, "1FFM0"),))
     assert desk.record.state.plan.done == 0
-    desk.record.next()
+    desk.record.dispatch(Action.NEXT)
     assert desk.record.state.plan.done == 1
 
 
 def test_the_simulated_stand_keeps_its_series_whatever_the_plan_says() -> None:
     desk = Desk()
-    desk.record.on_simulation_started("3SSM0", 0.2)
+    desk.record.dispatch(SimulationStarted("3SSM0", 0.2))
     desk.answer(CountCompletedRuns("/recordings"), ())
     assert desk.record.state.choices.series == "3SSM0"
 
 
 def test_a_plan_is_kept_and_what_is_none_is_said() -> None:
     desk = Desk(NextTests())
-    assert not desk.record.set_plan("9ZZ x3")
+    desk.record.dispatch(PlanEdited("9ZZ x3"))
     assert desk.record.state.plan.error.startswith("9ZZ is no series of this stand")
     assert desk.tasks() == []
-    assert desk.record.set_plan("2SSM1 x2")
+    desk.record.dispatch(PlanEdited("2SSM1 x2"))
     (task,) = desk.tasks()
     assert isinstance(task, SavePlan)
     assert task.tests.plan == (PlannedSeries("2SSM1", 2),)
@@ -400,14 +411,14 @@ def test_what_was_known_of_the_last_tests_is_there_again() -> None:
     assert choices.series == "2FFM1"
     assert choices.form == RunForm("N. N.", "", "1", "21.5", "", "P1", "", "", "4")
     assert choices.summary == "N. N. · 21.5\u202f°C · plate P1 · run-in 4"
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert desk.recorder.armed[0].conditions == kept.conditions
 
 
 def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
     desk = Desk()
-    desk.record.set_form(RunForm(note="new pads", run_in_number="4"))
-    desk.record.arm()
+    desk.record.dispatch(RunForm(note="new pads", run_in_number="4"))
+    desk.record.dispatch(Action.ARM)
     desk.run()
     form = desk.record.state.choices.form
     assert (form.note, form.run_in_number) == ("", "5")
@@ -423,10 +434,10 @@ def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
 )
 def test_what_cannot_be_is_said_and_nothing_is_recorded_with_it(form: RunForm, words: str) -> None:
     desk = Desk()
-    desk.record.set_form(form)
+    desk.record.dispatch(form)
     assert desk.record.state.choices.form_error.startswith(words)
     assert desk.tasks() == []
-    desk.record.arm()
+    desk.record.dispatch(Action.ARM)
     assert desk.recorder.armed == []
     assert desk.record.state.status_message.tone is Tone.BAD
 
@@ -434,13 +445,13 @@ def test_what_cannot_be_is_said_and_nothing_is_recorded_with_it(form: RunForm, w
 def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     desk = Desk()
     fresh = RecordPresenter(desk.recorder, bench(), desk.worker, "me")  # type: ignore[arg-type]
-    fresh.enter()
+    fresh.dispatch(ScreenEntered())
     (task,) = desk.tasks()
     desk.worker.news.append(TaskFailed(task, "next-tests.json: cannot be used. Mend it"))
     fresh.tick()
     assert desk.tasks() == [CountCompletedRuns("/recordings")]
     assert fresh.state.status_message.text == "next-tests.json: cannot be used. Mend it"
-    fresh.set_plan("1FFM0 x2")
+    fresh.dispatch(PlanEdited("1FFM0 x2"))
     assert desk.tasks() == []
 
 
@@ -449,7 +460,7 @@ def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
     desk.recorder.rows = rows_between(0.0, 1.5)
     desk.record.tick()
     assert desk.record.state.readings.table == "0.20"
-    desk.record.tare()
+    desk.record.dispatch(Action.TARE)
     assert desk.record.state.readings.table == "0.00"
     assert desk.record.state.readings.origin == "from the tare"
     assert desk.record.state.status_message.text == "Tared by 0.20\u202fmm and 0.00\u202fmm"
@@ -458,7 +469,7 @@ def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
     marks = desk.record.state.traces.marks
     range_mm = 1e3 * (bench().gauges.table.range_m or 0.0)
     assert marks.table_range_mm == pytest.approx((-range_mm - 0.2, range_mm - 0.2), abs=1e-3)
-    desk.record.untare()
+    desk.record.dispatch(Action.UNTARE)
     assert desk.record.state.readings.table == "0.20"
 
 
@@ -467,7 +478,7 @@ def test_a_stand_that_moves_is_not_tared() -> None:
     desk.recorder.rows = rows_between(2.0, 3.5)
     desk.record.tick()
     before = desk.record.state.readings.table
-    desk.record.tare()
+    desk.record.dispatch(Action.TARE)
     assert desk.record.state.status_message.text == "The stand moves: tare when it is at rest"
     assert desk.record.state.readings.table == before
 
@@ -478,20 +489,20 @@ def test_nothing_is_tared_while_a_run_is_recorded() -> None:
     assert Action.TARE not in desk.record.state.allowed
     desk.recorder.rows = rows_between(0.0, 1.5)
     desk.record.tick()
-    desk.record.tare()
+    desk.record.dispatch(Action.TARE)
     assert desk.record.state.readings.origin != "from the tare"
 
 
 def test_a_lost_device_is_said_with_what_to_do_until_it_is_back() -> None:
     desk = Desk()
     desk.come_to(PullbackState.TAIL)
-    desk.record.on_event(Reconnecting("the device at COM7 is gone"))
+    desk.record.dispatch(Reconnecting("the device at COM7 is gone"))
     state = desk.record.state
     assert state.guidance.instruction == "Plug the device in again"
     assert state.guidance.detail == "The device at COM7 is gone. The run goes on when it is back."
     assert state.guidance.tone is Tone.BAD
     assert (state.status_bar.device.text, state.status_bar.device.tone) == ("GSV-8 lost", Tone.BAD)
-    desk.record.on_event(Reconnected(1.2, "the device was away and is back"))
+    desk.record.dispatch(Reconnected(1.2, "the device was away and is back"))
     assert desk.record.state.guidance.instruction == "Hands off"
     assert desk.record.state.status_bar.device.text == "GSV-8"
 
@@ -513,7 +524,7 @@ def test_states_are_heard_only_by_who_wants_to() -> None:
     desk = Desk()
     desk.come_to(PullbackState.ARMED)
     assert desk.record.state.cue is None
-    desk.record.set_settings(Settings(sounds=True, operator="N. N."))
+    desk.record.dispatch(Settings(sounds=True, operator="N. N."))
     assert desk.record.state.cue is Cue.LET_GO
     desk.come_to(PullbackState.RELEASED)
     assert desk.record.state.cue is Cue.RELEASED

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_text
+from app.presenters.record.next_runs import format_plan, next_series, parse_plan, plan_progress, run_text
 from app.runs.next_tests import PlannedSeries
 from config.files import published_table
 
@@ -12,7 +12,7 @@ ALL = tuple(published_table())
 def test_a_plan_is_read_in_the_order_written() -> None:
     plan = parse_plan("2SSM1 x5, 1ffm0; 1FFM3 × 2", ALL)
     assert plan == (PlannedSeries("2SSM1", 5), PlannedSeries("1FFM0", 3), PlannedSeries("1FFM3", 2))
-    assert parse_plan(plan_text(plan), ALL) == plan
+    assert parse_plan(format_plan(plan), ALL) == plan
     assert parse_plan("  ", ALL) == ()
 
 
@@ -39,24 +39,24 @@ def test_what_is_no_plan_is_said(text: str, words: str) -> None:
 
 def test_dots_tell_what_is_done_and_figures_where_there_are_many() -> None:
     plan = parse_plan("1FFM0 x3, 1FFM1 x10, 1FFM2 x2", ALL)
-    progress = progress_of(plan, {"1FFM0": 2, "1FFM1": 4, "1FFM2": 5, "3SSM0": 9})
+    progress = plan_progress(plan, {"1FFM0": 2, "1FFM1": 4, "1FFM2": 5, "3SSM0": 9})
     assert [one.dots for one in progress] == ["●●○", "4/10", "●●"]
     assert progress[0].description == "1FFM0: 2 of 3 runs are there"
 
 
 def test_the_next_series_is_the_next_that_is_not_full() -> None:
     plan = parse_plan("1FFM0 x1, 1FFM1 x2, 1FFM2 x1", ALL)
-    assert next_series(progress_of(plan, {}), "1FFM1") == "1FFM1"
-    assert next_series(progress_of(plan, {"1FFM1": 2}), "1FFM1") == "1FFM2"
-    assert next_series(progress_of(plan, {"1FFM1": 2, "1FFM2": 1}), "1FFM1") == "1FFM0"
-    full = progress_of(plan, {"1FFM0": 1, "1FFM1": 2, "1FFM2": 1})
+    assert next_series(plan_progress(plan, {}), "1FFM1") == "1FFM1"
+    assert next_series(plan_progress(plan, {"1FFM1": 2}), "1FFM1") == "1FFM2"
+    assert next_series(plan_progress(plan, {"1FFM1": 2, "1FFM2": 1}), "1FFM1") == "1FFM0"
+    full = plan_progress(plan, {"1FFM0": 1, "1FFM1": 2, "1FFM2": 1})
     assert next_series(full, "1FFM2") == "1FFM2"
-    assert next_series(progress_of(plan, {"1FFM0": 1}), "3SSM0") == "1FFM1"
+    assert next_series(plan_progress(plan, {"1FFM0": 1}), "3SSM0") == "1FFM1"
     assert next_series((), "3SSM0") == "3SSM0"
 
 
 def test_a_run_is_numbered_in_its_series() -> None:
-    progress = progress_of(parse_plan("1FFM0 x3", ALL), {})
+    progress = plan_progress(parse_plan("1FFM0 x3", ALL), {})
     assert run_text(progress, "1FFM0", 1) == "1FFM0 run 2 of 3"
     assert run_text(progress, "1FFM0", 3) == "1FFM0 full: 3 of 3"
     assert run_text(progress, "2SSM0", 4) == "2SSM0 run 5"

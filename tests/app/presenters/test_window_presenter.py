@@ -11,6 +11,7 @@ from app.presenters.analysis_task import warm_up
 from app.presenters.base import Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
+from app.presenters.record.state import Action
 from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.start.state import ConnectForm, StartState
 from app.presenters.window import RECONNECT, Screen, WindowPresenter
@@ -67,7 +68,7 @@ def test_from_the_start_page_to_the_result(desk: Desk) -> None:
     assert window.start.state.busy == "Starting the simulated stand"
     desk.tick_until_connected()
     assert window.start.state.busy == ""
-    window.record.arm()
+    window.record.dispatch(Action.ARM)
     for until_s in (1.0, 3.0, 6.0, END_S + 0.1):
         desk.play(until_s)
     assert desk.worker.submitted == [(analyse, RUN)]
@@ -87,9 +88,9 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
     window = desk.window
     window.open_simulated("1FFM0")
     desk.tick_until_connected()
-    window.record.arm()
+    window.record.dispatch(Action.ARM)
     desk.play(1.0)
-    window.record.stop()
+    window.record.dispatch(Action.STOP)
     window.tick()
     desk.worker.news = [TaskFailed(RUN, "there is no release. Record until one")]
     window.tick()
@@ -159,7 +160,7 @@ def test_nothing_else_is_opened_while_a_run_is_recorded(desk: Desk) -> None:
     window = desk.window
     window.open_simulated("1FFM0")
     desk.tick_until_connected()
-    window.record.arm()
+    window.record.dispatch(Action.ARM)
     desk.play(1.0)
     window.start.start_simulation()
     window.start.disconnect()

@@ -24,10 +24,10 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
-from app.presenters.record.plan import SeriesProgress
+from app.presenters.record.decisions import KeepRun, LoadedPlan, LoadPlan, MoveToTrash, RecordTask
+from app.presenters.record.next_runs import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Cue, PlanState, RunForm
-from app.presenters.record.tasks import KeepRun, LoadedPlan, LoadPlan, MoveToTrash, RecordTask
+from app.presenters.record.state import Connecting, Cue, PlanState, RunForm
 from app.presenters.worker import TaskDone
 from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
@@ -63,12 +63,12 @@ class Stage:
         self.presenter.attach(self.screen)
         self.screen.show()
         qtbot.waitExposed(self.screen)
-        self.presenter.on_connecting("COM7")
+        self.presenter.dispatch(Connecting("COM7"))
         done = (("/a", "1FFM0"), ("/b", "1FFM0"), ("/c", "1FFM0"), ("/d", "1FFM1"))
         self.answer(LoadPlan("/recordings"), LoadedPlan(KEPT, done))
-        self.presenter.on_event(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
-        self.presenter.on_event(StateChanged(PullbackState.IDLE, 0.0))
-        self.presenter.on_event(health(bytes_per_s=70_000.0))
+        self.presenter.dispatch(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.dispatch(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.dispatch(health(bytes_per_s=70_000.0))
         self.presenter.tick()
         self.tasks()
 
@@ -85,11 +85,11 @@ class Stage:
         """Up to the result."""
         self.press(Qt.Key.Key_A)
         for _, event in script(RUN):
-            self.presenter.on_event(event)
+            self.presenter.dispatch(event)
         self.recorder.rows = rows_between(0.0, END_S)
         self.presenter.tick()
         self.tasks()
-        self.presenter.on_identified(analysed())
+        self.presenter.dispatch(analysed())
 
     def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         self.qtbot.keyClick(self.screen, key, modifier)
@@ -124,11 +124,11 @@ def test_no_word_is_cut_off_where_a_run_is_decided_about(stage: Stage, width: in
 
 def test_a_long_header_is_cut_short_by_its_names_alone(stage: Stage) -> None:
     stage.screen.resize(932, 700)
-    stage.presenter.set_form(RunForm(count="12"))
+    stage.presenter.dispatch(RunForm(count="12"))
     stage.press(Qt.Key.Key_A)
-    stage.presenter.on_event(Connected("GSV-8 S/N 1234 at the second bench", "1", 1000.0, "/ring"))
-    stage.presenter.on_event(health(missing=123_456, free_disk_bytes=90_000_000, bytes_per_s=70_000.0))
-    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 1.0))
+    stage.presenter.dispatch(Connected("GSV-8 S/N 1234 at the second bench", "1", 1000.0, "/ring"))
+    stage.presenter.dispatch(health(missing=123_456, free_disk_bytes=90_000_000, bytes_per_s=70_000.0))
+    stage.presenter.dispatch(StateChanged(PullbackState.ZERO, 1.0))
     stage.recorder.rows = rows_between(0.0, 0.5)
     stage.presenter.tick()
     QApplication.processEvents()
@@ -273,7 +273,7 @@ def test_the_target_bar_stays_where_it_is_while_the_table_is_pulled_and_held(sta
     stage.recorder.rows = rows_between(0.0, 4.4)
     stage.presenter.tick()
     for state in (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED):
-        stage.presenter.on_event(StateChanged(state, 4.4, "", standing(state)))
+        stage.presenter.dispatch(StateChanged(state, 4.4, "", standing(state)))
         QApplication.processEvents()
         assert bar.isVisible()
         places.append((bar.mapTo(stage.screen, bar.rect().topLeft()), steps.y()))
@@ -357,7 +357,7 @@ def test_what_is_known_of_the_next_tests_is_folded_into_a_line(stage: Stage) -> 
 
 def test_nothing_is_filled_in_while_a_run_is_recorded(stage: Stage) -> None:
     stage.press(Qt.Key.Key_F2)
-    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 1.0))
+    stage.presenter.dispatch(StateChanged(PullbackState.ZERO, 1.0))
     assert not stage.field("Operator").isEnabled()
     assert not stage.button("1FFM2").isEnabled()
 
@@ -376,12 +376,12 @@ def test_states_are_played_by_the_systems_player_or_its_bell(
 ) -> None:
     played: list[str] = []
     monkeypatch.setattr(sound.CuePlayer, "play", lambda _self, cue: played.append(cue.value))
-    stage.presenter.on_event(StateChanged(PullbackState.ARMED, 1.0))
+    stage.presenter.dispatch(StateChanged(PullbackState.ARMED, 1.0))
     assert played == []
-    stage.presenter.set_settings(Settings(sounds=True))
-    stage.presenter.on_event(StateChanged(PullbackState.ARMED, 1.1))
-    stage.presenter.on_event(StateChanged(PullbackState.RELEASED, 1.2))
-    stage.presenter.on_event(ended())
+    stage.presenter.dispatch(Settings(sounds=True))
+    stage.presenter.dispatch(StateChanged(PullbackState.ARMED, 1.1))
+    stage.presenter.dispatch(StateChanged(PullbackState.RELEASED, 1.2))
+    stage.presenter.dispatch(ended())
     assert played == ["let-go", "released"]
 
 

@@ -12,6 +12,7 @@ from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, healt
 
 from app.acquisition.messages import Connected, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import Action, Connecting, IdentificationFailed
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 
@@ -41,15 +42,15 @@ class Stage:
         qtbot.waitExposed(self.screen)
 
     def connect(self) -> None:
-        self.presenter.on_connecting("COM7")
-        self.presenter.on_event(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
-        self.presenter.on_event(StateChanged(PullbackState.IDLE, 0.0))
-        self.presenter.on_event(health())
+        self.presenter.dispatch(Connecting("COM7"))
+        self.presenter.dispatch(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.dispatch(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.dispatch(health())
 
     def play(self, start_s: float, end_s: float) -> None:
         for at_s, event in script(str(analysed().path)):
             if start_s <= at_s < end_s:
-                self.presenter.on_event(event)
+                self.presenter.dispatch(event)
         self.recorder.rows = rows_between(start_s, end_s)
         self.presenter.tick()
 
@@ -84,20 +85,20 @@ def tail(stage: Stage) -> None:
 
 def live(stage: Stage) -> None:
     tail(stage)
-    stage.presenter.on_event(LIVE)
+    stage.presenter.dispatch(LIVE)
 
 
 def result(stage: Stage) -> None:
     tail(stage)
     stage.play(10.0, END_S + 0.1)
-    stage.presenter.on_identified(analysed())
+    stage.presenter.dispatch(analysed())
 
 
 def failure(stage: Stage) -> None:
     tail(stage)
-    stage.presenter.on_event(ended())
+    stage.presenter.dispatch(ended())
     message = "the decay lasts 0.213 s, under two periods. Record until rest"
-    stage.presenter.on_not_identified(str(analysed().path), message)
+    stage.presenter.dispatch(IdentificationFailed(str(analysed().path), message))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
@@ -149,7 +150,7 @@ def test_the_result_is_read_off_the_state(stage: Stage) -> None:
     ):
         assert expected in words
     assert "Pull the table back" not in words
-    stage.presenter.next()
+    stage.presenter.dispatch(Action.NEXT)
     assert "Model fits" not in stage.words()
 
 
@@ -159,12 +160,12 @@ def test_single_keys_arm_stop_and_go_on(stage: Stage, qtbot: QtBot) -> None:
     assert stage.recorder.stopped == 0, "nothing is being recorded"
     qtbot.keyClick(stage.screen, Qt.Key.Key_A)
     assert len(stage.recorder.armed) == 1
-    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 0.5))
+    stage.presenter.dispatch(StateChanged(PullbackState.ZERO, 0.5))
     qtbot.keyClick(stage.screen, Qt.Key.Key_Escape)
     assert stage.recorder.stopped == 1
-    stage.presenter.on_event(ended())
-    stage.presenter.on_event(StateChanged(PullbackState.IDLE, 2.0))
-    stage.presenter.on_identified(analysed())
+    stage.presenter.dispatch(ended())
+    stage.presenter.dispatch(StateChanged(PullbackState.IDLE, 2.0))
+    stage.presenter.dispatch(analysed())
     qtbot.keyClick(stage.screen, Qt.Key.Key_Return)
     assert stage.presenter.state.result is None
 
@@ -242,10 +243,10 @@ def test_the_plots_tell_their_width_so_that_as_much_is_drawn(stage: Stage, qtbot
     stage.connect()
     stage.screen.resize(1828, 1080)
     QApplication.processEvents()
-    wide = stage.presenter._display.pixels
+    wide = stage.presenter._model.live.width_px
     stage.screen.resize(932, 700)
     QApplication.processEvents()
-    assert 64 < stage.presenter._display.pixels < wide < 1828
+    assert 64 < stage.presenter._model.live.width_px < wide < 1828
 
 
 def test_the_theme_can_change_at_any_time(stage: Stage, theme: Theme) -> None:

@@ -1,0 +1,234 @@
+"""Model of the Record screen: everything that its state is derived from, immutable."""
+
+from dataclasses import dataclass, field
+
+from app.acquisition.guidance import PullbackSituation
+from app.acquisition.messages import PullbackState, RunEnded, StandPosition
+from app.acquisition.pullback.plan import AllowedPlateRange
+from app.presenters.base import Progress
+from app.presenters.record.decisions import RunDecisions
+from app.presenters.record.live import GaugeMonitor, LiveTraces
+from app.presenters.record.next_runs import NextRuns
+from app.presenters.record.state import (
+    NO_ESTIMATE,
+    NO_STATUS,
+    Action,
+    LiveEstimate,
+    StandContext,
+    StatusBar,
+    Traces,
+)
+from app.presenters.results import Result
+from config.schema import Gauges
+
+UNKNOWN_POSITION = StandPosition()
+RECORDING_STATES = frozenset(
+    {
+        PullbackState.RECENTRE,
+        PullbackState.ZERO,
+        PullbackState.PULLING,
+        PullbackState.HELD,
+        PullbackState.ARMED,
+        PullbackState.RELEASED,
+        PullbackState.SLIPPING,
+        PullbackState.NO_SLIP,
+        PullbackState.TAIL,
+        PullbackState.RECORDING,
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """Engine and current run.
+
+    Attributes
+    ----------
+    engine : PullbackState or None
+        State that the engine reported last; None without an engine.
+    is_command_pending : bool
+        The engine has not yet answered a command.
+    note : str
+        Note of the engine with its state.
+    loss_reason : str
+        Why the device is lost; empty while it is there.
+    waiting_for : str
+        Process that is started before the engine reports.
+    simulated : bool
+    true_friction : float or None
+        f_d of a simulated stand.
+    device : str
+    heard_s : float
+        Time of the last event of the engine.
+    series, run_name, run_note : str
+        Of the run that was armed last: series, name of its file, note.
+    remaining_runs : int
+        Runs that follow without a command.
+    live_estimate : LiveEstimate
+    """
+
+    engine: PullbackState | None = None
+    is_command_pending: bool = False
+    position: StandPosition = UNKNOWN_POSITION
+    note: str = ""
+    loss_reason: str = ""
+    waiting_for: str = ""
+    simulated: bool = False
+    true_friction: float | None = None
+    device: str = ""
+    heard_s: float = 0.0
+    series: str = ""
+    run_name: str = ""
+    run_note: str = ""
+    remaining_runs: int = 0
+    live_estimate: LiveEstimate = NO_ESTIMATE
+
+    @property
+    def is_recording(self) -> bool:
+        """Tell whether samples go into a run."""
+        return self.engine in RECORDING_STATES
+
+    @property
+    def is_idle(self) -> bool:
+        """Tell whether the engine can arm a run."""
+        return self.engine is PullbackState.IDLE
+
+
+@dataclass(frozen=True, slots=True)
+class EndedRun:
+    """A run from its end until the operator goes on.
+
+    Attributes
+    ----------
+    event : RunEnded
+    series, name, note : str
+        Series, name of the file, and note that it was armed with.
+    result : Result or None
+        None while the run is being identified.
+    progress : Progress or None
+        Of the identification.
+    """
+
+    event: RunEnded
+    series: str
+    name: str
+    note: str
+    result: Result | None = None
+    progress: Progress | None = None
+
+    @property
+    def is_awaited(self) -> bool:
+        """Tell whether its result is awaited."""
+        return self.result is None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Snapshot:
+    """Screen at the moment when the operator went on from a run; undo returns to it."""
+
+    ended: EndedRun
+    traces: Traces
+    next_series: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RecordModel:
+    """Everything that the Record screen is made of.
+
+    Attributes
+    ----------
+    author : str
+        Who decides about runs, for their history.
+    ended : EndedRun or None
+        Run that is shown; None while the next one is prepared or recorded.
+    snapshot : Snapshot or None
+        Of the run that was shown before.
+    sounds : bool
+        States are played.
+    """
+
+    stand: StandContext
+    author: str
+    next_runs: NextRuns
+    live: LiveTraces
+    monitors: tuple[GaugeMonitor, GaugeMonitor]
+    session: Session = field(default_factory=Session)
+    ended: EndedRun | None = None
+    snapshot: Snapshot | None = None
+    decisions: RunDecisions = field(default_factory=RunDecisions)
+    status_bar: StatusBar = NO_STATUS
+    sounds: bool = False
+
+    @classmethod
+    def of_stand(cls, stand: StandContext, author: str) -> "RecordModel":
+        """Begin without a device."""
+        return cls(
+            stand,
+            author,
+            NextRuns.of_series(stand.all_series),
+            LiveTraces.of_gauges(stand.gauges),
+            monitors_of(stand.gauges),
+        )
+
+    @property
+    def pullback_m(self) -> float:
+        """Nominal pullback of the next run."""
+        return self.stand.pullback_m(self.next_runs.series)
+
+    @property
+    def is_run_shown(self) -> bool:
+        """Tell whether a run is armed, recorded, stored or shown."""
+        session = self.session
+        is_active = session.is_recording or session.engine is PullbackState.CLOSING
+        return is_active or self.ended is not None or session.is_command_pending
+
+    @property
+    def allowed(self) -> frozenset[Action]:
+        """Actions that are possible now."""
+        session = self.session
+        if session.is_command_pending:
+            return frozenset()
+        if session.is_recording:
+            return frozenset({Action.STOP})
+        allowed = {Action.ARM} if session.is_idle else set()
+        if self.ended is not None:
+            allowed.add(Action.NEXT)
+        elif session.is_idle:
+            allowed.add(Action.TARE)
+        if self.decisions.pending is not None:
+            allowed |= {Action.DISCARD} | ({Action.REPEAT} if session.is_idle else set())
+        return frozenset(allowed)
+
+    @property
+    def undo_text(self) -> str:
+        """What `Action.UNDO` takes back; empty where nothing can be."""
+        return self.decisions.undo_text(is_free=not self.is_run_shown)
+
+    @property
+    def shown_plate_range(self) -> AllowedPlateRange | None:
+        """Allowed position of the plate, while it has to be pushed back and gauge 2 shows it."""
+        is_measured = self.stand.gauges.relative.measures == "relative"
+        if not is_measured or self.session.engine is not PullbackState.RECENTRE:
+            return None
+        return self.stand.allowed_plate_range(self.next_runs.series)
+
+    def situation(self, state: PullbackState) -> PullbackSituation:
+        """What the guidance in an engine state depends on."""
+        session = self.session
+        table_m, relative_m = (float(value) for value in self.live.newest_m())
+        is_on_base = self.stand.gauges.relative.measures == "plate"
+        return PullbackSituation(
+            state=state,
+            position=session.position,
+            table_m=table_m,
+            plate_m=relative_m + table_m if is_on_base else relative_m,
+            plate_range=self.stand.allowed_plate_range(self.next_runs.series),
+            simulated=session.simulated,
+            note="" if session.is_idle else session.note,
+            loss_reason=session.loss_reason,
+        )
+
+
+def monitors_of(gauges: Gauges) -> tuple[GaugeMonitor, GaugeMonitor]:
+    """Monitors of both gauges, without a sample."""
+    return GaugeMonitor(0, gauges.table), GaugeMonitor(1, gauges.relative)
