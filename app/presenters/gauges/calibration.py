@@ -1,39 +1,44 @@
-"""A calibration against the dial gauge: readings taken live, fitted at once, kept as a file."""
+"""Presenter of the tab Calibrate: live readings against a dial gauge, fitted at once, saved as a file."""
 
 import datetime
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from app.acquisition.gauge_samples import AveragedCounts
-from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.gauges.reading_averager import ReadingAverager
-from app.presenters.gauges.recent_samples import InvalidWindow, RecentSamples, average_counts
-from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationPoint, CalibrationState
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
+from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples, average_counts
+from app.presenters.gauges.state import (
+    CONNECTION_LOST,
+    NO_DEVICE,
+    CalibrationFit,
+    CalibrationForm,
+    CalibrationPoint,
+    CalibrationState,
+)
 from app.presenters.gauges.tasks import FitCalibration, SaveCalibration, SavedCalibration
 from app.presenters.number_text import format_fixed, parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
 from config.schema import Gauges
-from messages.i18n import N_, gettext
+from messages.i18n import gettext
 
 _LIVE_S: Final = 0.5
-NOT_TAKEN_LOST: Final = N_("The connection is gone: the reading was not taken")
+"""Averaging time of the live counts: long enough to read the number, short enough to follow a hand."""
 _NAMES: Final = ("table", "relative")
 _FITTED_FROM: Final = 2
+"""Fewer points than this many plus one do not determine a line with a residual; that is no fault."""
 
 
-class CalibrationSession:
-    """Takes readings, one at a time.
+class CalibrationPresenter(Presenter[CalibrationState]):
+    """Takes one reading at a time.
 
     Parameters
     ----------
     recent : RecentSamples
         Live samples.
     submit : callable
-        Has a task done.
-    show : callable
-        Takes each new state.
+        Submits a task; its result comes to `on_fitted`, `on_saved` or `on_failed`.
     now : callable
         Time of day.
     """
@@ -42,69 +47,62 @@ class CalibrationSession:
         self,
         recent: RecentSamples,
         submit: Callable[[FitCalibration | SaveCalibration], None],
-        show: Callable[[CalibrationState], None],
         now: Callable[[], datetime.datetime],
     ) -> None:
-        self.state = CalibrationState()
+        super().__init__(CalibrationState())
         self._recent = recent
         self._submit = submit
-        self._show = show
         self._now = now
         self._gauges: Gauges | None = None
-        self._averaging = ReadingAverager(recent)
+        self._averager = ReadingAverager(recent)
         self._dial_mm = 0.0
         self._file_name = ""
 
-    # --- what the operator does ---
-
     def set_form(self, form: CalibrationForm) -> None:
-        """Take what was filled in; with another dial or curve it is fitted anew.
-
-        The gauge stays the same as long as there are readings of it.
-        """
+        """Replace the form, and fit again if dial or curve changed; points lock the gauge."""
         before = self.state.form
         if self.state.points:
             form = replace(form, gauge=before.gauge)
-        self._change(form=form, live_value=self.state.live_value if form.gauge == before.gauge else "")
-        if _fit_of(form) != _fit_of(before):
+        self._update(form=form, live_value=self.state.live_value if form.gauge == before.gauge else "")
+        if _fit_options(form) != _fit_options(before):
             self._fit()
 
     def take_point(self, dial_text: str) -> None:
-        """Average from now on, for the dial reading that was typed (mm)."""
+        """Begin a reading at the dial reading (mm) that was typed."""
         try:
             dial_mm = _millimetres(dial_text, gettext("Dial"))
         except ValueError as error:
-            self._change(message=Chip(str(error), Tone.BAD))
+            self._update(message=Chip(str(error), Tone.BAD))
             return
-        if self._gauges is None or not self._averaging.start():
-            self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
+        if self._gauges is None or not self._averager.start():
+            self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
-        self._change(
+        self._update(
             reading_status=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm),
             message=EMPTY_CHIP,
         )
 
     def undo(self) -> None:
-        """Leave the reading that is being taken, else take back the last one."""
-        if self._averaging.is_active:
-            self._averaging.stop()
-            self._change(reading_status="", message=Chip(gettext("Not taken"), Tone.PLAIN))
+        """Abandon the current reading; without one, remove the last point."""
+        if self._averager.is_active:
+            self._averager.stop()
+            self._update(reading_status="", message=Chip(gettext("Not taken"), Tone.PLAIN))
         elif self.state.points:
             last = self.state.points[-1]
-            self._change(
+            self._update(
                 points=self.state.points[:-1],
                 message=Chip(gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
             )
             self._fit()
 
     def restart(self) -> None:
-        """Begin anew, with the same gauge or the other one; the readings stay in their file."""
-        self._averaging.stop()
-        self._change(points=(), fit=None, can_save=False, reading_status="", message=EMPTY_CHIP)
+        """Remove all points; their file stays."""
+        self._averager.stop()
+        self._update(points=(), fit=None, can_save=False, reading_status="", message=EMPTY_CHIP)
 
     def save(self) -> None:
-        """Write the calibration, if all that was filled in can be."""
+        """Save the calibration, or say which field is wrong."""
         if not self.state.can_save:
             return
         form = self.state.form
@@ -120,97 +118,92 @@ class CalibrationSession:
                 form.calibrated_by.strip(),
             )
         except ValueError as error:
-            self._change(message=Chip(str(error), Tone.BAD))
+            self._update(message=Chip(str(error), Tone.BAD))
             return
-        self._change(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
+        self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         self._submit(task)
 
-    # --- what happens elsewhere ---
-
     def on_connected(self, gauges: Gauges | None) -> None:
-        """By these calibrations live samples are displacements now; None: nothing is connected."""
+        """Live samples are converted with these calibrations; None: nothing is connected."""
         self._gauges = gauges
-        was_taking = self._averaging.is_active
-        self._averaging.stop()
-        self._change(live_value="", live_note=gettext(NO_DEVICE), reading_status="", offers_reconnect=False)
-        if was_taking:
-            self._change(message=Chip(gettext(NOT_TAKEN_LOST), Tone.WARN))
+        was_averaging = self._averager.is_active
+        self._averager.stop()
+        self._update(live_value="", live_note=gettext(NO_DEVICE), reading_status="", offers_reconnect=False)
+        if was_averaging:
+            self._update(message=Chip(gettext(CONNECTION_LOST), Tone.WARN))
 
     def tick(self) -> None:
-        """Look at the newest samples."""
+        """Evaluate the newest samples."""
         if self._gauges is None:
             return
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
         if rows is not None:
-            seen = average_counts(rows, self.state.form.gauge, self._gauges)
-            self._show_live(seen)
-        self._look(self._gauges)
+            self._show_live(average_counts(rows, self.state.form.gauge, self._gauges))
+        self._poll_reading(self._gauges)
 
-    def on_fitted(self, task: FitCalibration, answer: Any) -> None:
-        """The readings make this calibration."""
+    def on_fitted(self, task: FitCalibration, fit: CalibrationFit) -> None:
+        """Show the fit of the current points."""
         if task.points == self.state.points:
-            self._change(fit=answer, can_save=True)
+            self._update(fit=fit, can_save=True)
 
     def on_saved(self, saved: SavedCalibration) -> None:
-        """It has been written."""
+        """Say where the calibration was saved."""
         used = self.state.form.use
-        words = gettext("Written to {file}.", file=saved.file)
+        text = gettext("Written to {file}.", file=saved.file)
         if saved.previous:
-            words += " " + gettext("The one before is kept as {file}.", file=saved.previous)
-        self._change(
-            message=Chip(words, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
+            text += " " + gettext("The one before is kept as {file}.", file=saved.previous)
+        self._update(
+            message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
         )
 
     def on_failed(self, task: FitCalibration | SaveCalibration, message: str) -> None:
-        """It could not be done; readings too few for a curve are nothing that went wrong."""
+        """Show why a task failed; too few points for a curve are no fault."""
         if isinstance(task, SaveCalibration):
-            self._change(message=Chip(sentence(message), Tone.BAD), can_save=True)
+            self._update(message=Chip(sentence(message), Tone.BAD), can_save=True)
         elif task.points == self.state.points:
             tone = Tone.PLAIN if len(task.points) <= _FITTED_FROM else Tone.WARN
-            self._change(fit=None, can_save=False, message=Chip(sentence(message), tone))
+            self._update(fit=None, can_save=False, message=Chip(sentence(message), tone))
 
-    # --- inside ---
-
-    def _show_live(self, seen: AveragedCounts | InvalidWindow) -> None:
-        if isinstance(seen, InvalidWindow):
-            self._change(live_value="", live_note=seen.reason)
+    def _show_live(self, average: AveragedCounts | InvalidWindow) -> None:
+        if isinstance(average, InvalidWindow):
+            self._update(live_value="", live_note=average.reason)
             return
-        mean, noise = _figures(seen)
-        self._change(
+        mean, noise = _format_counts(average)
+        self._update(
             live_value=mean,
             live_note=gettext(
                 "counts, mean of {time}; noise {noise}", time=with_unit(f"{_LIVE_S:g}", "s"), noise=noise
             ),
         )
 
-    def _look(self, gauges: Gauges) -> None:
-        """Keep the reading that is being taken, once it is one."""
-        seen = self._averaging.poll(self.state.form.gauge, gauges)
-        if isinstance(seen, AveragedCounts):
-            self._keep(seen, self._dial_mm)
-        elif isinstance(seen, InvalidWindow):
-            self._change(
-                reading_status="", message=Chip(gettext("Not taken. {words}", words=seen.reason), Tone.BAD)
+    def _poll_reading(self, gauges: Gauges) -> None:
+        """Add the reading once it is complete."""
+        average = self._averager.poll(self.state.form.gauge, gauges)
+        if isinstance(average, AveragedCounts):
+            self._add_point(average, self._dial_mm)
+        elif isinstance(average, InvalidWindow):
+            self._update(
+                reading_status="", message=Chip(gettext("Not taken. {words}", words=average.reason), Tone.BAD)
             )
-        elif seen is not None:
-            self._change(reading_status=seen.text)
+        elif average is not None:
+            self._update(reading_status=average.text)
 
-    def _keep(self, seen: AveragedCounts, dial_mm: float) -> None:
-        words = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
-        message = Chip(words, Tone.OK)
-        if not seen.is_steady:
+    def _add_point(self, average: AveragedCounts, dial_mm: float) -> None:
+        text = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_format_counts(average)[0])
+        message = Chip(text, Tone.OK)
+        if not average.is_steady:
             message = Chip(
                 gettext(
                     "{words}, though still creeping by {creep}",
-                    words=words,
-                    creep=with_minus_sign(f"{seen.creep_counts:.3g}"),
+                    words=text,
+                    creep=with_minus_sign(f"{average.creep_counts:.3g}"),
                 ),
                 Tone.WARN,
             )
         if not self.state.points:
             self._file_name = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
-        self._change(
-            points=(*self.state.points, CalibrationPoint(seen.counts, dial_mm)),
+        self._update(
+            points=(*self.state.points, CalibrationPoint(average.counts, dial_mm)),
             reading_status="",
             message=message,
         )
@@ -218,12 +211,12 @@ class CalibrationSession:
 
     def _fit(self) -> None:
         if not self.state.points:
-            self._change(fit=None, can_save=False)
+            self._update(fit=None, can_save=False)
             return
         try:
             self._submit(self._fit_task())
         except ValueError as error:
-            self._change(can_save=False, message=Chip(str(error), Tone.BAD))
+            self._update(can_save=False, message=Chip(str(error), Tone.BAD))
 
     def _fit_task(self) -> FitCalibration:
         form = self.state.form
@@ -237,26 +230,20 @@ class CalibrationSession:
             form.gauge, self.state.points, form.degree, resolution_m, uncertainty_m, self._file_name
         )
 
-    def _change(self, **changes: Any) -> None:
-        changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}
-        if changed:
-            self.state = replace(self.state, **changed)
-            self._show(self.state)
 
-
-def _fit_of(form: CalibrationForm) -> tuple[object, ...]:
+def _fit_options(form: CalibrationForm) -> tuple[object, ...]:
     return form.degree, form.resolution_mm, form.uncertainty_mm
 
 
-def _figures(average: AveragedCounts) -> tuple[str, str]:
-    """Mean and noise, to the digit that the noise leaves sure; a count may be a millivolt, too."""
+def _format_counts(average: AveragedCounts) -> tuple[str, str]:
+    """Mean and noise with the decimals that the standard error of the mean justifies."""
     noise = average.noise_counts
     decimals = 0 if noise <= 0.0 else min(max(1 - math.floor(math.log10(noise / average.samples**0.5)), 0), 9)
     return format_fixed(average.counts, decimals), format_fixed(noise, decimals)
 
 
 def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
-    """Read a length as typed. Raises ValueError that names value and remedy."""
+    """Parse a length (mm). Raises ValueError that names value and remedy."""
     value_mm = parse_number(text)
     if value_mm is None or math.isnan(value_mm) or value_mm < least:
         limit = gettext(", 0 or above") if least == 0.0 else ""
@@ -272,7 +259,7 @@ def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
 
 
 def _last_day(text: str, today: datetime.date) -> datetime.date | None:
-    """Read the day until which a calibration holds. Raises ValueError."""
+    """Parse the last day of validity. Raises ValueError."""
     if not text.strip():
         return None
     try:

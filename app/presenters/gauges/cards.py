@@ -1,23 +1,23 @@
-"""The calibrations in use, in words: what they are, whether they hold, how they were last checked."""
+"""Cards of the calibrations in use: values, validity and last check."""
 
 import datetime
 from collections.abc import Iterator
 from typing import Final
 
 from app.presenters.base import Chip, Tone
-from app.presenters.gauges.state import GaugeCard, LabelledValue
+from app.presenters.gauges.state import NAMES, GaugeCard, LabelledValue
 from app.presenters.number_text import format_fixed, format_millimetres, with_minus_sign, with_unit
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext
 
-NAMES: Final = (N_("Gauge 1, table"), N_("Gauge 2, relative"))
 _SOON: Final = datetime.timedelta(days=30)
+"""Time that a laboratory usually needs to arrange a calibration."""
 _NOT_STATED: Final = N_("not stated")
 _CHECK: Final = N_("Check it before a test: the tab Check, or slipstand calibrate check")
 
 
 def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
-    """Both cards, gauge 1 first."""
+    """Cards of both gauges, gauge 1 first."""
     last = {check.gauge: check for check in checks.latest_checks(gauges)}
     return (
         _card(NAMES[0], gauges.table, last.get("table"), today),
@@ -26,7 +26,7 @@ def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tu
 
 
 def validity(gauge: Gauge, today: datetime.date) -> Chip:
-    """Whether a calibration holds."""
+    """Whether a calibration is valid on a day."""
     until = gauge.valid_until
     if until is None:
         return Chip(
@@ -50,34 +50,34 @@ def validity(gauge: Gauge, today: datetime.date) -> Chip:
 
 
 def last_check_chip(check: GaugeCheck | None) -> Chip:
-    """How the calibration in use came out of its last check."""
+    """Outcome of the last check of the calibration in use."""
     if check is None:
         return Chip(gettext("Not checked yet"), Tone.PLAIN, gettext(_CHECK))
     off = with_unit(f"{check.deviation_m * 1e6:+.0f}".replace("-", "\u2212"), "µm")
     allowed = with_unit(f"{check.tolerance_m * 1e6:.0f}", "µm")
-    tried = gettext("Known shunt") if check.kind == "shunt" else gettext("Known displacement")
-    words = gettext(
+    reference_kind = gettext("Known shunt") if check.kind == "shunt" else gettext("Known displacement")
+    text = gettext(
         "{time}: {off} at {known}, {allowed} allowed",
         time=f"{check.at:%Y-%m-%d %H:%M}",
         off=off,
         known=with_unit(format_millimetres(check.expected_m, 3), "mm"),
         allowed=allowed,
     )
-    by = f"{tried}. {check.reference} {check.checked_by}".strip()
+    by = f"{reference_kind}. {check.reference} {check.checked_by}".strip()
     if check.passed:
-        return Chip(gettext("Check passed {words}", words=words), Tone.OK, by)
+        return Chip(gettext("Check passed {words}", words=text), Tone.OK, by)
     return Chip(
-        gettext("Check FAILED {words}", words=words),
+        gettext("Check FAILED {words}", words=text),
         Tone.BAD,
         gettext("{by}. Check plugs and mounting, then calibrate again", by=by),
     )
 
 
 def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.date) -> GaugeCard:
-    return GaugeCard(gettext(name), validity(gauge, today), tuple(_facts(gauge)), last_check_chip(check))
+    return GaugeCard(gettext(name), validity(gauge, today), tuple(_values(gauge)), last_check_chip(check))
 
 
-def _facts(gauge: Gauge) -> Iterator[LabelledValue]:
+def _values(gauge: Gauge) -> Iterator[LabelledValue]:
     gain = with_unit(with_minus_sign(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
     relative = gauge.gain_relative_standard_uncertainty
     yield LabelledValue(gettext("gain"), gain)

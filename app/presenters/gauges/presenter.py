@@ -1,20 +1,20 @@
-"""What the Gauges screen does: live samples and worker's news in, one state out."""
+"""Presenter of the Gauges screen: calibrations in use, gauge health, presenters of the tabs."""
 
 import datetime
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.calibration import CalibrationSession
+from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.cards import gauge_cards
-from app.presenters.gauges.check import CheckSession
-from app.presenters.gauges.port_probe import PortProbe
-from app.presenters.gauges.reading_averager import WINDOW_S
-from app.presenters.gauges.recent_samples import RecentSamples
-from app.presenters.gauges.state import CalibrationForm, CheckForm, GaugesState, GaugesTab
+from app.presenters.gauges.check import CheckPresenter
+from app.presenters.gauges.ports import PortsPresenter
+from app.presenters.gauges.recent_samples import WINDOW_S, RecentSamples
+from app.presenters.gauges.state import GaugesState, GaugesTab
 from app.presenters.gauges.tasks import (
+    EXECUTE,
     ActiveCalibrations,
     CheckGauge,
     FitCalibration,
@@ -22,18 +22,18 @@ from app.presenters.gauges.tasks import (
     LoadCalibrations,
     MeasureHealth,
     SaveCalibration,
-    execute,
 )
+from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.start.state import ConnectForm
 from app.presenters.worker import TaskDone, TaskFailed, Worker, WorkerEvent
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import N_, gettext
 
 HEALTH_S: Final = 5.0
-"""So much is looked at, once a second."""
+"""Length of the samples that health is measured from: resolves hum to 0.2 Hz and drift to minutes."""
 HEALTH_EVERY_S: Final = 1.0
 _LEAST_S: Final = 1.1
+"""Least length: `measure_health` needs more than a second."""
 _LIVE_EVERY_S: Final = 0.1
 _NOT_CONNECTED: Final = N_(
     "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"
@@ -42,35 +42,16 @@ _NOT_CONNECTED: Final = N_(
 _WAITING: Final = N_("Looking at the gauges: let the stand rest for a few seconds.")
 
 
-class Navigator(Protocol):
-    """Where the Gauges screen leads."""
-
-    def show_start(self) -> None:
-        """Go where a device is connected."""
-
-    def fill_connection(self, form: ConnectForm) -> None:
-        """Go there, with all filled in."""
-
-    def fill_second_port(self, url: str) -> None:
-        """Go there, with a port of gauge 2's own filled in beside what is there."""
-
-    def reconnect(self) -> None:
-        """Connect to the same device again."""
-
-    def set_gauges(self, gauges: Gauges) -> None:
-        """These calibrations are in use from now on."""
-
-
 class GaugesPresenter(Presenter[GaugesState]):
     """Calibrations, health, ports.
 
     Parameters
     ----------
-    worker, prober : Worker
-        The second one looks at ports, which takes long; it may be given up alone. Closed by `close`.
+    worker, port_worker : Worker
+        The second one probes ports. Both are closed by `close`.
     gauges : Gauges
-        In use at first.
-    doors : Doors
+        Calibrations in use at first.
+    navigator : Navigator
     now : callable
         Time of day.
     """
@@ -78,7 +59,7 @@ class GaugesPresenter(Presenter[GaugesState]):
     def __init__(
         self,
         worker: Worker,
-        prober: Worker,
+        port_worker: Worker,
         gauges: Gauges,
         navigator: Navigator,
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
@@ -86,206 +67,131 @@ class GaugesPresenter(Presenter[GaugesState]):
         cards = gauge_cards(gauges, GaugeChecks(), now().date())
         super().__init__(GaugesState(cards, health_note=gettext(_NOT_CONNECTED)))
         self._worker = worker
-        self._probing = PortProbe(prober, self._update)
         self._gauges = gauges
-        self._navigator = navigator
+        self.navigator = navigator
         self._now = now
         self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
-        self._calibrating = CalibrationSession(self._recent, self._submit, self._show_calibration, now)
-        self._checking = CheckSession(self._recent, self._submit, self._show_check)
-        self._read_by: Gauges | None = None
+        self.ports = PortsPresenter(port_worker, navigator)
+        self.calibration = CalibrationPresenter(self._recent, self._submit, now)
+        self.check = CheckPresenter(self._recent, self._submit)
+        self._stream_gauges: Gauges | None = None
         self._rate_hz = 0.0
-        self._port = ""
         self._is_shown = False
-        self._judging = False
-        self._judged_s = self._live_s = float("-inf")
-
-    # --- what the operator does ---
+        self._is_measuring = False
+        self._measured_s = self._live_s = float("-inf")
 
     def enter(self) -> None:
-        """The screen is shown: files and ports may have changed meanwhile."""
+        """Reload calibrations and ports: they may have changed while another screen was shown."""
         self._is_shown = True
         self._submit(LoadCalibrations())
-        self._probing.list_ports()
+        self.ports.list_ports()
 
     def leave(self) -> None:
         """Another screen is shown."""
         self._is_shown = False
 
-    def set_tab(self, side: GaugesTab) -> None:
+    def set_tab(self, tab: GaugesTab) -> None:
         """Show another tab."""
-        self._update(tab=side)
-
-    def show_start(self) -> None:
-        """Go where a device is connected."""
-        self._navigator.show_start()
-
-    def set_query_silent(self, asks: bool) -> None:
-        """Whether silent devices are asked who they are; else nothing is sent to any."""
-        self._update(query_silent=asks)
-
-    def probe(self) -> None:
-        """Look at all ports."""
-        self._probing.probe(self._port, query_silent=self.state.query_silent)
-
-    def cancel_probe(self) -> None:
-        """Stop looking."""
-        self._probing.cancel()
-
-    def fill_port(self, url: str) -> None:
-        """Fill in how to record from a port, and go there."""
-        for card in self.state.ports:
-            if card.url == url and card.suggested_form is not None:
-                self._navigator.fill_connection(card.suggested_form)
-
-    def fill_second_port(self, url: str) -> None:
-        """Fill in that gauge 2 has a device of its own on a port, and go there."""
-        self._navigator.fill_second_port(url)
-
-    def set_check_form(self, form: CheckForm) -> None:
-        """Take what was filled in about a check."""
-        self._checking.set_form(form)
-
-    def advance_check(self) -> None:
-        """Begin a check, or take the reading that is asked for."""
-        self._checking.advance()
-
-    def cancel_check(self) -> None:
-        """Break the check off."""
-        self._checking.cancel()
-
-    def set_calibration_form(self, form: CalibrationForm) -> None:
-        """Take what was filled in about the calibration."""
-        self._calibrating.set_form(form)
-
-    def take_point(self, dial_text: str) -> None:
-        """The dial shows this many millimetres."""
-        self._calibrating.take_point(dial_text)
-
-    def undo_point(self) -> None:
-        """Take the last reading back."""
-        self._calibrating.undo()
-
-    def restart_calibration(self) -> None:
-        """Begin another calibration."""
-        self._calibrating.restart()
-
-    def save_calibration(self) -> None:
-        """Keep the calibration as a file."""
-        self._calibrating.save()
-
-    def reconnect(self) -> None:
-        """Connect again, by the new calibration."""
-        self._navigator.reconnect()
-
-    # --- what happens elsewhere ---
+        self._update(tab=tab)
 
     def on_connecting(self, port: str) -> None:
-        """A port is being opened, to be read by the calibrations that are in use now."""
+        """A port is being opened; its samples are converted with the calibrations in use now."""
         self.on_disconnected()
-        self._port = port
-        self._read_by = self._gauges
+        self.ports.connected_url = port
+        self._stream_gauges = self._gauges
 
     def on_connected(self, event: Connected) -> None:
-        """Samples flow."""
+        """The device is connected."""
         self._rate_hz = event.rate_hz
-        self._calibrating.on_connected(self._read_by)
-        self._checking.on_connected(self._read_by, event.device)
+        self.calibration.on_connected(self._stream_gauges)
+        self.check.on_connected(self._stream_gauges, event.device)
         self._update(device=event.device, health_note=gettext(_WAITING))
 
     def on_disconnected(self) -> None:
-        """Nothing is connected any more."""
-        self._port = ""
-        self._read_by = None
+        """Nothing is connected."""
+        self.ports.connected_url = ""
+        self._stream_gauges = None
         self._recent.clear()
-        self._judged_s = self._live_s = float("-inf")
-        self._calibrating.on_connected(None)
-        self._checking.on_connected(None)
+        self._measured_s = self._live_s = float("-inf")
+        self.calibration.on_connected(None)
+        self.check.on_connected(None)
         self._update(device="", health=(), health_note=gettext(_NOT_CONNECTED))
 
     def on_rows(self, rows: RingRows) -> None:
-        """Live samples, whoever else draws them."""
+        """Take live samples."""
         self._recent.append(rows)
 
     def tick(self) -> None:
-        """Take in what the workers have said, and look at the newest samples."""
-        for news in self._worker.poll():
-            self._on_event(news)
-        self._probing.poll()
+        """Process events of the workers and the newest samples."""
+        for event in self._worker.poll():
+            self._on_event(event)
+        self.ports.poll()
         now_s = self._recent.end_s
-        is_wanted = self._is_shown or self.state.calibration.reading_status or self.state.check.reading_status
-        if is_wanted and now_s - self._live_s >= _LIVE_EVERY_S:
+        is_reading = self.calibration.state.reading_status or self.check.state.reading_status
+        if (self._is_shown or is_reading) and now_s - self._live_s >= _LIVE_EVERY_S:
             self._live_s = now_s
-            self._calibrating.tick()
-            self._checking.tick()
+            self.calibration.tick()
+            self.check.tick()
         if self._is_shown and self.state.tab is GaugesTab.HEALTH:
             self._measure_health(now_s)
 
     def close(self) -> None:
         """End the workers."""
         self._worker.close()
-        self._probing.close()
-
-    # --- inside ---
+        self.ports.close()
 
     def _submit(self, task: GaugesTask) -> None:
-        self._worker.submit(execute, task)
+        self._worker.submit(EXECUTE, task)
 
     def _measure_health(self, now_s: float) -> None:
-        if self._judging or self._read_by is None or now_s - self._judged_s < HEALTH_EVERY_S:
+        if self._is_measuring or self._stream_gauges is None or now_s - self._measured_s < HEALTH_EVERY_S:
             return
         rows = self._recent.since(now_s - HEALTH_S)
         if rows is not None and self._recent.length_s >= _LEAST_S:
-            self._judging, self._judged_s = True, now_s
-            self._submit(MeasureHealth(rows, self._rate_hz, self._read_by))
+            self._is_measuring, self._measured_s = True, now_s
+            self._submit(MeasureHealth(rows, self._rate_hz, self._stream_gauges))
 
-    def _on_event(self, news: WorkerEvent) -> None:
-        if isinstance(news, TaskFailed):
-            self._on_failed(news.argument, news.message)
-        elif isinstance(news, TaskDone):
-            self._on_done(news)
+    def _on_event(self, event: WorkerEvent) -> None:
+        if isinstance(event, TaskFailed):
+            self._on_failed(event.argument, event.message)
+        elif isinstance(event, TaskDone):
+            self._on_done(event)
 
     def _on_failed(self, task: Any, message: str) -> None:
         match task:
             case FitCalibration() | SaveCalibration():
-                self._calibrating.on_failed(task, message)
+                self.calibration.on_failed(task, message)
             case CheckGauge():
-                self._checking.on_failed(message)
+                self.check.on_failed(message)
             case MeasureHealth():
-                self._judging = False
-                if self._read_by is task.gauges:
+                self._is_measuring = False
+                if self._stream_gauges is task.gauges:
                     self._update(health=(), health_note=sentence(message))
             case LoadCalibrations():
                 self._update(checks_fault=Chip(sentence(message), Tone.BAD))
 
-    def _on_done(self, news: TaskDone[Any]) -> None:
-        task, answer = news.argument, news.answer
+    def _on_done(self, event: TaskDone[Any]) -> None:
+        task, answer = event.argument, event.answer
         match task:
             case LoadCalibrations():
                 self._on_loaded(answer)
             case MeasureHealth():
-                self._judging = False
-                if self._read_by is task.gauges:
+                self._is_measuring = False
+                if self._stream_gauges is task.gauges:
                     self._update(health=answer)
             case FitCalibration():
-                self._calibrating.on_fitted(task, answer)
+                self.calibration.on_fitted(task, answer)
             case SaveCalibration():
-                self._calibrating.on_saved(answer)
+                self.calibration.on_saved(answer)
                 self._submit(LoadCalibrations())
             case CheckGauge():
-                self._checking.on_checked(task, answer)
+                self.check.on_checked(task, answer)
                 self._submit(LoadCalibrations())
 
-    def _on_loaded(self, in_use: ActiveCalibrations) -> None:
-        if in_use.gauges != self._gauges:
-            self._gauges = in_use.gauges
-            self._navigator.set_gauges(in_use.gauges)
-        fault = Chip(sentence(in_use.checks_fault), Tone.BAD) if in_use.checks_fault else EMPTY_CHIP
-        cards = gauge_cards(in_use.gauges, in_use.checks, self._now().date())
-        self._update(cards=cards, file=in_use.file, checks_fault=fault)
-
-    def _show_check(self, check: Any) -> None:
-        self._update(check=check)
-
-    def _show_calibration(self, calibration: Any) -> None:
-        self._update(calibration=calibration)
+    def _on_loaded(self, loaded: ActiveCalibrations) -> None:
+        if loaded.gauges != self._gauges:
+            self._gauges = loaded.gauges
+            self.navigator.set_gauges(loaded.gauges)
+        fault = Chip(sentence(loaded.checks_fault), Tone.BAD) if loaded.checks_fault else EMPTY_CHIP
+        cards = gauge_cards(loaded.gauges, loaded.checks, self._now().date())
+        self._update(cards=cards, file=loaded.file, checks_fault=fault)

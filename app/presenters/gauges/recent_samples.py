@@ -1,5 +1,6 @@
-"""Live samples kept for some seconds: as counts of a gauge again, and in one piece for its health."""
+"""The last seconds of live samples, and readings averaged over them."""
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.gauge_samples import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
+from app.presenters.number_text import with_minus_sign
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 from messages.i18n import gettext
@@ -16,24 +18,32 @@ from messages.i18n import gettext
 Floats = NDArray[np.float64]
 
 _OVERLOADS: Final = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
-_SOUND_SHARE: Final = 0.5
+_MIN_VALID_FRACTION: Final = 0.5
+"""Least fraction of valid samples in a window: below it the gauge is hardly in range."""
 _NEWTON_STEPS: Final = 6
+"""Newton converges quadratically: non-linearities of percents vanish below rounding in fewer steps."""
+WINDOW_S: Final = 1.0
+"""Length of an averaging window: 1 s averages whole periods of 50 and 60 Hz hum."""
+MAX_WINDOWS: Final = 5
+"""A reading waits at most this many windows until the gauge is at rest, then it is taken with a warning."""
+_STALE_S: Final = 0.1
+"""Samples older than the request may still be queued for so long."""
 
 
 @dataclass(frozen=True, slots=True)
 class InvalidWindow:
-    """A window that gives no average, and why."""
+    """A window without an average, and the reason."""
 
     reason: str
 
 
 class RecentSamples:
-    """The newest rows of the ring.
+    """The newest rows of the live ring.
 
     Parameters
     ----------
     seconds : float
-        How much of them is kept.
+        Length that is kept.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -51,7 +61,7 @@ class RecentSamples:
         return self.end_s - float(self._parts[0].time_s[0]) if self._parts else 0.0
 
     def append(self, rows: RingRows) -> None:
-        """Take new rows, and forget those that are too old."""
+        """Append rows, and drop those that are too old."""
         if not len(rows):
             return
         self._parts.append(rows)
@@ -59,11 +69,11 @@ class RecentSamples:
             self._parts.popleft()
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Drop all rows."""
         self._parts.clear()
 
     def since(self, start_s: float) -> RingRows | None:
-        """All rows from a time on, in one piece; None without any."""
+        """Rows from a time on, concatenated; None without any."""
         parts = [rows for rows in self._parts if rows.time_s[-1] >= start_s]
         if not parts:
             return None
@@ -78,7 +88,7 @@ class RecentSamples:
 
 
 def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCounts | InvalidWindow:
-    """Average counts of a gauge over rows, as a calibration against a dial gauge takes them.
+    """Average the counts of a gauge over rows.
 
     Parameters
     ----------
@@ -86,13 +96,13 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
     channel : int
         0 for gauge 1, 1 for gauge 2.
     gauges : Gauges
-        Calibrations by which the rows came to be displacements.
+        Calibrations that the displacements were computed with.
     """
-    unsound = (rows.status & int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])) != 0
-    seen_m = rows.table_m if channel == 0 else gauge_2_displacement_m(rows, gauges)
-    sound_m = seen_m[~unsound & np.isfinite(seen_m)]
-    if len(sound_m) < max(_SOUND_SHARE * len(rows), 2):
-        bad = len(rows) - len(sound_m)
+    invalid = (rows.status & int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])) != 0
+    displacement_m = rows.table_m if channel == 0 else gauge_2_displacement_m(rows, gauges)
+    valid_m = displacement_m[~invalid & np.isfinite(displacement_m)]
+    if len(valid_m) < max(_MIN_VALID_FRACTION * len(rows), 2):
+        bad = len(rows) - len(valid_m)
         return InvalidWindow(
             gettext(
                 "Gauge {number} is overloaded or its samples are damaged: {bad} of {all}."
@@ -102,18 +112,18 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
                 all=len(rows),
             )
         )
-    return compute_average(counts_from_displacement(sound_m, (gauges.table, gauges.relative)[channel]))
+    return compute_average(counts_from_displacement(valid_m, (gauges.table, gauges.relative)[channel]))
 
 
 def gauge_2_displacement_m(rows: RingRows, gauges: Gauges) -> Floats:
-    """Displacements (n,) as gauge 2 reads them (m), which may be against the base."""
+    """Displacement (m, (n,)) that gauge 2 measures: relative, or absolute if it measures the plate."""
     return rows.relative_m + rows.table_m if gauges.relative.measures == "plate" else rows.relative_m
 
 
 def counts_from_displacement(displacement_m: Floats, gauge: Gauge) -> Floats:
-    """Counts (n,) that stand for displacements (n,): the inverse of `Gauge.displacement_m`.
+    """Counts (n,) of displacements (n,): the inverse of `Gauge.displacement_m`.
 
-    The bends of a gauge are small against its line, so that Newton's method from the line converges.
+    The polynomial is close to a straight line, so Newton's method converges from the line.
     """
     linear = displacement_m.copy()
     if gauge.polynomial:
@@ -122,3 +132,59 @@ def counts_from_displacement(displacement_m: Floats, gauge: Gauge) -> Floats:
         for _ in range(_NEWTON_STEPS):
             linear -= (terms(linear) - displacement_m) / slope(linear)
     return linear / gauge.gain_m_per_count + gauge.zero_count
+
+
+@dataclass(frozen=True, slots=True)
+class StillMoving:
+    """The gauge is not at rest yet."""
+
+    text: str
+
+
+class ReadingAverager:
+    """Averages one reading once the gauge is at rest.
+
+    Parameters
+    ----------
+    recent : RecentSamples
+        Live samples.
+    """
+
+    def __init__(self, recent: RecentSamples) -> None:
+        self._recent = recent
+        self._since_s = math.nan
+        self._windows = 0
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a reading is being averaged."""
+        return self._windows > 0
+
+    def start(self) -> bool:
+        """Begin a reading; False without samples."""
+        if not math.isfinite(self._recent.end_s):
+            return False
+        self._windows, self._since_s = 1, self._recent.end_s + _STALE_S
+        return True
+
+    def stop(self) -> None:
+        """Abandon the reading."""
+        self._windows = 0
+
+    def poll(self, gauge: int, gauges: Gauges) -> AveragedCounts | InvalidWindow | StillMoving | None:
+        """Evaluate the current window once it is complete; None before.
+
+        The last window is accepted even if the gauge still creeps.
+        """
+        if not self.is_active or self._recent.end_s < self._since_s + WINDOW_S:
+            return None
+        rows = self._recent.since(self._since_s)
+        if rows is None:
+            return None
+        average = average_counts(rows, gauge, gauges)
+        if isinstance(average, InvalidWindow) or average.is_steady or self._windows == MAX_WINDOWS:
+            self.stop()
+            return average
+        self._windows, self._since_s = self._windows + 1, self._recent.end_s
+        creep = with_minus_sign(f"{average.creep_counts:.3g}")
+        return StillMoving(gettext("Still moving by {creep} counts, waiting", creep=creep))

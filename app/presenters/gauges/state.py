@@ -1,8 +1,8 @@
-"""What the Gauges screen shows, as values."""
+"""State of the Gauges screen, and the forms of its tabs."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,17 @@ from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.start.state import ConnectForm
 from messages.i18n import N_
 
-if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
+if TYPE_CHECKING:  # its import loads `analysis`, which the window does without until it has started
     from app.presenters.gauge_health import GaugeHealthState
 
 Floats = NDArray[np.float64]
+NAMES: Final = (N_("Gauge 1, table"), N_("Gauge 2, relative"))
+NO_DEVICE: Final = N_("No samples: connect the device first")
+CONNECTION_LOST: Final = N_("The connection is gone: the reading was not taken")
 
 
 class GaugesTab(StrEnum):
-    """What the larger part of the screen shows, by the names of its tabs."""
+    """Tabs of the screen; the value is the title."""
 
     HEALTH = N_("Health")
     PORTS = N_("Ports and devices")
@@ -28,7 +31,7 @@ class GaugesTab(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LabelledValue:
-    """A line of a table: what it is, and its value with unit."""
+    """A row of a table: a label, and a value with its unit."""
 
     label: str
     value: str
@@ -36,16 +39,16 @@ class LabelledValue:
 
 @dataclass(frozen=True, slots=True)
 class GaugeCard:
-    """The calibration of one gauge that is in use.
+    """The calibration in use of one gauge.
 
     Attributes
     ----------
     name : str
-    standing : Chip
-        Whether it holds, or until when.
-    facts : tuple of Fact
+    validity : Chip
+        Whether it is valid, and until when.
+    values : tuple of LabelledValue
     check : Chip
-        How it was last checked against a known displacement.
+        Outcome of the last check against a known displacement.
     """
 
     name: str
@@ -55,8 +58,83 @@ class GaugeCard:
 
 
 @dataclass(frozen=True, slots=True)
+class GaugesState:
+    """State of the screen, apart from the tabs that have a presenter of their own.
+
+    Attributes
+    ----------
+    cards : tuple of GaugeCard
+        Gauge 1 first.
+    file : str
+        File of the calibrations in use.
+    checks_fault : Chip
+        Why the record of checks cannot be read.
+    tab : GaugesTab
+    device : str
+        The connected device; empty without one.
+    health : tuple of GaugeHealthState
+        Empty while nothing is known.
+    health_note : str
+        Why nothing is known.
+    """
+
+    cards: tuple[GaugeCard, ...]
+    file: str = ""
+    checks_fault: Chip = EMPTY_CHIP
+    tab: GaugesTab = GaugesTab.HEALTH
+    device: str = ""
+    health: "tuple[GaugeHealthState, ...]" = ()
+    health_note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PortCard:
+    """A serial port of this computer.
+
+    Attributes
+    ----------
+    url : str
+    identity : str
+        USB chip or board, and USB numbers.
+    status : Chip
+        The device that was recognised, or why none was; empty before the port is probed.
+    description : tuple of str
+        How the device was verified, problems and remedies.
+    suggested_form : ConnectForm, optional
+        Form of the Start screen that connects to the device.
+    """
+
+    url: str
+    identity: str = ""
+    status: Chip = EMPTY_CHIP
+    description: tuple[str, ...] = ()
+    suggested_form: ConnectForm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PortsState:
+    """State of the tab Ports and devices.
+
+    Attributes
+    ----------
+    ports : tuple of PortCard
+    progress : str
+        What the probe is doing; empty while none runs.
+    message : Chip
+        Outcome of the last probe.
+    query_silent : bool
+        Whether the probe sends identification requests to silent devices.
+    """
+
+    ports: tuple[PortCard, ...] = ()
+    progress: str = ""
+    message: Chip = EMPTY_CHIP
+    query_silent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationForm:
-    """What the operator has filled in, as typed. Lengths in mm."""
+    """Fields of a calibration, as typed. Lengths in mm."""
 
     gauge: int = 0
     degree: int = 1
@@ -71,7 +149,7 @@ class CalibrationForm:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationPoint:
-    """Mean counts at what the dial showed (mm)."""
+    """Mean counts at a dial reading (mm)."""
 
     counts: float
     dial_mm: float
@@ -79,17 +157,17 @@ class CalibrationPoint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationFit:
-    """What the readings make.
+    """Curve fitted to the points.
 
     Attributes
     ----------
     dial_mm, residual_um : (n,) float64
-        Dial reading minus curve, in the order in which they were taken.
+        Dial reading, and dial reading minus curve, in the order of the points.
     upward : (n,) bool
-        Taken on the way up.
-    facts : tuple of Fact
-        Gain, zero, merits and uncertainty.
-    cautions : tuple of str
+        Whether the dial was rising.
+    values : tuple of LabelledValue
+        Gain, zero, linearity and uncertainty.
+    warnings : tuple of str
     """
 
     dial_mm: Floats
@@ -99,29 +177,26 @@ class CalibrationFit:
     warnings: tuple[str, ...]
 
 
-NO_DEVICE = N_("No samples: connect the device first")
-
-
 @dataclass(frozen=True, slots=True)
 class CalibrationState:
-    """The calibration that is being made.
+    """State of the tab Calibrate.
 
     Attributes
     ----------
     form : CalibrationForm
-    live : str
-        Mean counts just now; empty without samples.
-    live_words : str
-        Their noise, or why there are none.
-    readings : tuple of Reading
-    waiting : str
-        Why a reading is not taken yet; empty when none is.
-    fitted : FittedCalibration, optional
+    live_value : str
+        Mean counts now; empty without samples.
+    live_note : str
+        Noise of the counts, or why there are none.
+    points : tuple of CalibrationPoint
+    reading_status : str
+        Progress of the reading being averaged; empty while none is.
+    fit : CalibrationFit, optional
     message : Chip
-        What came of the last action, or is missing.
+        Outcome of the last action, or what is missing.
     can_save : bool
     offers_reconnect : bool
-        The device is still read by the calibration before.
+        Whether the device is still read with the previous calibration.
     """
 
     form: CalibrationForm = CalibrationForm()
@@ -136,7 +211,7 @@ class CalibrationState:
 
 
 class CheckKind(StrEnum):
-    """What a gauge is tried with; the value is what is shown."""
+    """Reference of a check; the value is the label."""
 
     DISPLACEMENT = N_("a displacement, mm")
     SHUNT = N_("a shunt, in mm")
@@ -145,7 +220,7 @@ class CheckKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CheckForm:
-    """What the operator has filled in about a check, as typed."""
+    """Fields of a check, as typed."""
 
     gauge: int = 0
     kind: CheckKind = CheckKind.DISPLACEMENT
@@ -157,27 +232,26 @@ class CheckForm:
 
 @dataclass(frozen=True, slots=True)
 class CheckState:
-    """A gauge tried against what is known, in two readings.
+    """State of the tab Check: a gauge compared with a known step, in two readings.
 
     Attributes
     ----------
     form : CheckForm
-    started : bool
-        It is under way, so that the form is fixed.
+    is_started : bool
+        Whether a check is under way, which locks the form.
     instruction : str
-        What to do now; empty when nothing is.
-    waiting : str
-        Why a reading is not taken yet; empty when none is.
-    verdict : Chip
-        What came of it.
-    facts : tuple of Fact
-        Known, measured, allowed, and what the tolerance is made of.
-    cautions : tuple of str
+        The operator's next step; empty without one.
+    reading_status : str
+        Progress of the reading being averaged; empty while none is.
+    outcome : Chip
+    values : tuple of LabelledValue
+        Known and measured step, tolerance, and the budget of the tolerance.
+    warnings : tuple of str
     message : Chip
-        What is missing, or went wrong.
+        What is missing or failed.
     """
 
-    form: CheckForm = field(default_factory=CheckForm)
+    form: CheckForm = CheckForm()
     is_started: bool = False
     instruction: str = ""
     reading_status: str = ""
@@ -185,121 +259,3 @@ class CheckState:
     values: tuple[LabelledValue, ...] = ()
     warnings: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
-
-
-@dataclass(frozen=True, slots=True)
-class PortCard:
-    """A port of this computer, and what was found on it.
-
-    Attributes
-    ----------
-    url : str
-    identity : str
-        Chip or board, and USB numbers.
-    finding : Chip
-        What speaks there, or why nobody knows; empty before it was looked at.
-    words : tuple of str
-        What else is to be known: how it was tested, what stands in the way, remedies.
-    suggestion : ConnectForm, optional
-        How to record from it.
-    """
-
-    url: str
-    identity: str = ""
-    status: Chip = EMPTY_CHIP
-    description: tuple[str, ...] = ()
-    suggested_form: ConnectForm | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class GaugesState:
-    """The whole screen.
-
-    Attributes
-    ----------
-    cards : tuple of GaugeCard
-        Gauge 1 first.
-    file : str
-        Where these calibrations are kept.
-    side : Side
-    device : str
-        What is connected; empty when nothing is.
-    health : tuple of GaugeHealthState
-        Empty as long as nothing is known.
-    health_words : str
-        Why nothing is known.
-    ports : tuple of PortCard
-    probing : str
-        What is being done on a port; empty when nothing.
-    ports_message : Chip
-    asks : bool
-        Silent devices are asked who they are.
-    calibration : CalibrationState
-    check : CheckState
-    """
-
-    cards: tuple[GaugeCard, ...]
-    file: str = ""
-    checks_fault: Chip = EMPTY_CHIP
-    tab: GaugesTab = GaugesTab.HEALTH
-    device: str = ""
-    health: "tuple[GaugeHealthState, ...]" = ()
-    check: CheckState = field(default_factory=CheckState)
-    health_note: str = ""
-    ports: tuple[PortCard, ...] = ()
-    probing: str = ""
-    ports_message: Chip = EMPTY_CHIP
-    query_silent: bool = False
-    calibration: CalibrationState = field(default_factory=CalibrationState)
-
-
-class GaugesEvents(Protocol):
-    """What the Gauges screen tells its presenter."""
-
-    def set_tab(self, side: GaugesTab) -> None:
-        """Show another tab."""
-
-    def show_start(self) -> None:
-        """Go where a device is connected."""
-
-    def probe(self) -> None:
-        """Look at all ports."""
-
-    def cancel_probe(self) -> None:
-        """Stop looking."""
-
-    def set_query_silent(self, asks: bool) -> None:
-        """Whether silent devices are asked who they are."""
-
-    def fill_port(self, url: str) -> None:
-        """Fill in how to record from a port."""
-
-    def fill_second_port(self, url: str) -> None:
-        """Fill in that gauge 2 has a device of its own on a port."""
-
-    def set_calibration_form(self, form: CalibrationForm) -> None:
-        """Take what was filled in about the calibration."""
-
-    def set_check_form(self, form: CheckForm) -> None:
-        """Take what was filled in about a check."""
-
-    def advance_check(self) -> None:
-        """Begin a check, or take the reading that is asked for."""
-
-    def cancel_check(self) -> None:
-        """Break the check off."""
-
-    def take_point(self, dial_text: str) -> None:
-        """The dial shows this many millimetres."""
-
-    def undo_point(self) -> None:
-        """Take the last reading back."""
-
-    def restart_calibration(self) -> None:
-        """Begin another calibration."""
-
-    def save_calibration(self) -> None:
-        """Keep the calibration as a file."""
-
-    def reconnect(self) -> None:
-        """Connect again, by the new calibration."""

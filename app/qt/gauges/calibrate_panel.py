@@ -1,5 +1,6 @@
-"""Calibration against the dial gauge: live counts, readings, residuals, merits, and what is kept of it."""
+"""Tab Calibrate: live counts, points, residuals, characteristics, and the form to save."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +21,13 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters import number_text
-from app.presenters.gauges.cards import NAMES
+from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.state import (
+    NAMES,
     CalibrationFit,
     CalibrationForm,
     CalibrationPoint,
     CalibrationState,
-    GaugesEvents,
 )
 from app.qt.gauges.residual_plot import ResidualPlot
 from app.qt.gauges.value_grid import ValueGrid
@@ -36,7 +37,7 @@ from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
 
-_TAKING_WIDTH = 256
+_COLUMN_WIDTH = 256
 _DEGREES = (
     N_("line"),
     N_("polynomial of degree 2"),
@@ -58,11 +59,11 @@ _FIELDS = {
 class CalibratePanel(QScrollArea):
     """Draws `CalibrationState`."""
 
-    def __init__(self, theme: Theme, events: GaugesEvents) -> None:
+    def __init__(self, theme: Theme, presenter: CalibrationPresenter, reconnect: Callable[[], None]) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._form = CalibrationForm()
-        self._taking = _Taking(events, self._fill_gauge)
+        self._readings = _ReadingColumn(presenter, self._fill_gauge)
         self._plot = ResidualPlot(theme)
         self._merits = ValueGrid()
         self._cautions = label(muted=True, wrap=True)
@@ -75,12 +76,12 @@ class CalibratePanel(QScrollArea):
         self._again.setToolTip(gettext("The device is still read by the calibration before"))
         self._shown: CalibrationFit | None = None
         self._lay_out()
-        self._connect()
+        self._connect(reconnect)
 
     def show_state(self, state: CalibrationState) -> None:
         """Draw what differs."""
         self._form = state.form
-        self._taking.show_state(state)
+        self._readings.show_state(state)
         self._degree.setCurrentIndex(state.form.degree - 1)
         self._use.setChecked(state.form.use)
         for name, field in self._fields.items():
@@ -98,24 +99,24 @@ class CalibratePanel(QScrollArea):
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
         bind_button(self._save, "Ctrl+S", gettext("Write a new dated file beside the one in use"), screen)
-        self._taking.add_keys(screen)
+        self._readings.add_keys(screen)
 
     def _fill_gauge(self, gauge: int) -> None:
-        self._events.set_calibration_form(replace(self._form, gauge=gauge))
+        self._presenter.set_form(replace(self._form, gauge=gauge))
 
     def _fill(self) -> None:
         filled = replace(self._form, degree=self._degree.currentIndex() + 1, use=self._use.isChecked())
         for name, field in self._fields.items():
             filled = replace(filled, **{name: field.text()})  # type: ignore[arg-type]  # all of them are texts
-        self._events.set_calibration_form(filled)
+        self._presenter.set_form(filled)
 
-    def _connect(self) -> None:
+    def _connect(self, reconnect: Callable[[], None]) -> None:
         self._degree.activated.connect(lambda _: self._fill())
         self._use.clicked.connect(lambda _: self._fill())
         for field in self._fields.values():
             field.textEdited.connect(lambda _: self._fill())
-        self._save.clicked.connect(lambda _: self._events.save_calibration())
-        self._again.clicked.connect(lambda _: self._events.reconnect())
+        self._save.clicked.connect(lambda _: self._presenter.save())
+        self._again.clicked.connect(lambda _: reconnect())
 
     def _lay_out(self) -> None:
         inside = QWidget()
@@ -134,7 +135,7 @@ class CalibratePanel(QScrollArea):
         below.addStretch(1)
         right.addLayout(below)
         right.addStretch(1)
-        columns.addWidget(self._taking)
+        columns.addWidget(self._readings)
         columns.addLayout(right, 1)
         self.setProperty("role", "column")
         self.setFrameShape(QFrame.Shape.NoFrame)
@@ -155,13 +156,13 @@ class CalibratePanel(QScrollArea):
         return grid
 
 
-class _Taking(QWidget):
-    """The operator's part: live counts, the dial reading, and the readings taken."""
+class _ReadingColumn(QWidget):
+    """Live counts, the dial reading to type, and the table of points."""
 
-    def __init__(self, events: GaugesEvents, choose: object) -> None:
+    def __init__(self, presenter: CalibrationPresenter, choose: Callable[[int], None]) -> None:
         super().__init__()
-        self.setFixedWidth(_TAKING_WIDTH)
-        self._events = events
+        self.setFixedWidth(_COLUMN_WIDTH)
+        self._presenter = presenter
         self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
         self._gauge.setAccessibleName(gettext("Gauge to calibrate"))
@@ -180,8 +181,8 @@ class _Taking(QWidget):
         self._table = _ReadingsTable()
         self._gauge.activated.connect(choose)
         self._dial.returnPressed.connect(self._take)
-        self._undo.clicked.connect(lambda _: events.undo_point())
-        self._restart.clicked.connect(lambda _: events.restart_calibration())
+        self._undo.clicked.connect(lambda _: presenter.undo())
+        self._restart.clicked.connect(lambda _: presenter.restart())
         self._lay_out()
 
     def show_state(self, state: CalibrationState) -> None:
@@ -201,7 +202,7 @@ class _Taking(QWidget):
         bind_button(self._undo, "Alt+U", words, screen)
 
     def _take(self) -> None:
-        self._events.take_point(self._dial.text())
+        self._presenter.take_point(self._dial.text())
         self._dial.selectAll()
 
     def _lay_out(self) -> None:

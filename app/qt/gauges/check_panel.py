@@ -5,8 +5,8 @@ from dataclasses import replace
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.gauges.cards import NAMES
-from app.presenters.gauges.state import CheckForm, CheckKind, CheckState, GaugesEvents
+from app.presenters.gauges.check import CheckPresenter
+from app.presenters.gauges.state import NAMES, CheckForm, CheckKind, CheckState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
@@ -32,24 +32,24 @@ _WIDTH = 640
 class CheckPanel(QWidget):
     """Draws `CheckState`."""
 
-    def __init__(self, events: GaugesEvents) -> None:
+    def __init__(self, presenter: CheckPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._form = CheckForm()
         self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
-        self._tried = ComboBox()
-        for tried in CheckKind:
-            self._tried.addItem(gettext(tried.value), tried)
+        self._kind = ComboBox()
+        for kind in CheckKind:
+            self._kind.addItem(gettext(kind.value), kind)
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._instruction = label(role=TextRole.HEADING, wrap=True)
         self._waiting = label(wrap=True)
         self._message = label(wrap=True)
-        self._go_on = QPushButton()
-        self._leave = QPushButton(gettext("Break off"))
+        self._advance = QPushButton()
+        self._cancel = QPushButton(gettext("Break off"))
         self._verdict = label(role=TextRole.HEADING, wrap=True)
-        self._facts = ValueGrid()
-        self._cautions = label(muted=True, wrap=True)
+        self._values = ValueGrid()
+        self._warnings = label(muted=True, wrap=True)
         self._lay_out()
         self._connect()
 
@@ -57,41 +57,42 @@ class CheckPanel(QWidget):
         """Draw what differs."""
         self._form = state.form
         self._gauge.setCurrentIndex(state.form.gauge)
-        self._tried.setCurrentIndex(list(CheckKind).index(state.form.kind))
+        self._kind.setCurrentIndex(list(CheckKind).index(state.form.kind))
         for name, field in self._fields.items():
             if field.text() != getattr(state.form, name):
                 field.setText(getattr(state.form, name))
-        for part in (self._gauge, self._tried, *self._fields.values()):
+        for part in (self._gauge, self._kind, *self._fields.values()):
             part.setEnabled(not state.is_started)
         for shown, text in ((self._instruction, state.instruction), (self._waiting, state.reading_status)):
             shown.setText(text)
             shown.setVisible(bool(text))
-        self._go_on.setText(gettext(_STARTED if state.is_started else _NOT_STARTED))
-        self._go_on.setEnabled(not state.reading_status and (bool(state.instruction) or not state.is_started))
-        self._leave.setVisible(state.is_started)
+        self._advance.setText(gettext(_STARTED if state.is_started else _NOT_STARTED))
+        is_due = bool(state.instruction) or not state.is_started
+        self._advance.setEnabled(is_due and not state.reading_status)
+        self._cancel.setVisible(state.is_started)
         show_chip(self._message, state.message)
         show_chip(self._verdict, state.outcome)
-        self._facts.show_values(state.values)
-        self._cautions.setText("\n".join(state.warnings))
-        self._cautions.setVisible(bool(state.warnings))
+        self._values.show_values(state.values)
+        self._warnings.setText("\n".join(state.warnings))
+        self._warnings.setVisible(bool(state.warnings))
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        bind_button(self._go_on, "Ctrl+Return", gettext("Begin the check, or take the reading"), screen)
+        bind_button(self._advance, "Ctrl+Return", gettext("Begin the check, or take the reading"), screen)
 
     def _fill(self) -> None:
         texts = {name: field.text() for name, field in self._fields.items()}
-        gauge, tried = self._gauge.currentIndex(), self._tried.currentData()
-        self._events.set_check_form(replace(self._form, gauge=gauge, kind=CheckKind(tried), **texts))
+        gauge, kind = self._gauge.currentIndex(), self._kind.currentData()
+        self._presenter.set_form(replace(self._form, gauge=gauge, kind=CheckKind(kind), **texts))
 
     def _connect(self) -> None:
         self._gauge.activated.connect(lambda _: self._fill())
-        self._tried.activated.connect(lambda _: self._fill())
+        self._kind.activated.connect(lambda _: self._fill())
         for field in self._fields.values():
             field.textEdited.connect(lambda _: self._fill())
-            field.returnPressed.connect(self._go_on.click)
-        self._go_on.clicked.connect(lambda _checked: self._events.advance_check())
-        self._leave.clicked.connect(lambda _checked: self._events.cancel_check())
+            field.returnPressed.connect(self._advance.click)
+        self._advance.clicked.connect(lambda _checked: self._presenter.advance())
+        self._cancel.clicked.connect(lambda _checked: self._presenter.cancel())
 
     def _lay_out(self) -> None:
         page = QWidget()
@@ -105,12 +106,12 @@ class CheckPanel(QWidget):
         column.addWidget(self._waiting)
         buttons = QHBoxLayout()
         buttons.setSpacing(8)
-        self._go_on.setProperty("primary", "true")
-        for button in (self._go_on, self._leave):
+        self._advance.setProperty("primary", "true")
+        for button in (self._advance, self._cancel):
             buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
         buttons.addStretch(1)
         column.addLayout(buttons)
-        for part in (self._message, self._verdict, self._facts, self._cautions):
+        for part in (self._message, self._verdict, self._values, self._warnings):
             column.addWidget(part)
         column.addStretch(1)
         layout = QVBoxLayout(self)
@@ -121,4 +122,4 @@ class CheckPanel(QWidget):
         for name, field in self._fields.items():
             field.setPlaceholderText(gettext(_FIELDS[name][1]))
         written = [(gettext(_FIELDS[name][0]), field) for name, field in self._fields.items()]
-        return [(gettext("Gauge to check"), self._gauge), (gettext("Tried with"), self._tried), *written]
+        return [(gettext("Gauge to check"), self._gauge), (gettext("Tried with"), self._kind), *written]

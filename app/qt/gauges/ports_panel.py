@@ -1,8 +1,9 @@
-"""Ports and devices: what is plugged in, what speaks there, and one click to record from it."""
+"""Tab Ports and devices: serial ports, the devices recognised on them, buttons to connect."""
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
+from app.presenters.gauges.ports import PortsPresenter
+from app.presenters.gauges.state import PortCard, PortsState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox
 from app.qt.widgets.layouts import make_scroll_area
@@ -17,32 +18,32 @@ _NOT_LOOKED_AT = N_("Not looked at yet: Look at the ports (F5) listens here, and
 class PortsPanel(QWidget):
     """Draws the list of ports."""
 
-    def __init__(self, events: GaugesEvents) -> None:
+    def __init__(self, presenter: PortsPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._shown: tuple[PortCard, ...] | None = None
         self._look = QPushButton(gettext("Look at the ports"))
         self._stop = QPushButton(gettext("Stop looking"))
-        self._asks = CheckBox(gettext("Ask silent devices, too"))
-        self._asks.setToolTip(
+        self._query_silent = CheckBox(gettext("Ask silent devices, too"))
+        self._query_silent.setToolTip(
             gettext("Sends each silent device questions that only read. Without it nothing is sent to any.")
         )
-        self._doing = label(muted=True, wrap=True)
+        self._progress = label(muted=True, wrap=True)
         self._message = label(wrap=True)
         self._list = make_scroll_area(name=gettext("Ports of this computer"))
-        self._look.clicked.connect(lambda _checked: events.probe())
-        self._stop.clicked.connect(lambda _checked: events.cancel_probe())
-        self._asks.clicked.connect(events.set_query_silent)
+        self._look.clicked.connect(lambda _checked: presenter.probe())
+        self._stop.clicked.connect(lambda _checked: presenter.cancel())
+        self._query_silent.clicked.connect(presenter.set_query_silent)
         self._lay_out()
 
-    def show_state(self, state: GaugesState) -> None:
+    def show_state(self, state: PortsState) -> None:
         """Draw what differs."""
-        self._look.setEnabled(not state.probing)
-        self._stop.setEnabled(bool(state.probing))
-        self._asks.setChecked(state.query_silent)
-        self._doing.setText(state.probing)
-        self._doing.setVisible(bool(state.probing))
-        show_chip(self._message, state.ports_message)
+        self._look.setEnabled(not state.progress)
+        self._stop.setEnabled(bool(state.progress))
+        self._query_silent.setChecked(state.query_silent)
+        self._progress.setText(state.progress)
+        self._progress.setVisible(bool(state.progress))
+        show_chip(self._message, state.message)
         if state.ports != self._shown:
             self._shown = state.ports
             self._list.setWidget(self._rows(state.ports))
@@ -84,7 +85,7 @@ class PortsPanel(QWidget):
             use = QPushButton(gettext("Use this port"))
             use.setToolTip(gettext("Fill in the start page for {url}", url=card.url))
             use.setAccessibleName(gettext("Use {url}", url=card.url))
-            use.clicked.connect(lambda _checked: self._events.fill_port(card.url))
+            use.clicked.connect(lambda _checked: self._presenter.fill_port(card.url))
             buttons = QVBoxLayout()
             buttons.addWidget(use)
             if is_pair:
@@ -94,25 +95,25 @@ class PortsPanel(QWidget):
         return row
 
     def _second_button(self, url: str) -> QPushButton:
-        """For who has a device for each gauge."""
+        """Button for a stand with a device for each gauge."""
         second = QPushButton(gettext("Use for gauge 2"))
         second.setToolTip(
             gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
         )
         second.setAccessibleName(gettext("Use {url} for gauge 2", url=url))
-        second.clicked.connect(lambda _checked: self._events.fill_second_port(url))
+        second.clicked.connect(lambda _checked: self._presenter.fill_second_port(url))
         return second
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
         head.setContentsMargins(16, 8, 16, 0)
         head.setSpacing(12)
-        for part in (self._look, self._stop, self._asks):
+        for part in (self._look, self._stop, self._query_silent):
             head.addWidget(part)
         head.addStretch(1)
         said = QVBoxLayout()
         said.setContentsMargins(16, 0, 16, 0)
-        said.addWidget(self._doing)
+        said.addWidget(self._progress)
         said.addWidget(self._message)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

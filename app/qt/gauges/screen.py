@@ -1,11 +1,12 @@
-"""The Gauges screen: calibrations in use at the left; health, ports and calibrating at the right."""
+"""The Gauges screen: calibrations in use at the left; health, ports, calibration and check at the right."""
 
 from functools import partial
 
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
-from app.presenters.gauges.state import GaugesEvents, GaugesState, GaugesTab
+from app.presenters.gauges.presenter import GaugesPresenter
+from app.presenters.gauges.state import GaugesState, GaugesTab
 from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.cards import FOCUS_RING, CardsColumn
 from app.qt.gauges.check_panel import CheckPanel
@@ -31,32 +32,32 @@ class GaugesScreen(QWidget):
     Parameters
     ----------
     theme : Theme
-    events : GaugesEvents
-        Told what the operator does.
+    presenter : GaugesPresenter
     """
 
-    def __init__(self, theme: Theme, events: GaugesEvents) -> None:
+    def __init__(self, theme: Theme, presenter: GaugesPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._cards = CardsColumn()
         self._tabs = QTabBar()
-        self._health = HealthPanel(theme, events.show_start)
-        self._ports = PortsPanel(events)
-        self._calibrate = CalibratePanel(theme, events)
-        self._check = CheckPanel(events)
-        self._sides = QStackedWidget()
+        self._health = HealthPanel(theme, presenter.navigator.show_start)
+        self._ports = PortsPanel(presenter.ports)
+        self._calibrate = CalibratePanel(theme, presenter.calibration, presenter.navigator.reconnect)
+        self._check = CheckPanel(presenter.check)
+        self._pages = QStackedWidget()
         self._lay_out()
-        self._tabs.currentChanged.connect(lambda index: events.set_tab(list(GaugesTab)[index]))
+        self._tabs.currentChanged.connect(lambda index: presenter.set_tab(list(GaugesTab)[index]))
         self._add_keys()
+        presenter.ports.attach(self._ports)
+        presenter.calibration.attach(self._calibrate)
+        presenter.check.attach(self._check)
 
     def show_state(self, state: GaugesState) -> None:
         """Draw what differs from what is shown."""
         self._tabs.setCurrentIndex(list(GaugesTab).index(state.tab))
-        self._sides.setCurrentIndex(self._tabs.currentIndex())
-        for part in (self._cards, self._health, self._ports):
-            part.show_state(state)
-        self._calibrate.show_state(state.calibration)
-        self._check.show_state(state.check)
+        self._pages.setCurrentIndex(self._tabs.currentIndex())
+        self._cards.show_state(state)
+        self._health.show_state(state)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Give the cards their share of the width."""
@@ -70,9 +71,8 @@ class GaugesScreen(QWidget):
         self._tabs.setFocus()
 
     def _add_keys(self) -> None:
-        events = self._events
-        for side, key in _KEYS.items():
-            add_shortcut(self, key, gettext(side.value), partial(events.set_tab, side))
+        for tab, key in _KEYS.items():
+            add_shortcut(self, key, gettext(tab.value), partial(self._presenter.set_tab, tab))
         self._ports.add_keys(self)
         self._calibrate.add_keys(self)
         self._check.add_keys(self)
@@ -82,16 +82,16 @@ class GaugesScreen(QWidget):
         card.setProperty("role", "card")
         inside = QVBoxLayout(card)
         inside.setContentsMargins(1, 1, 1, 1)
-        for index, (side, key) in enumerate(_KEYS.items()):
-            self._tabs.addTab(gettext(side.value))
-            self._tabs.setTabToolTip(index, f"{gettext(side.value)} ({key})")
+        for index, (tab, key) in enumerate(_KEYS.items()):
+            self._tabs.addTab(gettext(tab.value))
+            self._tabs.setTabToolTip(index, f"{gettext(tab.value)} ({key})")
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName(gettext("What is shown of the gauges"))
         for panel in (self._health, self._ports, self._calibrate, self._check):
-            self._sides.addWidget(panel)
+            self._pages.addWidget(panel)
         inside.addWidget(self._tabs)
-        inside.addWidget(self._sides, 1)
+        inside.addWidget(self._pages, 1)
         layout = QHBoxLayout(self)
         beside = QVBoxLayout()
         beside.setContentsMargins(0, FOCUS_RING, 0, FOCUS_RING)  # edges in line with those of the cards

@@ -7,10 +7,10 @@ import time
 import pytest
 
 from app.presenters.base import Progress, Tone
-from app.presenters.gauges.port_cards import listed_port, probed_port
-from app.presenters.gauges.port_probe import ListPorts, ProbePorts, list_ports, probe_ports
+from app.presenters.gauges import port_tasks
+from app.presenters.gauges.port_tasks import list_port_cards, listed_port, probe_ports, probed_port
+from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.start.presenter import port_settings
-from drivers import port as ports
 from drivers.port import PortInfo
 from drivers.port_users import PortUser
 from drivers.probe.host_checks import PortHint
@@ -97,7 +97,7 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
             time.sleep(0.01)
 
     there = [PortInfo(terminal.url), PortInfo("COM7")]
-    monkeypatch.setattr(ports, "list_ports", lambda: there)
+    monkeypatch.setattr(port_tasks, "list_ports", lambda: there)
     told: list[Progress] = []
     sender = threading.Thread(target=send)
     sender.start()
@@ -111,4 +111,4 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
     assert cards[0].suggested_form.protocol == "csv"
     assert "listening" in told[-1].text
     assert cards[1].status.text == "connected here"
-    assert [card.url for card in list_ports(ListPorts(), told.append)] == [terminal.url, "COM7"]
+    assert [card.url for card in list_port_cards(ListPorts(), told.append)] == [terminal.url, "COM7"]

@@ -13,10 +13,10 @@ from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import Progress, Tone
 from app.presenters.gauges.cards import gauge_cards
-from app.presenters.gauges.port_probe import ListPorts, ProbePorts
+from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.reading_averager import MAX_WINDOWS
 from app.presenters.gauges.recent_samples import (
+    MAX_WINDOWS,
     InvalidWindow,
     RecentSamples,
     average_counts,
@@ -32,8 +32,8 @@ from app.presenters.gauges.tasks import (
     MeasureHealth,
     SaveCalibration,
     SavedCalibration,
-    execute,
 )
+from app.presenters.gauges.work import execute
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from config.files import load_checks, load_gauges
@@ -182,7 +182,7 @@ def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None
 def test_without_a_connection_it_says_how_to_get_one(desk: Desk) -> None:
     desk.presenter.enter()
     assert "Connect the device" in desk.state.health_note
-    desk.presenter.show_start()
+    desk.presenter.navigator.show_start()
     assert desk.went == ["start"]
 
 
@@ -221,33 +221,33 @@ def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
 def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) -> None:
     desk.presenter.enter()
     assert [task for _, task in desk.prober.submitted] == [ListPorts()]
-    desk.presenter.probe()
-    desk.presenter.set_query_silent(True)
-    desk.presenter.probe()
+    desk.presenter.ports.probe()
+    desk.presenter.ports.set_query_silent(True)
+    desk.presenter.ports.probe()
     assert desk.prober.submitted[-1][1] == ProbePorts(query_silent=False, connected="")
     assert len(desk.prober.submitted) == 2, "one look at a time"
     task = desk.prober.submitted[-1][1]
     desk.hear(TaskProgress(task, Progress("COM7: listening at 9600 baud")), prober=True)
-    assert desk.state.probing == "COM7: listening at 9600 baud"
+    assert desk.presenter.ports.state.progress == "COM7: listening at 9600 baud"
     form = ConnectForm("COM7", "csv", "9600", settings="columns=time_us,value,value")
     cards = (PortCard("COM7", suggested_form=form), PortCard("COM8"))
     desk.hear(TaskDone(task, cards), prober=True)
-    assert desk.state.ports == cards
-    desk.presenter.fill_port("COM8")
-    desk.presenter.fill_port("COM7")
+    assert desk.presenter.ports.state.ports == cards
+    desk.presenter.ports.fill_port("COM8")
+    desk.presenter.ports.fill_port("COM7")
     assert desk.went == [form]
     desk.presenter.enter()
     desk.hear(TaskDone(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
-    assert desk.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
+    assert desk.presenter.ports.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
 
 
 def test_looking_can_be_given_up(desk: Desk) -> None:
-    desk.presenter.probe()
-    desk.presenter.cancel_probe()
+    desk.presenter.ports.probe()
+    desk.presenter.ports.cancel()
     assert desk.prober.cancelled == 1
     desk.hear(TaskFailed(desk.prober.submitted[-1][1], CANCELLED), prober=True)
-    assert desk.state.probing == ""
-    assert desk.state.ports_message.text == "Given up"
+    assert desk.presenter.ports.state.progress == ""
+    assert desk.presenter.ports.state.message.text == "Given up"
 
 
 # --- live counts ---
@@ -286,21 +286,22 @@ def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
 
 
 def test_nothing_is_taken_without_a_device_or_a_number(desk: Desk) -> None:
-    desk.presenter.take_point("1")
-    assert desk.state.calibration.message.text == NO_DEVICE
+    desk.presenter.calibration.take_point("1")
+    assert desk.presenter.calibration.state.message.text == NO_DEVICE
     desk.presenter.enter()
     desk.connect()
     desk.pass_time(1.0)
-    desk.presenter.take_point("one")
-    assert "'one' is not a number of millimetres" in desk.state.calibration.message.text
-    assert float(desk.state.calibration.live_value) == pytest.approx(12000.0, abs=250.0), "the zero in use"
+    desk.presenter.calibration.take_point("one")
+    assert "'one' is not a number of millimetres" in desk.presenter.calibration.state.message.text
+    live = float(desk.presenter.calibration.state.live_value)
+    assert live == pytest.approx(12000.0, abs=250.0), "the zero in use"
 
 
 def calibrate_by_hand(desk: Desk, dials_mm: list[float]) -> None:
     """Take readings of a gauge that shows a hundredth too much."""
     for dial_mm in dials_mm:
         desk.pass_time(0.3, table_m=1.01e-3 * dial_mm)
-        desk.presenter.take_point(f"{dial_mm:g}".replace(".", ","))
+        desk.presenter.calibration.take_point(f"{dial_mm:g}".replace(".", ","))
         desk.pass_time(1.3, table_m=1.01e-3 * dial_mm)
         desk.work()
 
@@ -308,11 +309,11 @@ def calibrate_by_hand(desk: Desk, dials_mm: list[float]) -> None:
 def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) -> None:
     desk.connect()
     calibrate_by_hand(desk, [0.0, 2.5, 5.0])
-    desk.presenter.undo_point()
+    desk.presenter.calibration.undo()
     desk.work()
-    assert len(desk.state.calibration.points) == 2
+    assert len(desk.presenter.calibration.state.points) == 2
     calibrate_by_hand(desk, [5.0, 2.5, 0.0, 2.5, 5.0, 2.5, 0.0])
-    made = desk.state.calibration
+    made = desk.presenter.calibration.state
     assert made.can_save
     assert made.fit is not None
     assert np.abs(made.fit.residual_um).max() < 1.0
@@ -322,11 +323,11 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
     assert len(kept) == 1, "readings outlive the window"
     assert kept[0].read_text().count("\n") == 10
     form = made.form
-    desk.presenter.set_calibration_form(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
-    desk.presenter.save_calibration()
-    assert "is past" in desk.state.calibration.message.text
-    desk.presenter.set_calibration_form(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
-    desk.presenter.save_calibration()
+    desk.presenter.calibration.set_form(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
+    desk.presenter.calibration.save()
+    assert "is past" in desk.presenter.calibration.state.message.text
+    desk.presenter.calibration.set_form(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
+    desk.presenter.calibration.save()
     saving = desk.asked[-1]
     assert isinstance(saving, SaveCalibration)
     desk.work()
@@ -334,83 +335,83 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
     assert used.table.gain_m_per_count == pytest.approx(GAUGES.table.gain_m_per_count / 1.01, rel=1e-4)
     assert (used.table.calibrated_by, used.table.valid_until) == ("A. Berger", datetime.date(2027, 1, 31))
     assert used.relative == GAUGES.relative
-    assert desk.state.calibration.offers_reconnect
+    assert desk.presenter.calibration.state.offers_reconnect
     desk.work()
     assert desk.state.cards[0].validity.tone is Tone.OK
-    desk.presenter.reconnect()
+    desk.presenter.navigator.reconnect()
     assert desk.went == [used, "again"]
 
 
 def test_a_reading_waits_until_the_gauge_stands_still_but_not_for_ever(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_point("1")
+    desk.presenter.calibration.take_point("1")
     for _ in range(13):
         desk.presenter.on_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
         desk.now_s += 0.1
         desk.presenter.tick()
-    assert desk.state.calibration.reading_status.startswith("Still moving by")
-    assert desk.state.calibration.points == ()
+    assert desk.presenter.calibration.state.reading_status.startswith("Still moving by")
+    assert desk.presenter.calibration.state.points == ()
     for _ in range(round(11 * MAX_WINDOWS)):
         desk.presenter.on_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
         desk.now_s += 0.1
         desk.presenter.tick()
-    assert len(desk.state.calibration.points) == 1
-    assert "still creeping" in desk.state.calibration.message.text
+    assert len(desk.presenter.calibration.state.points) == 1
+    assert "still creeping" in desk.presenter.calibration.state.message.text
 
 
 def test_a_reading_can_be_left_and_does_not_outlive_its_device(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_point("1")
-    desk.presenter.undo_point()
+    desk.presenter.calibration.take_point("1")
+    desk.presenter.calibration.undo()
     desk.pass_time(2.0)
-    assert desk.state.calibration.points == ()
-    desk.presenter.take_point("1")
+    assert desk.presenter.calibration.state.points == ()
+    desk.presenter.calibration.take_point("1")
     desk.presenter.on_disconnected()
-    assert "was not taken" in desk.state.calibration.message.text
-    assert desk.state.calibration.reading_status == ""
+    assert "was not taken" in desk.presenter.calibration.state.message.text
+    assert desk.presenter.calibration.state.reading_status == ""
 
 
 def test_an_overloaded_gauge_gives_no_reading(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_point("1")
+    desk.presenter.calibration.take_point("1")
     desk.pass_time(1.5, status=int(SampleStatus.OVERLOAD_TABLE))
-    assert desk.state.calibration.points == ()
-    assert "overloaded" in desk.state.calibration.message.text
+    assert desk.presenter.calibration.state.points == ()
+    assert "overloaded" in desk.presenter.calibration.state.message.text
 
 
 def test_the_gauge_stays_while_there_are_readings_of_it(desk: Desk) -> None:
     desk.connect()
     calibrate_by_hand(desk, [0.0])
-    form = desk.state.calibration.form
-    desk.presenter.set_calibration_form(replace(form, gauge=1))
-    assert desk.state.calibration.form.gauge == 0
-    desk.presenter.restart_calibration()
-    desk.presenter.set_calibration_form(replace(form, gauge=1))
-    assert desk.state.calibration.form.gauge == 1
+    form = desk.presenter.calibration.state.form
+    desk.presenter.calibration.set_form(replace(form, gauge=1))
+    assert desk.presenter.calibration.state.form.gauge == 0
+    desk.presenter.calibration.restart()
+    desk.presenter.calibration.set_form(replace(form, gauge=1))
+    assert desk.presenter.calibration.state.form.gauge == 1
 
 
 def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) -> None:
     desk.connect()
     calibrate_by_hand(desk, [0.0])
-    form = desk.state.calibration.form
-    desk.presenter.set_calibration_form(replace(form, degree=2, uncertainty_mm="0,002"))
+    form = desk.presenter.calibration.state.form
+    desk.presenter.calibration.set_form(replace(form, degree=2, uncertainty_mm="0,002"))
     fit = desk.asked[-1]
     assert isinstance(fit, FitCalibration)
     assert fit.degree == 2
     assert fit.uncertainty_m == pytest.approx(2e-6)
-    desk.presenter.set_calibration_form(replace(form, resolution_mm="fine"))
-    assert "Resolution of the dial 'fine'" in desk.state.calibration.message.text
+    desk.presenter.calibration.set_form(replace(form, resolution_mm="fine"))
+    assert "Resolution of the dial 'fine'" in desk.presenter.calibration.state.message.text
 
 
 def test_what_went_wrong_while_saving_is_said(desk: Desk) -> None:
     task = SaveCalibration(FitCalibration(0, (), 1, 1e-5, None, ""), True, NOW.date())
     desk.hear(TaskFailed(task, "gauges.toml: cannot be written (no space left)"))
-    assert desk.state.calibration.message.tone is Tone.BAD
+    assert desk.presenter.calibration.state.message.tone is Tone.BAD
     desk.hear(TaskDone(task, SavedCalibration("new.toml", "old.toml")))
-    assert "old.toml" in desk.state.calibration.message.text
+    assert "old.toml" in desk.presenter.calibration.state.message.text
 
 
 def test_the_tab_is_kept(desk: Desk) -> None:
@@ -434,13 +435,13 @@ def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
     desk.connect()
     desk.presenter.enter()
     desk.pass_time(0.5, table_m=1e-3)
-    desk.presenter.set_check_form(check_form(**changes))
-    desk.presenter.advance_check()
-    assert "rest" in desk.state.check.instruction
-    desk.presenter.advance_check()
+    desk.presenter.check.set_form(check_form(**changes))
+    desk.presenter.check.advance()
+    assert "rest" in desk.presenter.check.state.instruction
+    desk.presenter.check.advance()
     desk.pass_time(1.5, table_m=1e-3)
-    assert "+10" in desk.state.check.instruction
-    desk.presenter.advance_check()
+    assert "+10" in desk.presenter.check.state.instruction
+    desk.presenter.check.advance()
     desk.pass_time(1.5, table_m=1e-3 + moved_m)
     assert isinstance(desk.asked[-1], CheckGauge)
     desk.work()
@@ -449,7 +450,7 @@ def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
 @pytest.mark.parametrize(("moved_m", "passed"), [(10.005e-3, True), (10.5e-3, False)])
 def test_a_gauge_is_checked_and_the_verdict_kept(desk: Desk, moved_m: float, passed: bool) -> None:
     run_check(desk, moved_m)
-    check = desk.state.check
+    check = desk.presenter.check.state
     assert check.outcome.tone is (Tone.OK if passed else Tone.BAD)
     facts = {fact.label: fact.value for fact in check.values}
     assert facts["known"] == "10.0000\u202fmm"
@@ -467,17 +468,17 @@ def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
     desk.connect()
     desk.presenter.enter()
     desk.pass_time(0.5)
-    desk.presenter.set_check_form(check_form())
-    desk.presenter.advance_check()
-    desk.presenter.advance_check()
+    desk.presenter.check.set_form(check_form())
+    desk.presenter.check.advance()
+    desk.presenter.check.advance()
     for step in range(15):
         desk.pass_time(0.1, table_m=1e-4 * step)
-    assert "Still moving" in desk.state.check.reading_status
-    desk.presenter.set_check_form(check_form(known="3"))
-    assert desk.state.check.form.known == "10.0", "what is checked is fixed meanwhile"
-    desk.presenter.cancel_check()
-    assert "nothing is kept" in desk.state.check.message.text
-    assert not desk.state.check.is_started
+    assert "Still moving" in desk.presenter.check.state.reading_status
+    desk.presenter.check.set_form(check_form(known="3"))
+    assert desk.presenter.check.state.form.known == "10.0", "what is checked is fixed meanwhile"
+    desk.presenter.check.cancel()
+    assert "nothing is kept" in desk.presenter.check.state.message.text
+    assert not desk.presenter.check.state.is_started
     assert load_checks().check == ()
 
 
@@ -492,23 +493,23 @@ def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
 )
 def test_what_cannot_be_checked_is_said(desk: Desk, changes: dict[str, str], said: str) -> None:
     desk.connect()
-    desk.presenter.set_check_form(check_form(**changes))
-    desk.presenter.advance_check()
-    assert said in desk.state.check.message.text
-    assert not desk.state.check.is_started
+    desk.presenter.check.set_form(check_form(**changes))
+    desk.presenter.check.advance()
+    assert said in desk.presenter.check.state.message.text
+    assert not desk.presenter.check.state.is_started
 
 
 def test_a_check_needs_a_device_that_stays(desk: Desk) -> None:
-    desk.presenter.advance_check()
-    assert desk.state.check.message.text == NO_DEVICE
+    desk.presenter.check.advance()
+    assert desk.presenter.check.state.message.text == NO_DEVICE
     desk.connect()
-    desk.presenter.set_check_form(check_form())
-    desk.presenter.advance_check()
+    desk.presenter.check.set_form(check_form())
+    desk.presenter.check.advance()
     desk.presenter.on_disconnected()
-    assert "connection is gone" in desk.state.check.message.text
-    assert not desk.state.check.is_started
+    assert "connection is gone" in desk.presenter.check.state.message.text
+    assert not desk.presenter.check.state.is_started
 
 
 def test_a_port_can_be_that_of_gauge_2(desk: Desk) -> None:
-    desk.presenter.fill_second_port("COM8")
+    desk.presenter.ports.fill_second_port("COM8")
     assert desk.went == ["COM8"]

@@ -17,7 +17,7 @@ from analysis.gauge_health import HealthGrade, Symptom
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
-from app.presenters.gauges.port_probe import ProbePorts
+from app.presenters.gauges.ports import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import (
     CalibrationFit,
@@ -119,12 +119,10 @@ class Stage:
         self.connect()
         self.presenter.tick()
         self.presenter._update(
-            health=(health("Gauge 1", HealthGrade.DOUBTFUL), health("Gauge 2", HealthGrade.BAD)), ports=PORTS
+            health=(health("Gauge 1", HealthGrade.DOUBTFUL), health("Gauge 2", HealthGrade.BAD))
         )
-        made = replace(
-            self.presenter.state.calibration, points=READINGS, fit=FITTED, live_value="1000123", can_save=True
-        )
-        self.presenter._update(calibration=made)
+        self.presenter.ports._update(ports=PORTS)
+        self.presenter.calibration._update(points=READINGS, fit=FITTED, live_value="1000123", can_save=True)
 
 
 @pytest.fixture
@@ -171,7 +169,7 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     assert "not verified on hardware" in stage.words()
     stage.click("Use this port")
     assert PORTS[0].suggested_form in stage.went
-    stage.screen._ports._asks.click()
+    stage.screen._ports._query_silent.click()
     stage.click("Look at the ports")
     assert stage.prober.submitted[-1][1].query_silent
     stage.click("Stop looking")
@@ -180,8 +178,7 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
 
 def test_a_port_that_nobody_has_listened_to_says_so(stage: Stage) -> None:
     stage.presenter.set_tab(GaugesTab.PORTS)
-    stage.presenter.state = replace(stage.presenter.state, ports=(PortCard("COM3", "FTDI adapter"),))
-    stage.screen.show_state(stage.presenter.state)
+    stage.presenter.ports._update(ports=(PortCard("COM3", "FTDI adapter"),))
     assert "Not looked at yet" in stage.words()
     stage.fill()
     assert "Not looked at yet" not in stage.words()
@@ -210,7 +207,7 @@ def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:
     assert "connect the device first" in stage.words()
     stage.fill()
     assert "7.1" in stage.words()
-    assert stage.screen._calibrate._taking._table.rowCount() == 5
+    assert stage.screen._calibrate._readings._table.rowCount() == 5
     up, down = stage.screen._calibrate._plot._marks
     assert (len(up.points()), len(down.points())) == (3, 2)
 
@@ -220,7 +217,7 @@ def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
     stage.qtbot.keyClicks(stage.field("Calibrated by"), "A. Berger")
     stage.field("Its uncertainty, mm").setFocus()
     stage.qtbot.keyClicks(stage.field("Its uncertainty, mm"), "0.002")
-    form = stage.presenter.state.calibration.form
+    form = stage.presenter.calibration.state.form
     assert (form.calibrated_by, form.uncertainty_mm) == ("A. Berger", "0.002")
     assert not any(isinstance(task, FitCalibration) for _, task in stage.worker.submitted)
 
@@ -247,7 +244,7 @@ def test_a_check_is_led_through(stage: Stage) -> None:
     assert not stage.field("Known").isEnabled()
     stage.click("Break off")
     assert "nothing is kept" in stage.words()
-    stage.presenter._show_check(
+    stage.presenter.check._set_state(
         CheckState(
             outcome=Chip("Gauge 1 FAILED", Tone.BAD),
             values=(LabelledValue("known", "10 mm"),),

@@ -1,0 +1,106 @@
+"""Tasks of the tab Ports and devices, executed in its worker process, and the text about each port."""
+
+from dataclasses import replace
+from functools import partial
+
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.gauges.ports import ListPorts, ProbePorts
+from app.presenters.gauges.state import PortCard
+from app.presenters.number_text import with_unit
+from app.presenters.start.state import ConnectForm
+from app.presenters.worker import ReportProgress
+from drivers.port import PortInfo, list_ports
+from drivers.probe.host_checks import usb_chip_name
+from drivers.probe.recognition import Recognition
+from drivers.probe.report import PortReport, ProbeOutcome, probe_port
+from drivers.registry import PROTOCOLS
+from messages.i18n import N_, gettext, translate
+
+_OUTCOMES = {
+    ProbeOutcome.UNREADABLE: Chip(N_("something speaks that is not known"), Tone.WARN),
+    ProbeOutcome.SILENT: Chip(N_("silent"), Tone.PLAIN),
+    ProbeOutcome.IN_USE: Chip(N_("in use by another program"), Tone.WARN),
+    ProbeOutcome.UNAVAILABLE: Chip(N_("cannot be opened"), Tone.BAD),
+}
+
+
+def list_port_cards(_task: ListPorts, _report: ReportProgress) -> tuple[PortCard, ...]:
+    """List the ports of this computer without opening them."""
+    return tuple(listed_port(port) for port in list_ports())
+
+
+def probe_ports(task: ProbePorts, report: ReportProgress) -> tuple[PortCard, ...]:
+    """Probe one port after another."""
+    present = list_ports()
+    cards = []
+    for number, port in enumerate(present):
+        if port.device == task.connected:
+            cards.append(listed_port(port, Chip(gettext("connected here"), Tone.OK)))
+            continue
+        tell = partial(_report_step, report, port.device, number / len(present))
+        tell("looking")
+        cards.append(probed_port(probe_port(port, task.query_silent, tell)))
+    return tuple(cards)
+
+
+def _report_step(report: ReportProgress, device: str, fraction: float, step: str) -> None:
+    report(Progress(f"{device}: {step}", fraction))
+
+
+def listed_port(port: PortInfo, status: Chip = EMPTY_CHIP) -> PortCard:
+    """Card of a port that was not probed."""
+    known = usb_chip_name(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
+    usb = port.identity.removeprefix(port.device).strip()
+    return PortCard(port.device, ", ".join(part for part in (known, usb) if part), status)
+
+
+def probed_port(report: PortReport) -> PortCard:
+    """Card of a port that was probed."""
+    card = listed_port(report.port)
+    hints = tuple(translate(f"{hint.message}. {hint.remedy}") for hint in report.hints)
+    found = report.recognition
+    if found is None:
+        return PortCard(
+            card.url,
+            card.identity,
+            replace(_OUTCOMES[report.outcome], text=gettext(_OUTCOMES[report.outcome].text)),
+            (_in_window(report.message), *hints),
+        )
+    info = PROTOCOLS[found.protocol]
+    title = f"{info.title} at {report.line_settings}" if report.line_settings else info.title
+    remark = (_in_window(found.remark),) if found.remark else ()
+    return PortCard(
+        card.url,
+        card.identity,
+        Chip(title, Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
+        (f"{_signal(found)}; {translate(info.verified)}", *remark, *hints),
+        suggested_form(report, found),
+    )
+
+
+def suggested_form(report: PortReport, found: Recognition) -> ConnectForm:
+    """Form of Start that connects to the device; empty fields take the defaults of the protocol."""
+    line_settings = report.line_settings
+    usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
+    return ConnectForm(
+        port=report.port.device,
+        protocol=found.protocol,
+        baud="" if line_settings is None or line_settings.baud == usual else str(line_settings.baud),
+        rate_hz=found.rate_option,
+        parity="N" if line_settings is None else line_settings.parity,
+        settings=" ".join(f"{key}={value}" for key, value in found.settings.items()),
+    )
+
+
+def _signal(found: Recognition) -> str:
+    one = gettext("1 gauge, so choose the port of gauge 2 too")
+    gauges = one if found.channels == 1 else f"{found.channels} gauges"
+    return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
+
+
+def _in_window(text: str) -> str:
+    """Replace options of the command line by the controls of the window."""
+    asked = translate(text).replace(
+        "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"
+    )
+    return asked.replace("--set ", "device settings ")
