@@ -5,9 +5,10 @@ file changes. Here it is compiled anew when any file of the package changes that
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ParamSpec, TypeVar, cast
 
 from numba import njit
@@ -38,6 +39,38 @@ def compiled_part(function: Callable[Parameters, Result]) -> Callable[Parameters
 def compiled_sum(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Compile likewise a function of long sums, whose terms may be added in any order, several at once."""
     return _kept(function, {"_nrt": False, "fastmath": {"reassoc", "contract"}})
+
+
+def compile_with(
+    templates: Iterable[tuple[Callable[..., Any], Callable[..., Any]]], name: str, **replaced: object
+) -> dict[str, Any]:
+    """Compile functions of one module once more, with some of the names that they use replaced.
+
+    numba neither keeps functions that take functions on disk nor inlines their arguments. So code that is
+    common to several friction laws is written as templates, and each law has its own compiled copy.
+
+    Parameters
+    ----------
+    templates : iterable of (decorator, function)
+        Uncompiled functions with one of the decorators of this module, each before its callers.
+    name : str
+        Tells the copies apart on disk: an identifier.
+    **replaced
+        Compiled functions by the global name under which the templates call them.
+
+    Returns
+    -------
+    dict
+        The compiled functions, and everything else that the templates see, by name.
+    """
+    scope: dict[str, Any] = {}
+    for decorate, template in templates:
+        source = cast("FunctionType", template)
+        scope = scope or {**source.__globals__, **replaced}
+        function = FunctionType(source.__code__, scope, source.__name__, source.__defaults__)
+        function.__qualname__ = f"{name}_{source.__name__}"
+        scope[source.__name__] = decorate(function)
+    return scope
 
 
 def _kept(function: Callable[Parameters, Result], options: dict[str, Any]) -> Callable[Parameters, Result]:

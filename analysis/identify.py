@@ -4,16 +4,17 @@ from collections.abc import Callable
 
 from analysis.arrays import Floats
 from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess, initial_points
-from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.fitting.search import Fit, Search
-from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
+from analysis.fitting.search import Fit, Search, may_be_friction
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, ModelSelection, MonteCarlo
+from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, law_by_name, law_without
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
 from analysis.preparation.plausibility import check_friction, pullback_warnings
 from analysis.quantities import ResultWarning
-from analysis.record import AnalysisError, Record, RecordError
+from analysis.record import Record, RecordError
 from analysis.results.curves import fitted_curves, friction_curves, friction_objective, named_parameters
 from analysis.results.decay_constants import (
     DecayConstants,
@@ -38,7 +39,6 @@ from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstat
 from messages.message import message
 
 Progress = Callable[[float, str], None]
-_WITHOUT_STATIC = {FrictionLaw.STATIC: FrictionLaw.COULOMB, FrictionLaw.STATIC_TILT: FrictionLaw.COULOMB_TILT}
 
 
 def identify(
@@ -76,11 +76,12 @@ def identify(
         return _without_slip(record, decay, drawn=monte_carlo is not None)
     problem = build_problem(record, decay)
     search, widest = _searched(record, decay, problem, report)
-    report(0.6, "fitting " + ", ".join(law.value for law in models))
+    report(0.6, "fitting " + ", ".join(law.name for law in models))
     fits = _fits(search, models, widest)
-    if model == "auto" and _wants_stribeck(problem, decay, fits):
-        report(0.7, f"fitting {FrictionLaw.STRIBECK_TILT.value}")
-        fits.append(fit_stribeck(search, fits[-1]))
+    if model == "auto" and _wants_other_friction(problem, decay, fits):
+        for law in FALLBACK_LAWS:
+            report(0.7, f"fitting {law.name}")
+            fits.append(search.fit_fallback(law, fits[len(COMPARED_LAWS) - 1]))
     result = _result(record, decay, problem, fits, monte_carlo, report)
     if model != "auto":
         result.warnings.extend(_needless_static(search, fits[0], widest))
@@ -104,19 +105,19 @@ def _searched(
 
 
 def _fits(search: Search, models: tuple[FrictionLaw, ...], widest: list[Floats]) -> list[Fit]:
-    if models == (FrictionLaw.STRIBECK_TILT,):
-        return [fit_stribeck(search, search.fit(FrictionLaw.STATIC_TILT, widest))]
+    if models[0] in FALLBACK_LAWS:
+        return [search.fit_fallback(models[0], search.fit(WIDEST_LAW, widest))]
     return search.fit_all(models, widest)
 
 
-def _wants_stribeck(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
+def _wants_other_friction(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
     """Whether no law of `fits` explains the record, and another friction may be why."""
-    return not _judge(problem, decay, fits, fits).adequate and may_explain(problem, fits)
+    return not _judge(problem, decay, fits, fits).adequate and may_be_friction(problem, fits)
 
 
 def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[ResultWarning]:
     """Say so where the law that was asked for has an f_s that the record does not need."""
-    plain = _WITHOUT_STATIC.get(asked.law)
+    plain = law_without(asked.law, Parameter.FRICTION_STATIC)
     if plain is None or not asked.determines(Parameter.FRICTION_STATIC):
         return []
     without = search.fit(plain, [*starts, asked.parameters])
@@ -125,7 +126,7 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[R
     text = message(
         "the law {plain} explains the record as well (BIC {bic:.1f}, with f_s {bic_2:.1f}): f_s may"
         " be as small as f_d, outside its interval too.",
-        plain=plain.value,
+        plain=plain.name,
         bic=without.bic,
         bic_2=asked.bic,
     )
@@ -140,11 +141,7 @@ def _judge(problem: FitProblem, decay: FreeDecay, candidates: list[Fit], fits: l
 def _models(name: str) -> tuple[FrictionLaw, ...]:
     if name == "auto":
         return COMPARED_LAWS
-    try:
-        return (FrictionLaw(name),)
-    except ValueError:
-        allowed = ", ".join(("auto", *(model.value for model in FrictionLaw)))
-        raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed}.") from None
+    return (law_by_name(name),)
 
 
 def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identification:
@@ -233,7 +230,7 @@ def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelSele
 
 def _profiled(chosen: Fit, judged: ModelSelection) -> bool:
     """Whether intervals are worth following chi-square: with Stribeck friction that takes seconds."""
-    return judged.adequate or chosen.law is not FrictionLaw.STRIBECK_TILT
+    return judged.adequate or chosen.law.solver.is_closed_form
 
 
 def _refuted(warning: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:

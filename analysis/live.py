@@ -12,11 +12,12 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.averaging import average_record
 from analysis.damped_cosine import DampedCosine, refit_damped_cosine
-from analysis.fitting.fitted_motion import motion_phases
 from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess
-from analysis.fitting.models import COMPARED_LAWS, PARAMETER_COUNT, FrictionLaw, Parameter
-from analysis.fitting.problem import FitProblem
+from analysis.fitting.problem import FitProblem, motion_phases
 from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 from analysis.preparation.drift import remove_drift
 from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
@@ -197,7 +198,7 @@ def _known(
         now_s,
         to_record(fit.value(Parameter.RELEASE)),
         None if stuck_s is None else to_record(stuck_s),
-        fit.law.value,
+        fit.law.name,
         _friction(fit, fitted),
         period,
         damping,

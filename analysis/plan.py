@@ -13,9 +13,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.initial_guess import build_problem_from_channels
-from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, PARAMETER_COUNT, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit, fit_at_minimum
+from analysis.laws.catalogue import PARAMETER_COUNT, compared_law, default_point
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.preparation.channels import SAMPLES_MIN, Channel
@@ -109,9 +111,7 @@ class PlannedTest:
     def law(self) -> FrictionLaw:
         """The friction law that the parameters stand for."""
         static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
-        if self.parameters.tilt_rad:
-            return FrictionLaw.STATIC_TILT if static else FrictionLaw.COULOMB_TILT
-        return FrictionLaw.STATIC if static else FrictionLaw.COULOMB
+        return compared_law(static_friction=static, tilt=self.parameters.tilt_rad != 0.0)
 
     @property
     def period_s(self) -> float:
@@ -297,13 +297,12 @@ def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
 
 def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
     """The fit that finds the truth."""
-    point = np.zeros(PARAMETER_COUNT)
+    point = default_point()
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)
     if test.parameters.pullback_m < 0.0:
         motion[[Parameter.PULLBACK, Parameter.TILT]] *= -1.0
     point[: len(motion)] = motion
-    point[Parameter.STRIBECK_VELOCITY] = DEFAULT_STRIBECK_VELOCITY_M_PER_S
     return fit_at_minimum(problem, test.law, problem.minimise(point, test.law, 1))
 
 

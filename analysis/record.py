@@ -6,8 +6,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from messages.message import MessageError
 
-class AnalysisError(Exception):
+
+class AnalysisError(MessageError):
     """Root of the analysis errors. The message names the value, the fault and the remedy."""
 
 

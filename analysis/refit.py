@@ -14,15 +14,15 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.initial_guess import build_problem
-from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.search import Fit, fit_at_minimum
 from analysis.identification import Curves
+from analysis.laws.catalogue import OWN_PARAMETERS, law_by_name
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
 from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
 from analysis.results.curves import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
-
-_VELOCITY = "stribeck_velocity_m_per_s"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -83,13 +83,13 @@ class Refitter:
         AnalysisError
             An unknown model, a start without one of its parameters, or a parameter that cannot be held.
         """
-        law, point = _law(model), self._point(start)
+        law, point = law_by_name(model), self._point(start)
         held = None if hold is None else self._held(hold, law)
         minimum = self._problem.minimise(_zeroed(self._problem, point, law), law, steps_max, fixed=held)
         fit = fit_at_minimum(self._problem, law, minimum)
         named = named_parameters(fit.parameters, self._decay)
-        if law is FrictionLaw.STRIBECK_TILT:
-            named[_VELOCITY] = fit.value(Parameter.STRIBECK_VELOCITY)
+        for place, parameter in zip(law.own_places, law.own, strict=True):
+            named[parameter.name] = float(fit.parameters[place])
         return Refit(named, fit.chi_square, fit.rms_m, self._curves(fit), minimum.steps)
 
     def _curves(self, fit: Fit) -> Callable[[Floats], Curves]:
@@ -104,7 +104,8 @@ class Refitter:
         point = self._problem.prior_mean.copy()
         for place, name in PARAMETER_NAMES.items():
             point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)
-        point[Parameter.STRIBECK_VELOCITY] = start.get(_VELOCITY, DEFAULT_STRIBECK_VELOCITY_M_PER_S)
+        for own_place, own in enumerate(OWN_PARAMETERS, start=SHARED_PARAMETER_COUNT):
+            point[own_place] = start.get(own.name, own.default)
         point[Parameter.RELEASE] = self._decay.channels.from_record_time(np.array(start["release_s"]))
         return point
 
@@ -114,14 +115,6 @@ class Refitter:
         if name not in places:
             raise AnalysisError(f"{name!r} cannot be held. Choose one of {', '.join(places)}.")
         return places[name]
-
-
-def _law(name: str) -> FrictionLaw:
-    try:
-        return FrictionLaw(name)
-    except ValueError:
-        allowed_names = ", ".join(model.value for model in FrictionLaw)
-        raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed_names}.") from None
 
 
 def _zeroed(problem: FitProblem, point: Floats, law: FrictionLaw) -> Floats:

@@ -14,9 +14,9 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.damped_cosine import DampedCosine, damped_cosine
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
+from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 
 RELATIVE_REDUCTION_MIN = 0.05

@@ -8,7 +8,6 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
 from analysis.quantities import BudgetLine, BudgetSource, OtherLaw, Quantity, Source
@@ -76,7 +75,7 @@ def propagate_expected(problem: FitProblem, fit: Fit) -> ParameterUncertainty:
     return _propagate(problem, fit, [1.0] * len(_times(problem)))
 
 
-def white_noise_variance(problem: FitProblem, fit: Fit, place: Parameter) -> float:
+def white_noise_variance(problem: FitProblem, fit: Fit, place: int) -> float:
     """Variance of one fitted parameter by white noise of the stated size alone."""
     inverse, _ = covariance(fit.normal_matrix)
     known = problem.prior_deviation[fit.free]
@@ -103,7 +102,7 @@ def propagate_with_model_choice(
     for fit, share in zip(candidates, shares, strict=True):
         if fit is not chosen and share > _SHARE_MIN:
             noise = noise + share * (propagate(problem, fit, block_s).noise_covariance - own.noise_covariance)
-            columns[OtherLaw(fit.law.value)] = np.sqrt(share) * (fit.parameters - chosen.parameters)
+            columns[OtherLaw(fit.law.name)] = np.sqrt(share) * (fit.parameters - chosen.parameters)
     return ParameterUncertainty(columns, noise)
 
 

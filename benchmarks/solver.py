@@ -15,10 +15,10 @@ from functools import partial
 import numpy as np
 from reference_solvers import integrate_with_events, march_like_the_paper
 
-from analysis.motion import paper_method, stribeck
+from analysis.laws import stribeck
+from analysis.motion import paper_method
 from analysis.motion.events import integrate_events
 from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from config.files import load_stand, published_table
 
@@ -31,7 +31,8 @@ STRIBECK_VELOCITY_M_PER_S = 0.005
 START = """
 import time
 import numpy as np
-from analysis.motion import gradients, paper_method, phases, stribeck
+from analysis.laws import stribeck
+from analysis.motion import events, gradients, paper_method
 from analysis.motion.two_mass import TwoMassParameters
 
 parameters = TwoMassParameters(
@@ -41,7 +42,7 @@ parameters = TwoMassParameters(
 vector, times, stamps = parameters.vector(), np.linspace(0.0, 1.0, 9), [time.process_time()]
 parameters.simulate(1.0).sample(times)
 stamps.append(time.process_time())
-gradients.sample_with_gradient(vector, phases.walk(vector, 1.0), times, np.eye(10))
+gradients.sample_with_gradient(vector, events.integrate_events(vector, 1.0), times, np.eye(10))
 stamps.append(time.process_time())
 stribeck.simulate(parameters, stribeck_velocity_m_per_s=0.01, duration_s=1.0).sample(times)
 stamps.append(time.process_time())
@@ -116,8 +117,8 @@ def report_samples(p: TwoMassParameters) -> None:
         "u1, rel and 8 derivatives at 10,000 even times": lambda: slopes(EVEN),
         "u1, rel and 8 derivatives at 10,000 uneven times": lambda: slopes(UNEVEN),
         "u1, rel and 8 derivatives at 400 even times": lambda: slopes(FEW),
-        "Stribeck: u1, rel and 8 differences at 400 even times": lambda: sample_stribeck_with_gradient(
-            eleven, FEW, np.eye(11)[:8].copy()
+        "Stribeck: u1, rel and 8 differences at 400 even times": lambda: (
+            stribeck.STRIBECK_TILT.solver.kernels.sample_with_gradient(eleven, FEW, np.eye(11)[:8].copy())
         ),
     }
     print("| 1FFM0, 10 s, simulated and sampled | ms |")

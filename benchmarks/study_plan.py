@@ -62,7 +62,7 @@ def run(seed: int, whole: bool) -> Kept:
     if found is None or expected is None:
         return Kept(seed, law, agrees=found is None and expected is None)
     u = expected.standard_uncertainty
-    same = identified.model is not None and identified.model.name == test.law.value
+    same = identified.model is not None and identified.model.name == test.law.name
     off = (found.value - nominal.friction_dynamic) / u
     return Kept(seed, law, found.standard_uncertainty / u, off, same_law=same)
 

@@ -3,20 +3,22 @@
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.models import (
-    COMMON_PARAMETERS,
-    DEFAULT_STRIBECK_VELOCITY_M_PER_S,
-    PARAMETER_COUNT,
-    FrictionLaw,
-    Parameter,
-)
 from analysis.fitting.plate_path import PlatePathEstimate, estimate_from_plate_path
 from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.laws.catalogue import FIRST_SLIP_LAW, WIDEST_LAW, default_point
+from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
+from analysis.laws.stand import IDEAL_STAND
 from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.mounting import relative_to_table
 from analysis.record import GaugeUncertainty, Record
 
+_UNKNOWN = (
+    Parameter.FRICTION_DYNAMIC,
+    Parameter.FRICTION_STATIC,
+    Parameter.TILT,
+    *(place for part in IDEAL_STAND for place in part.free),
+)
 _TAIL_TRUST = 5.0
 """First estimates' uncertainties are widened so much when they guide the first steps."""
 _FRICTION_GUESS = 0.1
@@ -41,10 +43,9 @@ def build_problem_from_channels(
 ) -> FitProblem:
     """Readings of both gauges, turned so that the pullback is positive, with what `record` knows beside."""
     table, relative = channels
-    mean, deviation = np.zeros(PARAMETER_COUNT), np.zeros(PARAMETER_COUNT)
-    deviation[
-        [*COMMON_PARAMETERS, Parameter.FRICTION_STATIC, Parameter.TILT, Parameter.STRIBECK_VELOCITY]
-    ] = np.inf
+    mean = default_point()
+    deviation = np.zeros(len(mean))
+    deviation[[*_UNKNOWN, *range(SHARED_PARAMETER_COUNT, len(mean))]] = np.inf
     masses = record.masses
     mean[Parameter.TABLE_MASS], deviation[Parameter.TABLE_MASS] = (
         masses.table_mass_kg,
@@ -55,7 +56,6 @@ def build_problem_from_channels(
         masses.plate_mass_uncertainty_kg,
     )
     mean[Parameter.GRAVITY] = masses.gravity_m_per_s2
-    mean[Parameter.STRIBECK_VELOCITY] = DEFAULT_STRIBECK_VELOCITY_M_PER_S
     deviation[Parameter.TABLE_GAIN] = gain_uncertainty(record.table_gauge, range_m(table.value_m))
     if relative is not None:
         deviation[Parameter.RELATIVE_GAIN] = gain_uncertainty(
@@ -97,7 +97,7 @@ def initial_guess(problem: FitProblem, decay: FreeDecay) -> tuple[Floats, FitPro
     path = estimate_plate_path(decay, float(start[Parameter.GRAVITY]))
     start[Parameter.FRICTION_DYNAMIC] = _FRICTION_GUESS if path is None else max(path.friction, 0.01)
     start[Parameter.TILT] = 0.0 if path is None else path.tilt_rad
-    start = project_to_bounds(start, FrictionLaw.COULOMB_TILT)
+    start = project_to_bounds(start, FIRST_SLIP_LAW)
     return start, _with_estimates_as_priors(problem, start, decay, path)
 
 
@@ -202,9 +202,7 @@ def guess_release(
     window = guided.before(first_s + _WINDOW_PERIODS * period_s).decimated(_READINGS, np.inf)
     candidates = _candidates(window, start, period_s, pullback_m)
     best = candidates[np.argsort(window.chi_squares(candidates, fit_zero=True))[: 4 * _KEPT]]
-    refined = [
-        window.minimise(_with_fitted_zero(window, point), FrictionLaw.STATIC_TILT, 20) for point in best
-    ]
+    refined = [window.minimise(_with_fitted_zero(window, point), WIDEST_LAW, 20) for point in best]
     refined.sort(key=lambda minimum: minimum.cost)
     return [minimum.parameters for minimum in refined[:_KEPT]]
 
@@ -229,7 +227,7 @@ def _candidates(window: FitProblem, start: Floats, period_s: float, pullback_m: 
 
 def _with_fitted_zero(window: FitProblem, point: Floats) -> Floats:
     """The point with gauge 2's zero at its best."""
-    _, second = window.residuals(point, FrictionLaw.STATIC_TILT)
+    _, second = window.residuals(point, WIDEST_LAW)
     if not len(second):
         return point
     moved = point.copy()

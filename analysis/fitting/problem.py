@@ -1,4 +1,4 @@
-"""What is fitted to what: the readings of one test, their noise, and the motion that should explain them."""
+"""The least-squares problem of a record: readings, their noise, and what is known of the parameters."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -8,39 +8,32 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled_part
-from analysis.fitting.chi_square import GaugeReadings, chi_squares, chi_squares_with_fitted_zero
-from analysis.fitting.fitted_motion import sample_motion
-from analysis.fitting.gauss_newton import GaussNewton
 from analysis.fitting.least_squares import Minimum, QuadraticModel, minimise
-from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.laws.closed_form import (
+    GAUGE_1,
+    GAUGE_2,
+    GAUGE_2_BASE,
+    GaugeReadings,
+    chi_squares,
+    chi_squares_with_fitted_zero,
+)
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT, SHARED_PARAMETER_COUNT, Parameter
+from analysis.laws.solvers import Gauge
+from analysis.laws.stand import IDEAL_STAND, StandPart
+from analysis.motion.events import DURATION_MIN_S
 from analysis.preparation.channels import Channel
-from analysis.preparation.plausibility import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.record import RecordError
 
 _REACH_DEVIATIONS = 10.0
-"""Known parameters are not looked for farther from what is known of them."""
-_FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
-"""Of f_d, f_s. A fit may go beyond what is refused as its result, not beyond all reason."""
-_ANGULAR_MIN, _ANGULAR_MAX = 2.0 * math.pi / (3.0 * PERIOD_MAX_S), 2.0 * math.pi * 3.0 / PERIOD_MIN_S
-"""Of the joint motion (rad/s)."""
-_DAMPING_RATIO_MAX = 0.5
-"""Over the critical one."""
-_PULLBACK_MAX_M = TRAVEL_MAX_M
-_TILT_MAX = 1.0
-_VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0
-_DYNAMIC, _STATIC, _TILT = (
-    int(Parameter.FRICTION_DYNAMIC),
-    int(Parameter.FRICTION_STATIC),
-    int(Parameter.TILT),
-)
-_STIFFNESS, _DAMPING, _PULLBACK = int(Parameter.STIFFNESS), int(Parameter.DAMPING), int(Parameter.PULLBACK)
-_TABLE_MASS, _PLATE_MASS = int(Parameter.TABLE_MASS), int(Parameter.PLATE_MASS)
-_VELOCITY, _RELEASE = int(Parameter.STRIBECK_VELOCITY), int(Parameter.RELEASE)
+"""Known parameters are not fitted farther from what is known of them."""
+_GAUGE_2_PARAMETERS = frozenset((Parameter.RELATIVE_OFFSET, Parameter.RELATIVE_GAIN, Parameter.LAG))
+_RELEASE = int(Parameter.RELEASE)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitProblem:
-    """Readings, noise and prior knowledge.
+    """Readings, noise and prior knowledge; a friction law is given with each call.
 
     Attributes
     ----------
@@ -48,14 +41,16 @@ class FitProblem:
     relative : Channel or None
     noise_m : (float, float)
         Standard deviation of each channel's white noise.
-    prior_mean, prior_deviation : (16,) float64
+    prior_mean, prior_deviation : (p,) float64
         What is known of each parameter beforehand; a deviation of 0 fixes it, inf leaves it open.
-    absolute : bool
+    gauge_2_absolute : bool
         Gauge 2 measures the plate against the base.
     earliest_release_s : float
         The release is not looked for before, nor after the last reading.
+    stand : tuple of StandPart
+        Suspension, release and gauges, which every law is composed with.
     readings : tuple
-        Arrays for the compiled evaluations, see `analysis.fitting.chi_square`.
+        Arrays for the compiled evaluations, see `analysis.laws.closed_form`.
     """
 
     table: Channel
@@ -65,14 +60,17 @@ class FitProblem:
     prior_deviation: Floats
     gauge_2_absolute: bool = False
     earliest_release_s: float = -math.inf
+    stand: tuple[StandPart, ...] = IDEAL_STAND
     readings: GaugeReadings = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         table, relative = self.table, self.relative or Channel(np.empty(0), np.empty(0))
-        gauges = table.time_s, table.value_m, relative.time_s, relative.value_m
-        object.__setattr__(
-            self, "readings", (*gauges, np.array(self.noise_m), 2 if self.gauge_2_absolute else 1)
-        )
+        channels = table.time_s, table.value_m, relative.time_s, relative.value_m
+        object.__setattr__(self, "readings", (*channels, np.array(self.noise_m), self._second_gauge))
+
+    @property
+    def _second_gauge(self) -> int:
+        return GAUGE_2_BASE if self.gauge_2_absolute else GAUGE_2
 
     @property
     def sample_count(self) -> int:
@@ -101,90 +99,117 @@ class FitProblem:
             relative=None if self.relative is None else self.relative.between(-np.inf, end_s),
         )
 
+    def model_parameters(self, law: FrictionLaw) -> set[int]:
+        """Places that law and stand leave free, without those fitted only because they are uncertain."""
+        return {*law.free_parameters, *(int(place) for part in self.stand for place in part.free)}
+
     def free_parameters(self, law: FrictionLaw) -> Indices:
-        """Places of the free parameters of `model`, calibration and masses with an uncertainty included."""
+        """Free places, masses and gauges with a known uncertainty included; those of the motion first."""
         known = self.prior_deviation
         informed = np.flatnonzero((known > 0.0) & np.isfinite(known))
-        free = set(law.free_parameters) | set(informed.tolist())
+        free = self.model_parameters(law) | set(informed.tolist())
         if self.relative is None:
-            free -= {Parameter.RELATIVE_OFFSET, Parameter.RELATIVE_GAIN, Parameter.LAG}
-        return np.array(sorted(free), dtype=np.int64)
+            free -= _GAUGE_2_PARAMETERS
+        return np.array(sorted(free, key=lambda place: (not _moves(place), place)), dtype=np.int64)
 
     def residuals(self, parameters: Floats, law: FrictionLaw) -> tuple[Floats, Floats]:
         """Reading minus curve of each channel (m); the second is empty without gauge 2."""
         table = self.table.value_m - predict_gauge_1(parameters, self.table.time_s, law)
         if self.relative is None:
             return table, np.empty(0)
-        return table, self.relative.value_m - predict_gauge_2(
-            parameters, self.relative.time_s, law, self.gauge_2_absolute
-        )
+        expected = predict_gauge_2(parameters, self.relative.time_s, law, self.gauge_2_absolute)
+        return table, self.relative.value_m - expected
+
+    def chi_square(self, parameters: Floats, law: FrictionLaw) -> float:
+        """Chi-square of the readings alone, without priors."""
+        table, relative = self.residuals(parameters, law)
+        return float(table @ table / self.noise_m[0] ** 2 + relative @ relative / self.noise_m[1] ** 2)
 
     def chi_squares(self, points: Floats, *, fit_zero: bool = False) -> Floats:
-        """Chi-square of points (m, 16) without the priors' terms; gauge 2's zero at its best if `zero_open`.
-
-        Stribeck friction is not for searching: f_s of `points` is that of laws without it.
-        """
+        """Chi-square of points (m, p) of laws in closed form; gauge 2's zero at its best if `fit_zero`."""
         return (chi_squares_with_fitted_zero if fit_zero else chi_squares)(points, self.readings)
 
     def quadratic_model(self, parameters: Floats, law: FrictionLaw, free: Indices) -> QuadraticModel:
-        """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
-        return self._gauss_newton(law, free).evaluate(parameters)
+        """Chi-square with priors, its descent and its Gauss-Newton curvature over the `free` parameters."""
+        return GaussNewton(self, law, free).evaluate(parameters)
 
     def normal_equations(self, parameters: Floats, law: FrictionLaw, free: Indices) -> list[Floats]:
-        """Normal matrix, descent (last column) and cost (corner) of each gauge over `free`."""
-        return self._gauss_newton(law, free).normal_equations(parameters)
+        """Normal matrix, descent (last column) and chi-square (corner) of each gauge over `free`."""
+        return GaussNewton(self, law, free).normal_equations(parameters)
 
     def minimise(
-        self, start: Floats, law: FrictionLaw, steps_max: int = 30, *, fixed: Parameter | None = None
+        self, start: Floats, law: FrictionLaw, steps_max: int = 30, *, fixed: int | None = None
     ) -> Minimum:
-        """Refine `start` for `model`, one parameter `held` where it is."""
+        """Refine `start` for `law`, one parameter `fixed` where it is."""
         free = self.free_parameters(law)
         free = free if fixed is None else free[free != fixed]
-        has_static, has_tilt = law.has_static_friction, law.has_tilt
         if not len(self.table) or (self.relative is not None and not len(self.relative)):
             raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
         earliest_s, latest_s = self.earliest_release_s, float(self.table.time_s[-1])
 
         def project(parameters: Floats) -> Floats:
-            near = parameters.copy()
-            near[_RELEASE] = min(max(near[_RELEASE], earliest_s), latest_s)
-            _apply_prior_bounds(near, free, self.prior_mean, self.prior_deviation)
-            _apply_bounds(near, has_static, has_tilt)
-            return near
+            point = parameters.copy()
+            point[_RELEASE] = min(max(point[_RELEASE], earliest_s), latest_s)
+            _apply_prior_bounds(point, free, self.prior_mean, self.prior_deviation)
+            _apply_bounds(point, law, self.stand)
+            return point
 
-        return minimise(self._gauss_newton(law, free).evaluate, project, start, free, steps_max)
+        return minimise(GaussNewton(self, law, free).evaluate, project, start, free, steps_max)
 
-    def _gauss_newton(self, law: FrictionLaw, free: Indices) -> GaussNewton:
-        prior = self.prior_mean, self.prior_deviation
-        return GaussNewton.build(
-            (self.table, self.relative), self.noise_m, prior, (law, free, self.gauge_2_absolute)
+    def gauges(self) -> list[Gauge]:
+        """Readings of each gauge as the solvers take them."""
+        gauges = [(self.table.time_s, self.table.value_m, GAUGE_1, self.noise_m[0])]
+        if self.relative is not None:
+            second = self.relative
+            gauges.append((second.time_s, second.value_m, self._second_gauge, self.noise_m[1]))
+        return gauges
+
+
+class GaussNewton:
+    """Chi-square of a law over its free parameters, with its derivatives, at as many points as wanted."""
+
+    def __init__(self, problem: FitProblem, law: FrictionLaw, free: Indices) -> None:
+        self.law, self._gauges, self._free = law, problem.gauges(), free
+        self._directions = law.directions(
+            np.array([place for place in free if _moves(place)], dtype=np.int64)
         )
+        deviation = problem.prior_deviation[free]
+        informed = (deviation > 0.0) & np.isfinite(deviation)
+        self._mean = problem.prior_mean[free]
+        self._weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
+        self._prior_normal = np.diag(self._weight)
+
+    def evaluate(self, point: Floats) -> QuadraticModel:
+        """Chi-square at `point` (p,), priors included, its descent and its curvature."""
+        systems = self.normal_equations(point)
+        system = systems[0] if len(systems) == 1 else systems[0] + systems[1]
+        last, away = len(self._free), self._mean - point[self._free]
+        pull = self._weight * away
+        cost = float(system[last, last]) + float(pull @ away)
+        return QuadraticModel(cost, system[:last, last] + pull, system[:last, :last] + self._prior_normal)
+
+    def normal_equations(self, point: Floats) -> list[Floats]:
+        """Normal equations of each gauge, priors aside."""
+        solver, vector = self.law.solver, self.law.vector(point)
+        return solver.normal_equations(point, vector, self._free, self._directions, self._gauges)
 
 
 def project_to_bounds(parameters: Floats, law: FrictionLaw) -> Floats:
-    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none."""
+    """Return the nearest vector that law and stand allow: f_d > 0, f_s >= f_d, no tilt where it has none."""
     point = parameters.copy()
-    _apply_bounds(point, law.has_static_friction, law.has_tilt)
+    _apply_bounds(point, law, IDEAL_STAND)
     return point
 
 
-@compiled_part
-def _apply_bounds(point: Floats, has_static: bool, has_tilt: bool) -> None:
-    """Move `point` to the nearest that a law allows.
+def _apply_bounds(point: Floats, law: FrictionLaw, stand: tuple[StandPart, ...]) -> None:
+    law.apply_bounds(point)
+    for part in stand:
+        part.apply_bounds(point)
 
-    A table that does not swing (damping near critical) is no stand, and no motion of the kernels. What is
-    far beyond any stand's only costs time: a fit without hope goes there, and its motions have no end.
-    """
-    point[_DYNAMIC] = min(max(point[_DYNAMIC], _FRICTION_MIN), _FRICTION_MAX)
-    static = min(max(point[_STATIC], point[_DYNAMIC]), _FRICTION_MAX)
-    point[_STATIC] = static if has_static else point[_DYNAMIC]
-    mass = point[_TABLE_MASS] + point[_PLATE_MASS]
-    point[_STIFFNESS] = min(max(point[_STIFFNESS], mass * _ANGULAR_MIN**2), mass * _ANGULAR_MAX**2)
-    critical = 2.0 * math.sqrt(point[_STIFFNESS] * point[_TABLE_MASS])
-    point[_DAMPING] = min(max(point[_DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
-    point[_PULLBACK] = min(max(point[_PULLBACK], -_PULLBACK_MAX_M), _PULLBACK_MAX_M)
-    point[_VELOCITY] = min(max(point[_VELOCITY], _VELOCITY_MIN), _VELOCITY_MAX)
-    point[_TILT] = min(max(point[_TILT], -_TILT_MAX), _TILT_MAX) if has_tilt else 0.0
+
+def _moves(place: int) -> bool:
+    """Whether a parameter moves the motion: all do but those of the gauges."""
+    return place < MOTION_PARAMETER_COUNT or place >= SHARED_PARAMETER_COUNT
 
 
 @compiled_part
@@ -195,6 +220,17 @@ def _apply_prior_bounds(point: Floats, free: Indices, mean: Floats, deviation: F
         if deviation[place] < math.inf:
             reach = _REACH_DEVIATIONS * deviation[place]
             point[place] = min(max(point[place], mean[place] - reach), mean[place] + reach)
+
+
+def sample_motion(parameters: Floats, time_s: Floats, law: FrictionLaw) -> Floats:
+    """Displacements (2, n) of the table, and of the plate against it, at rising `time_s`."""
+    duration_s = max(DURATION_MIN_S, float(time_s[-1]) - float(parameters[Parameter.RELEASE]))
+    return law.solver.displacements(law.vector(parameters), time_s, duration_s)
+
+
+def motion_phases(parameters: Floats, law: FrictionLaw, duration_s: float) -> Floats:
+    """Phases (m, 5) from release: start, sign of slip (0 stick), and u1, u1', u2 - u1 there."""
+    return law.solver.phases(law.vector(parameters), max(DURATION_MIN_S, duration_s))
 
 
 def predict_gauge_1(parameters: Floats, time_s: Floats, law: FrictionLaw) -> Floats:

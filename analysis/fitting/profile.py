@@ -7,9 +7,9 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
+from analysis.laws.law import FrictionLaw
 
 CHI_SQUARE_RISE_95 = 3.841458820694124
 """Rise of chi-square at the ends of a 95 % interval."""
@@ -59,14 +59,14 @@ class Profile:
 
     problem: FitProblem
     law: FrictionLaw
-    parameter: Parameter
+    parameter: int
     parameters: Floats
     follow: Floats
     deviation: float
     white: float
 
     @classmethod
-    def from_fit(cls, problem: FitProblem, fit: Fit, parameter: Parameter, white: float) -> Self:
+    def from_fit(cls, problem: FitProblem, fit: Fit, parameter: int, white: float) -> Self:
         """Profile about a fit, the noise's variance being `white` times that stated."""
         still = np.where(np.isinf(problem.prior_deviation), np.inf, 0.0)
         fixed = replace(problem, prior_mean=fit.parameters, prior_deviation=still)

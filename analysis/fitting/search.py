@@ -6,8 +6,10 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import Minimum, covariance
-from analysis.fitting.models import FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.laws.catalogue import FIRST_SLIP_LAW, WIDEST_LAW
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
 
 _FEW = 500
 """Readings a channel for searching: the shape of chi-square needs no more, ..."""
@@ -34,6 +36,11 @@ _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
 """Each about twice as long as the one before: few new minima at a time."""
 _KEPT = 4
 """Minima that are followed from one window to the next."""
+_FALLBACK_KEPT, _FALLBACK_STEPS = 3, 10
+"""Start points and steps of an integrated law, whose steps take a hundred times as long as in closed form."""
+_MISFIT_MAX = 0.1
+"""Residual over range of gauge 1 above which it is not friction that is wrong: f_s of three times f_d that
+falls with speed leaves 0.014 at most with a law of constant f_d."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,7 +116,7 @@ class Search:
     def fit_first_slip(self, start: Floats) -> Floats:
         """Refine `start` on the first slip after the release, where chi-square has one minimum."""
         first = self.window(float(start[Parameter.RELEASE]) + _FIRST_WINDOW_PERIODS * self.period_s)
-        return first.minimise(start, FrictionLaw.COULOMB_TILT, 25).parameters
+        return first.minimise(start, FIRST_SLIP_LAW, 25).parameters
 
     def find_minima(self, points: list[Floats]) -> list[Floats]:
         """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time.
@@ -123,8 +130,7 @@ class Search:
             window = self.window(begin + periods * self.period_s)
             lines = [(point, _static_friction_grid(point)) for point in points]
             minima = [
-                window.minimise(point, FrictionLaw.STATIC_TILT, 12)
-                for point in _scan_static_friction(window, lines)
+                window.minimise(point, WIDEST_LAW, 12) for point in _scan_static_friction(window, lines)
             ]
             points = [minimum.parameters for minimum in _distinct(minima)]
         return points
@@ -152,6 +158,15 @@ class Search:
         if law.has_static_friction and not last.converged:
             last = _cross_jumps(self.problem, law, last)
         return fit_at_minimum(self.problem, law, last)
+
+    def fit_fallback(self, law: FrictionLaw, simpler: Fit) -> Fit:
+        """Fit a law that is too slow for a search, from its start points about the fit of a simpler law."""
+        some = self.window(np.inf)
+        starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
+        starts.sort(key=lambda point: some.chi_square(point, law))
+        rough = [some.minimise(point, law, _FALLBACK_STEPS) for point in starts[:_FALLBACK_KEPT]]
+        best = min(rough, key=lambda minimum: minimum.cost)
+        return fit_at_minimum(self.problem, law, self.problem.minimise(best.parameters, law, _FALLBACK_STEPS))
 
     def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
@@ -184,13 +199,18 @@ class Search:
         return [minimum for minimum in fine if minimum.cost <= fine[0].cost + _TIE][:_KEPT]
 
 
+def may_be_friction(problem: FitProblem, fits: list[Fit]) -> bool:
+    """Whether the best of `fits` is so near the record that another friction law may explain the rest."""
+    rms_m = min(fit.rms_m for fit in fits)
+    return rms_m < _MISFIT_MAX * float(np.ptp(problem.table.value_m))
+
+
 def fit_at_minimum(problem: FitProblem, law: FrictionLaw, minimum: Minimum) -> Fit:
     """Describe a minimum."""
     table, relative = problem.residuals(minimum.parameters, law)
-    chi_square = float(
-        table @ table / problem.noise_m[0] ** 2 + relative @ relative / problem.noise_m[1] ** 2
-    )
-    bic = chi_square + len(law.free_parameters) * float(np.log(problem.sample_count))
+    weights = np.square(problem.noise_m)
+    chi_square = float(table @ table / weights[0] + relative @ relative / weights[1])
+    bic = chi_square + len(problem.model_parameters(law)) * float(np.log(problem.sample_count))
     free = problem.free_parameters(law)
     return Fit(law, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
 

@@ -27,6 +27,7 @@ from analysis.compiled import compiled, compiled_part
     PLATE_MASS,
     GRAVITY,
 ) = range(10)
+PARAMETER_COUNT = 10
 
 # Columns of the phase table: start (s since release), sign of the slip (0 stick), and the state there.
 START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)

@@ -4,17 +4,13 @@ import numpy as np
 
 from analysis.damped_cosine import dominant_period
 from analysis.formatting import format_length, format_number
+from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.preparation.channels import Channel
 from analysis.preparation.release import Release
 from analysis.quantities import ResultWarning
 from analysis.record import RecordError
 from messages.message import message
 
-PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
-"""Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
-FRICTION_MAX = 2.0
-"""No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
-TRAVEL_MAX_M = 0.5
 _LENGTH_MIN_S = 1e-3
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0

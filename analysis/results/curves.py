@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.models import Parameter
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2, project_to_bounds
 from analysis.fitting.search import Fit
 from analysis.identification import Curves
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 
 PARAMETER_NAMES = {

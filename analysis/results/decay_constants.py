@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.damped_cosine import DampedCosine, damped_cosine
-from analysis.fitting.models import Parameter
 from analysis.fitting.search import Fit
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
 from analysis.record import Record

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.fitted_motion import motion_phases
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import FrictionLaw, Parameter
-from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.fitting.problem import FitProblem, motion_phases, project_to_bounds
 from analysis.fitting.search import Fit
 from analysis.identification import Events
+from analysis.laws.catalogue import compared_law
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.results.static_bounds import largest_static_friction
 
@@ -121,7 +122,7 @@ def _slips_on(chosen: Fit, end_s: float, period_s: float) -> bool:
 
 def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float) -> SlipEnd:
     """Widen by the ends of slip of every f_s that the record allows above f_d, to which the law ties it."""
-    law = FrictionLaw.STATIC_TILT if chosen.law.has_tilt else FrictionLaw.STATIC
+    law = compared_law(static_friction=True, tilt=chosen.law.has_tilt)
     points = np.tile(chosen.parameters, (_DRAWS, 1))
     points[:, Parameter.FRICTION_STATIC] = np.linspace(
         chosen.value(Parameter.FRICTION_DYNAMIC), largest, _DRAWS

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.fitted_motion import fitted_peak_rates, residual_displacement
 from analysis.fitting.initial_guess import nonlinearity_slope_error, range_m
-from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import Profile
 from analysis.fitting.search import Fit
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
 from analysis.record import AnalysisError, Record
@@ -91,25 +91,29 @@ def add_fitted_quantities(
 
     Intervals of f_d and f_s follow chi-square itself where `profiled`.
     """
-    for place, name, unit in _PARAMETERS:
-        if place in fit.law.free_parameters and fit.determines(place):
+    own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
+    of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
+    for place, name, unit in (*_FRICTION, *of_law, *_STAND):
+        if fit.determines(place):
             sign = decay.sign if place in (Parameter.TILT, Parameter.PULLBACK) else 1
             weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
             shares, reach = fitted.contributions(weights), None
-            if profiled and fit.law.has_static_friction and place in _BENT:
+            if profiled and fit.law.has_static_friction and place in _PROFILED:
                 shares, reach = _by_profile(problem, fit, place, shares)
             budget.add(name, sign * fit.value(place), unit, shares, reach)
     if ended:
         _add_residual_displacement(record, decay, fit, fitted, budget)
     duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
-    _add_functions(budget, fit, fitted, _RATES, lambda p: fitted_peak_rates(p, fit.law, duration))
+    _add_functions(
+        budget, fit, fitted, _RATES, lambda p: fit.law.solver.peak_rates(fit.law.vector(p), duration)
+    )
     velocity = budget.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
 
 
 def _by_profile(
-    problem: FitProblem, fit: Fit, place: Parameter, shares: dict[Source, float]
+    problem: FitProblem, fit: Fit, place: int, shares: dict[Source, float]
 ) -> tuple[dict[Source, float], tuple[float, float] | None]:
     """Shares of the uncertainty, and the reach of the 95 % interval, by the shape of chi-square itself.
 
@@ -152,7 +156,8 @@ def _add_residual_displacement(
     duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
 
     def end(parameters: Floats) -> float:
-        return float(residual_displacement(project_to_bounds(parameters, fit.law), fit.law, duration))
+        vector = fit.law.vector(project_to_bounds(parameters, fit.law))
+        return fit.law.solver.final_relative(vector, duration)
 
     value, shares = end(fit.parameters), fitted.contributions(numerical_gradient(end, fit.parameters))
     if (
@@ -194,14 +199,12 @@ def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
     return column
 
 
-_PARAMETERS = (
+_FRICTION = (
     (Parameter.FRICTION_DYNAMIC, "friction_dynamic", "1"),
     (Parameter.FRICTION_STATIC, "friction_static", "1"),
-    (Parameter.STRIBECK_VELOCITY, "stribeck_velocity_m_per_s", "m/s"),
-    (Parameter.TILT, "tilt_rad", "rad"),
-    (Parameter.PULLBACK, "pullback_m", "m"),
 )
-_BENT = (Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC)
+_STAND = ((Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m"))
+_PROFILED = (Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC)
 """Parameters about which chi-square may have kinks."""
 _RATES = (
     ("table_velocity_max_m_per_s", "m/s"),

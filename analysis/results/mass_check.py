@@ -12,10 +12,11 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.fitting.initial_guess import build_problem, initial_guess
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.formatting import format_number
+from analysis.laws.catalogue import COMPARED_LAWS, WIDEST_LAW
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
@@ -95,8 +96,7 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
         search, (point,) = _search(record, decay, float(np.exp(logarithm)))
         end_s = float(point[Parameter.RELEASE]) + _WINDOW_PERIODS * decay.period_s
         window = search.window(end_s)
-        law = FrictionLaw.STATIC_TILT
-        return fit_at_minimum(window, law, window.minimise(point, law)).chi_square
+        return fit_at_minimum(window, WIDEST_LAW, window.minimise(point, WIDEST_LAW)).chi_square
 
     logarithms = np.log(_factors(record.masses))
     at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)

@@ -14,10 +14,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.damped_cosine import DampedCosine, refit_damped_cosine
-from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
 from analysis.fitting.search import Fit
 from analysis.identification import MonteCarlo
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 from analysis.quantities import Quantity
 from analysis.record import Record, StandMasses

@@ -3,11 +3,12 @@
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.fitted_motion import static_friction_bounds
-from analysis.fitting.models import PARAMETER_COUNT, FrictionLaw, Parameter
-from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.fitting.problem import FitProblem, motion_phases, project_to_bounds
 from analysis.fitting.profile import CHI_SQUARE_RISE_95
 from analysis.fitting.search import Fit
+from analysis.laws.catalogue import PARAMETER_COUNT, compared_law
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource
 from analysis.record import Record
@@ -51,7 +52,7 @@ def add_static_friction_bounds(
         return
 
     def bounds(parameters: Floats) -> Floats:
-        return static_friction_bounds(project_to_bounds(parameters, chosen.law), chosen.law, duration_s)
+        return _bounds_of_motion(project_to_bounds(parameters, chosen.law), chosen.law, duration_s)
 
     values, slopes = bounds(chosen.parameters), numerical_gradient(bounds, chosen.parameters)
     for name, value, weights in zip((LOWER, UPPER), values, slopes, strict=True):
@@ -93,7 +94,7 @@ def largest_static_friction(
 
     `chosen` ties f_s to f_d; one of `candidates` may have found a lower minimum with a free f_s.
     """
-    law = FrictionLaw.STATIC_TILT if chosen.law.has_tilt else FrictionLaw.STATIC
+    law = compared_law(static_friction=True, tilt=chosen.law.has_tilt)
     some = problem.decimated(_READINGS, decay.dense_until_s)
     starts = [chosen.parameters, *(fit.parameters for fit in candidates if fit.law is law)]
     best = min((some.minimise(start, law, 2 * _STEPS) for start in starts), key=lambda found: found.cost)
@@ -146,3 +147,37 @@ def _unseen_slip_m(record: Record, decay: FreeDecay) -> float:
     rest = decay.relative.between(decay.release.time_s + 0.5 * decay.period_s, np.inf).value_m
     uncertainty = decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest)))
     return _SLIP_DOUBT * (abs(float(rest.mean() - held.mean())) + 2.0 * uncertainty)
+
+
+def _bounds_of_motion(parameters: Floats, law: FrictionLaw, duration_s: float) -> Floats:
+    """Least and largest f_s that leave the motion as it is, (2,); both f_s where a stick ends in slip."""
+    phases = motion_phases(parameters, law, duration_s)
+    stick = phases[:, 1] == 0.0
+    if (stick[:-1] & ~stick[1:]).any():
+        return np.array([parameters[Parameter.FRICTION_STATIC], parameters[Parameter.FRICTION_STATIC]])
+    demands = _demand(parameters, phases[:, 2], phases[:, 3])
+    upper = float(demands[~stick].min()) if (~stick).any() else np.inf
+    lower = _largest_demand(parameters, phases[-1]) if stick[-1] else np.nan
+    return np.array([lower, upper])
+
+
+def _demand(parameters: Floats, position: Floats, velocity: Floats) -> Floats:
+    """|u1'' - g alpha| / g of the joint motion: the f_s that it takes to stick."""
+    _, _, stiffness, damping, _, tilt, _, table_mass, plate_mass, gravity = parameters[
+        :MOTION_PARAMETER_COUNT
+    ]
+    acceleration = -(damping * velocity + stiffness * position) / (table_mass + plate_mass)
+    return np.asarray(np.abs(acceleration / gravity - tilt))
+
+
+def _largest_demand(parameters: Floats, phase: Floats) -> float:
+    """Largest demand during a last stick."""
+    mass = float(parameters[Parameter.TABLE_MASS] + parameters[Parameter.PLATE_MASS])
+    n = float(parameters[Parameter.DAMPING]) / (2.0 * mass)
+    w = float(np.sqrt(parameters[Parameter.STIFFNESS] / mass - n * n))
+    tau = np.linspace(0.0, 2.0 * np.pi / w, 2000)
+    a, b = phase[2], (phase[3] + n * phase[2]) / w
+    decay, cosine, sine = np.exp(-n * tau), np.cos(w * tau), np.sin(w * tau)
+    position = decay * (a * cosine + b * sine)
+    velocity = decay * ((w * b - n * a) * cosine - (w * a + n * b) * sine)
+    return float(_demand(parameters, position, velocity).max())

@@ -4,11 +4,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.damped_cosine import envelope_curvature
-from analysis.fitting.models import Parameter
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
 from analysis.formatting import format_length
 from analysis.identification import FittedModel, ModelSelection
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.noise import NOISE_FLOOR_M
 from analysis.quantities import BudgetSource, ResultWarning
@@ -34,7 +34,7 @@ def identifiable_fits(fits: list[Fit]) -> list[Fit]:
     candidates = [fit for fit in fits if not fit.law.has_tilt or fit.determines(Parameter.TILT)]
     if not candidates:
         raise RecordError(
-            f"{fits[0].law.value} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            f"{fits[0].law.name} cannot be identified: the plate slips one way only, so that tilt_rad and"
             " friction_dynamic act alike. Choose a model without tilt."
         )
     return candidates
@@ -61,10 +61,10 @@ def assess_model(
     ):
         if len(residual):
             adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
-    tried = tuple(FittedModel(f.law.value, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
-    return ModelSelection(chosen.law.value, bool(adequate), chosen.rms_m, noise, tried)
+    return ModelSelection(chosen.law.name, bool(adequate), chosen.rms_m, noise, tried)
 
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:

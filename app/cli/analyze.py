@@ -119,12 +119,12 @@ def _request(
     model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
 ) -> "AnalysisRequest":
     """What was asked for, refused before any run is read where it cannot be."""
-    from analysis.fitting.models import FrictionLaw
+    from analysis.laws.catalogue import LAWS
     from app.runs.analyze import REFITS_MAX, REFITS_MIN, AnalysisRequest
 
     positive("--table-mass", table_mass)
     positive("--plate-mass", plate_mass)
-    models = ("auto", *(law.value for law in FrictionLaw))
+    models = ("auto", *(law.name for law in LAWS))
     if model not in models:
         raise CommandError(f"--model {model!r} is not known. Use {', '.join(models)}")
     if kind == "one-mass":

@@ -41,7 +41,7 @@ def plan_document(test: PlannedTest) -> Document:
     found, parts = plan(test), uncertainty_parts(test)
     motion = found.motion
     return {
-        "law": found.law.value,
+        "law": found.law.name,
         "rate_hz": test.rate_hz,
         "duration_s": test.duration_s,
         "noise_m": test.noise_m,

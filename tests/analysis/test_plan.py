@@ -53,7 +53,7 @@ def test_expected_uncertainty_is_that_which_tests_report(repeats):
         one.results["friction_dynamic"].standard_uncertainty for one in found if one.model.name == law
     ]
 
-    assert test.law.value == law
+    assert test.law.name == law
     assert len(reported) > 0.8 * RECORDS
     assert np.median(reported) == pytest.approx(friction(test), rel=0.05)
 

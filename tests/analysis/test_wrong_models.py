@@ -7,7 +7,7 @@ import pytest
 from synthetic import Truth, simulate_readings, simulate_record
 
 from analysis.identify import identify
-from analysis.motion import stribeck
+from analysis.laws import stribeck
 from analysis.record import Record, StandMasses
 
 MASSES = StandMasses(131.6, 22.4)

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.identification import Identification
+from analysis.laws.catalogue import law_with_own_parameters
 from analysis.motion.motion import Motion, MotionSamples
-from analysis.motion.stribeck import simulate as simulate_stribeck
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.quantities import Quantity
 from analysis.record import Record
@@ -94,10 +94,9 @@ def _fitted_motion(record: Record, found: Identification) -> Motion | None:
     parameters = dict(found.parameters)
     duration_s = float(record.time_s[-1]) - parameters.pop("release_s")
     of_motion = TwoMassParameters(**parameters)
-    speed = found.results.get("stribeck_velocity_m_per_s")
-    if speed is None:
-        return of_motion.simulate(duration_s)
-    return simulate_stribeck(of_motion, stribeck_velocity_m_per_s=speed.value, duration_s=duration_s)
+    law = law_with_own_parameters(found.results)
+    own = [found.results[parameter.name].value for parameter in law.own]
+    return law.solver.simulate(of_motion, own, duration_s)
 
 
 def _times(motion: Motion, first_s: float, last_s: float, period_s: float) -> Floats:

@@ -9,9 +9,11 @@ from synthetic import Truth, simulate_readings, simulate_record
 
 from analysis.fitting.initial_guess import build_problem, initial_guess
 from analysis.fitting.least_squares import QuadraticModel, covariance, levenberg_marquardt_step, minimise
-from analysis.fitting.models import FrictionLaw, Parameter
 from analysis.fitting.plate_path import estimate_from_plate_path
 from analysis.fitting.problem import predict_gauge_1, predict_gauge_2, project_to_bounds
+from analysis.laws.catalogue import LAWS, WIDEST_LAW, default_point
+from analysis.laws.coulomb import COULOMB
+from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel, read_channels
 from analysis.preparation.cleaning import remove_invalid_readings
 from analysis.preparation.free_decay import prepare
@@ -22,9 +24,8 @@ MASSES = StandMasses(131.6, 22.4)
 
 
 def true_point(truth, time_s=1.0):
-    point = np.zeros(len(Parameter))
+    point = default_point()
     point[:10] = truth.parameters().vector(time_s + truth.release_phase / truth.rate_hz)
-    point[Parameter.STRIBECK_VELOCITY] = 0.01
     point[Parameter.TABLE_OFFSET], point[Parameter.RELATIVE_OFFSET] = truth.offsets_m
     return point
 
@@ -65,7 +66,7 @@ def test_no_slip_leaves_no_parabola():
     assert path is None
 
 
-@pytest.mark.parametrize("model", list(FrictionLaw), ids=lambda model: model.value)
+@pytest.mark.parametrize("model", LAWS, ids=lambda model: model.name)
 def test_the_quadratic_is_that_of_the_objective(model):
     """Descent against central differences of chi-square, at a point off the minimum."""
     truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=250.0, duration_s=3.0)
@@ -97,7 +98,7 @@ def test_costs_of_many_points_are_those_of_each():
     costs = made.chi_squares(points)
 
     for point, cost in zip(points, costs, strict=True):
-        table, relative = made.residuals(point, FrictionLaw.STATIC_TILT)
+        table, relative = made.residuals(point, WIDEST_LAW)
         expected = np.sum(table**2) / made.noise_m[0] ** 2 + np.sum(relative**2) / made.noise_m[1] ** 2
         assert cost == pytest.approx(expected, rel=1e-9)
     assert made.chi_squares(points, fit_zero=True)[0] <= costs[0]
@@ -109,8 +110,8 @@ def test_gauges_read_zeros_gains_and_lag():
     point = true_point(truth)
     point[Parameter.TABLE_GAIN], point[Parameter.RELATIVE_GAIN], point[Parameter.LAG] = 0.01, -0.02, 2e-4
 
-    assert predict_gauge_1(point, time, FrictionLaw.COULOMB) == pytest.approx(table, abs=1e-12)
-    assert predict_gauge_2(point, time, FrictionLaw.COULOMB, False) == pytest.approx(relative, abs=1e-12)
+    assert predict_gauge_1(point, time, COULOMB) == pytest.approx(table, abs=1e-12)
+    assert predict_gauge_2(point, time, COULOMB, False) == pytest.approx(relative, abs=1e-12)
 
 
 def test_the_first_guess_is_near_without_any_hint():
@@ -156,12 +157,10 @@ def test_a_direction_without_effect_is_not_stepped_in():
     assert promise == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    "model", [FrictionLaw.COULOMB, FrictionLaw.STATIC_TILT], ids=lambda model: model.value
-)
+@pytest.mark.parametrize("model", [COULOMB, WIDEST_LAW], ids=lambda model: model.name)
 def test_the_minimum_is_that_of_scipy(model):
     truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=250.0, duration_s=3.0)
-    if model is FrictionLaw.COULOMB:
+    if model is COULOMB:
         truth = truth.replace(friction_static=None, tilt_rad=0.0)
     made = problem(truth)
     start = project_to_bounds(true_point(truth), model)
@@ -191,7 +190,7 @@ def test_no_fit_leaves_what_stands_can_be():
         start[:7] *= 10.0 ** rng.uniform(-9.0, 9.0, 7)
         start[:7] *= rng.choice([-1.0, 1.0], 7)
 
-        found = made.minimise(start, FrictionLaw.STATIC_TILT, 15).parameters
+        found = made.minimise(start, WIDEST_LAW, 15).parameters
 
         joint_kg = found[Parameter.TABLE_MASS] + found[Parameter.PLATE_MASS]
         assert 0.01 <= 2.0 * np.pi * np.sqrt(joint_kg / found[Parameter.STIFFNESS]) * (1.0 + 1e-12) <= 30.1
@@ -211,11 +210,11 @@ def test_moments_of_phases_are_sums_over_readings(same_times, absolute):
     made = replace(made, relative=relative, gauge_2_absolute=absolute)
     point = true_point(truth)
     point[[Parameter.TABLE_GAIN, Parameter.RELATIVE_GAIN, Parameter.LAG]] = 2e-3, -1e-3, 3e-4
-    free = made.free_parameters(FrictionLaw.STATIC_TILT)
+    free = made.free_parameters(WIDEST_LAW)
 
-    systems = made.normal_equations(point, FrictionLaw.STATIC_TILT, free)
+    systems = made.normal_equations(point, WIDEST_LAW, free)
 
-    residuals = made.residuals(point, FrictionLaw.STATIC_TILT)
+    residuals = made.residuals(point, WIDEST_LAW)
     for gauge, (residual, noise) in enumerate(zip(residuals, made.noise_m, strict=True)):
         rows = [-_slope(made, point, place, gauge) / noise for place in free] + [residual / noise]
         expected = np.array(rows) @ np.array(rows).T
@@ -231,7 +230,7 @@ def _slope(made, point, place, gauge):
     for side in (1.0, -1.0):
         moved = point.copy()
         moved[place] += side * step
-        residuals.append(made.residuals(moved, FrictionLaw.STATIC_TILT)[gauge])
+        residuals.append(made.residuals(moved, WIDEST_LAW)[gauge])
     return (residuals[0] - residuals[1]) / (2.0 * step)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from random_stands import KINDS, heavy, ordinary, slippery
 
-from analysis.fitting.models import MOTION_PARAMETER_COUNT
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT
 from analysis.motion.events import (
     FRICTION_DYNAMIC,
     FRICTION_STATIC,

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 from random_stands import KINDS, ordinary
 
-from analysis.fitting.models import MOTION_PARAMETER_COUNT
-from analysis.motion import stribeck
+from analysis.laws import stribeck
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT
 from analysis.motion.events import FRICTION_STATIC, integrate_events
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError
-from analysis.motion.stribeck_integration import STRIBECK
-from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from benchmarks.reference_solvers import integrate_with_events
 
+KERNELS = stribeck.STRIBECK_TILT.solver.kernels
 COULOMB = TwoMassParameters.from_free_decay(
     period_s=0.32,
     damping_n1_per_s=0.12,
@@ -105,7 +104,7 @@ def test_differences_are_the_exact_derivatives_where_both_exist():
     places = np.eye(MOTION_PARAMETER_COUNT + 1)[:MOTION_PARAMETER_COUNT].copy()
     # f_s is held to f_d, for the Stribeck surplus would otherwise change with f_d.
     places[0, FRICTION_STATIC] = 1.0
-    motion, gradient = sample_stribeck_with_gradient(np.append(vector, 0.005), times, places)
+    motion, gradient = KERNELS.sample_with_gradient(np.append(vector, 0.005), times, places)
     for place in range(MOTION_PARAMETER_COUNT):
         if place != FRICTION_STATIC:
             size = np.abs(exact[place]).max()
@@ -116,9 +115,9 @@ def test_differences_are_the_exact_derivatives_where_both_exist():
 def test_differences_along_the_stribeck_velocity():
     times, step = np.linspace(0.0, 2.0, 201), 2e-6
     direction = np.zeros((1, MOTION_PARAMETER_COUNT + 1))
-    direction[0, STRIBECK] = 1.0
+    direction[0, MOTION_PARAMETER_COUNT] = 1.0
     vector = np.append(STRIBECK_STAND.vector(), 0.005)
-    _, gradient = sample_stribeck_with_gradient(vector, times, direction)
+    _, gradient = KERNELS.sample_with_gradient(vector, times, direction)
     sides = [
         stribeck.simulate(STRIBECK_STAND, stribeck_velocity_m_per_s=0.005 + side * step, duration_s=2.0)
         for side in (1.0, -1.0)

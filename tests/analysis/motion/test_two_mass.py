@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stands import KINDS, ordinary
 
+from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.motion.events import (
     DAMPING,
     FRICTION_DYNAMIC,
@@ -21,13 +22,12 @@ from analysis.motion.events import (
 )
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError, MotionSamples
-from analysis.motion.stribeck_integration import integrate_stribeck
-from analysis.motion.stribeck_sampling import sample_stribeck
 from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
 from benchmarks.reference_solvers import integrate_with_events
 
 # Made independently of this project and handed over with the task; times and displacements to 1e-12.
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "two_mass.json").read_text())
+KERNELS = STRIBECK_TILT.solver.kernels
 PARAMETERS = tuple(TwoMassParameters.__dataclass_fields__)
 FIRST = TwoMassParameters(**{name: GOLDEN[0][name] for name in PARAMETERS})
 
@@ -321,7 +321,7 @@ def test_kernels_end_on_parameters_that_no_stand_can_have():
         assert len(phases) >= 1
         sample_with_gradient(parameters, phases, times, np.eye(10))
         if number % 10 == 0:
-            sample_stribeck(vector, *integrate_stribeck(vector, 3.0), times, 6)
+            KERNELS.sample(vector, *KERNELS.integrate(vector, 3.0), times, 6)
 
 
 def test_walks_over_far_too_long_a_time_are_bounded():
@@ -330,7 +330,7 @@ def test_walks_over_far_too_long_a_time_are_bounded():
     vector[[FRICTION_DYNAMIC, FRICTION_STATIC, STIFFNESS, DAMPING]] = 1e-4, 1e-4, 1e12, 0.0
 
     phases = integrate_events(vector[:10].copy(), 1e6)
-    stribeck_phases, nodes = integrate_stribeck(vector, 1e6)
+    stribeck_phases, nodes = KERNELS.integrate(vector, 1e6)
 
     assert len(phases) == PHASE_LIMIT
     assert len(stribeck_phases) <= PHASE_LIMIT

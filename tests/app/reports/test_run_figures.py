@@ -8,7 +8,7 @@ from reports_kit import truth_of
 
 from analysis.identification import Events, Identification
 from analysis.identify import identify
-from analysis.motion.stribeck import simulate as simulate_stribeck
+from analysis.laws.stribeck import simulate as simulate_stribeck
 from analysis.quantities import Quantity
 from analysis.synthetic import simulate_record
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData

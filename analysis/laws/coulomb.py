@@ -1,0 +1,8 @@
+"""Coulomb friction: f_d while the plate slides and f_s = f_d while it sticks."""
+
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
+from analysis.laws.solvers import CLOSED_FORM
+
+COULOMB = FrictionLaw("coulomb", "f_s = f_d on a level plane", CLOSED_FORM)
+COULOMB_TILT = FrictionLaw("coulomb+tilt", "f_s = f_d on a tilted plane", CLOSED_FORM, (Parameter.TILT,))
