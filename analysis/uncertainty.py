@@ -10,6 +10,8 @@ from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.parameters import Parameter
 from analysis.quantities import BudgetLine, BudgetSource, OtherLaw, Quantity, Source
 from analysis.record import Record
 
