@@ -150,7 +150,7 @@ class WindowPresenter(Presenter[WindowState]):
     def show_screen(self, screen: Screen) -> None:
         """Show another screen; recording goes on meanwhile."""
         if screen is Screen.RUNS:
-            self.runs.enter()
+            self.runs.refresh()
         elif screen is Screen.CAMPAIGN:
             self.campaign.enter()
         self._show(screen)

@@ -1,18 +1,18 @@
-"""The analyses that were asked for on the Runs screen: done by a worker of their own, beside all else."""
+"""Queue of analyses of the Runs screen, executed by a worker of their own."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.presenters.base import Progress
 from app.presenters.batch_text import batch_progress, run_count_text
-from app.presenters.runs.analysis_tasks import ANALYSING, AnalyseRuns, RunAnalysed, analyse_runs
+from app.presenters.runs.tasks import ANALYSE_RUNS, ANALYSING, AnalyseRuns, RunAnalysed
 from app.presenters.worker import TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
 @dataclass(slots=True)
 class AnalysisSummary:
-    """What became of the runs so far."""
+    """Outcome of the analyses so far."""
 
     analysed: list[str] = field(default_factory=list)
     up_to_date: list[str] = field(default_factory=list)
@@ -21,18 +21,18 @@ class AnalysisSummary:
 
     @property
     def done(self) -> tuple[str, ...]:
-        """Runs whose result is kept in them."""
+        """Runs with an up-to-date saved result."""
         return (*self.analysed, *self.up_to_date)
 
-    def add(self, came: RunAnalysed) -> None:
-        """Add what became of a run."""
-        if came.fault:
-            self.faults.append(came.fault)
+    def add(self, run: RunAnalysed) -> None:
+        """Add the outcome of one run."""
+        if run.fault:
+            self.faults.append(run.fault)
         else:
-            (self.up_to_date if came.is_up_to_date else self.analysed).append(came.path)
+            (self.up_to_date if run.is_up_to_date else self.analysed).append(run.path)
 
     def text(self) -> str:
-        """What was done, in a sentence."""
+        """Sentence about the outcome."""
         count = len(self.up_to_date)
         if count and not self.analysed and not self.cancelled:
             return ngettext(
@@ -50,12 +50,12 @@ class AnalysisSummary:
 
 
 class AnalysisQueue:
-    """Asks the worker, and keeps account until nothing is left to do.
+    """Submits analyses, and collects their outcome until all are done.
 
     Parameters
     ----------
     worker : Worker
-        Its own one, so that the table, previews and edits wait for no analysis. Closed by `close`.
+        Used for analyses only: table, previews and edits do not wait for them. Closed by `close`.
     """
 
     def __init__(self, worker: Worker) -> None:
@@ -64,52 +64,52 @@ class AnalysisQueue:
         self._summary = AnalysisSummary()
         self.progress: Progress | None = None
 
-    def submit(self, paths: tuple[str, ...], *, anew: bool) -> None:
-        """Have runs analysed, those aside that wait for it already."""
-        waiting = {path for task in self._pending if task.reanalyse or not anew for path in task.paths}
+    def submit(self, paths: tuple[str, ...], *, reanalyse: bool) -> None:
+        """Submit runs, apart from those that are queued already."""
+        waiting = {path for task in self._pending if task.reanalyse or not reanalyse for path in task.paths}
         new = tuple(path for path in paths if path not in waiting)
         if not new:
             return
         if not self._pending:
             self._summary = AnalysisSummary()
-            batch_progress(self._take_progress, ANALYSING, new)(0.0, "")
-        task = AnalyseRuns(new, anew)
+            batch_progress(self._set_progress, ANALYSING, new)(0.0, "")
+        task = AnalyseRuns(new, reanalyse)
         self._pending.append(task)
-        self._worker.submit(analyse_runs, task)
+        self._worker.submit(ANALYSE_RUNS, task)
 
     def poll(self) -> AnalysisSummary | None:
-        """Take in what has come; the account once all is done, else None."""
-        ended = [self._on_event(news) for news in self._worker.poll() if news.argument in self._pending]
+        """Process the events of the worker; the summary once all analyses are done, else None."""
+        ended = [self._on_event(event) for event in self._worker.poll() if event.argument in self._pending]
         return self._ended() if any(ended) and not self._pending else None
 
     def cancel(self) -> AnalysisSummary:
-        """Give up what is not done."""
+        """Cancel what is not done."""
         self.poll()
         self._summary.cancelled = bool(self._pending)
         self._pending.clear()
         self._worker.cancel()
-        self._worker.poll()  # that it was given up
+        self._worker.poll()  # discards the event of the cancellation
         return self._ended()
 
     def close(self) -> None:
         """End the worker."""
         self._worker.close()
 
-    def _on_event(self, news: WorkerEvent) -> bool:
-        """Take in what has come; tell whether that ends a task."""
-        if isinstance(news, TaskProgress):
-            if isinstance(news.progress, RunAnalysed):
-                self._summary.add(news.progress)
+    def _on_event(self, event: WorkerEvent) -> bool:
+        """Process an event; True if it ends a task."""
+        if isinstance(event, TaskProgress):
+            if isinstance(event.progress, RunAnalysed):
+                self._summary.add(event.progress)
             else:
-                self._take_progress(news.progress)
+                self._set_progress(event.progress)
             return False
-        self._pending.remove(news.argument)
-        if isinstance(news, TaskFailed):
-            first = Path(news.argument.paths[0]).name
-            self._summary.faults.append(f"{first}: {news.message}" if _is_one(news) else news.message)
+        self._pending.remove(event.argument)
+        if isinstance(event, TaskFailed):
+            first = Path(event.argument.paths[0]).name
+            self._summary.faults.append(f"{first}: {event.message}" if _is_one(event) else event.message)
         return True
 
-    def _take_progress(self, progress: Progress) -> None:
+    def _set_progress(self, progress: Progress) -> None:
         self.progress = progress
 
     def _ended(self) -> AnalysisSummary:
@@ -117,5 +117,5 @@ class AnalysisQueue:
         return self._summary
 
 
-def _is_one(news: TaskFailed) -> bool:
-    return len(news.argument.paths) == 1
+def _is_one(event: TaskFailed) -> bool:
+    return len(event.argument.paths) == 1

@@ -1,9 +1,8 @@
-"""What becomes of the selected runs for other programs: format, content, place, and how it will look."""
+"""Presenter of the export dialog: format, content and target, with a preview."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
@@ -30,7 +29,7 @@ _ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
 
 @dataclass(frozen=True, slots=True)
 class ExportState:
-    """The dialog. `contents` are those that the format can hold; `output` is a file or, as told, a folder."""
+    """State of the dialog. The format offers `contents`; `output` is a file, or a folder if `is_folder`."""
 
     runs: tuple[str, ...] = ()
     format: str = "csv"
@@ -45,49 +44,30 @@ class ExportState:
     details: tuple[str, ...] = ()
 
 
-class ExportEvents(Protocol):
-    """What the dialog tells its presenter."""
-
-    def set_format(self, name: str) -> None:
-        """One of `FORMATS`."""
-
-    def set_content(self, name: str) -> None:
-        """One of the contents of the format."""
-
-    def set_output(self, path: str) -> None:
-        """Where it goes."""
-
-    def set_replace(self, allowed: bool) -> None:
-        """Whether files that are there already may be replaced."""
-
-    def export(self) -> None:
-        """Do it."""
-
-
 class ExportPresenter(Presenter[ExportState]):
     """Exports runs.
 
     Parameters
     ----------
     submit : callable
-        Gives a task to the worker of the Runs screen, which hands the answers to `show_preview` and `done`.
+        Submits a task; its result comes to `on_preview`, `on_done` or `on_failed`.
     """
 
     def __init__(self, submit: Callable[[PreviewExport | ExportRuns], None]) -> None:
         super().__init__(ExportState())
         self._submit = submit
         self._folder = Path()
-        self._is_own_place = False
+        self._is_output_typed = False
 
     def open(self, runs: tuple[str, ...], folder: str) -> None:
-        """These runs of a folder are to be exported; choices of the last time stay."""
+        """Open the dialog for runs of a folder; the last choices stay."""
         self._folder = Path(folder)
-        self._is_own_place = False
+        self._is_output_typed = False
         self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None)
         self._propose()
 
     def set_format(self, name: str) -> None:
-        """One of `FORMATS`; what it cannot hold is not offered."""
+        """Choose one of `FORMATS`; contents that it does not support are not offered."""
         contents = tuple(
             content
             for content in CONTENTS
@@ -99,21 +79,21 @@ class ExportPresenter(Presenter[ExportState]):
         self._propose()
 
     def set_content(self, name: str) -> None:
-        """One of the contents of the format."""
+        """Choose one of the contents of the format."""
         self._update(content=name, message=EMPTY_CHIP)
         self._propose()
 
     def set_output(self, path: str) -> None:
-        """Where it goes; a place of the operator's own is not proposed anew."""
-        self._is_own_place = True
+        """Set the target; one that the operator typed is kept when other choices change."""
+        self._is_output_typed = True
         self._update(output=path)
 
     def set_replace(self, allowed: bool) -> None:
-        """Whether files that are there already may be replaced."""
+        """Allow existing files to be replaced."""
         self._update(replace=allowed)
 
     def export(self) -> None:
-        """Do it, or say what is missing."""
+        """Export, or say what is missing."""
         state = self.state
         if not state.output.strip():
             missing = (
@@ -127,50 +107,48 @@ class ExportPresenter(Presenter[ExportState]):
             self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
             self._submit(ExportRuns(state.runs, output, state.format, state.content, state.replace))
 
-    # --- what the worker says ---
-
     def on_progress(self, progress: Progress) -> None:
-        """It goes on."""
+        """Show the progress of the export."""
         self._update(progress=progress)
 
     def on_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
-        """Show how it will look, unless something else was chosen meanwhile."""
+        """Show a preview, unless the choices have changed since."""
         if task == self._preview_task():
             self._update(preview=preview.text)
 
     def on_done(self, outcome: BatchOutcome) -> None:
-        """Say what was written, and what could not be."""
+        """Show which files were written, and what failed."""
         files = dict.fromkeys(outcome.done)
-        said = (
+        text = (
             gettext("Wrote {files}", files=_files(list(files))) if files else gettext("Nothing was written")
         )
         if outcome.faults:
             failed, all_runs = len(outcome.faults), len(self.state.runs)
-            said += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
+            text += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
-        self._update(progress=None, message=Chip(said, tone), details=outcome.faults)
+        self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
 
     def on_failed(self, message: str) -> None:
-        """Nothing could be written."""
-        told = (
+        """Show why nothing was written."""
+        text = (
             sentence(message)
             .replace("--force", gettext("Replace existing files"))
             .replace("-o", gettext("place"))
         )
-        self._update(progress=None, message=Chip(told, Tone.BAD))
+        self._update(progress=None, message=Chip(text, Tone.BAD))
 
     def _propose(self) -> None:
-        """Offer a place for what was chosen, and ask how it will look."""
+        """Propose a target, and request a preview."""
         state = self.state
         if not state.runs:
             return
         is_table = state.content == "coefficients"
         is_folder = not is_table and len(state.runs) > 1
-        if not self._is_own_place or is_folder != state.is_folder:
+        if not self._is_output_typed or is_folder != state.is_folder:
             suffix = _SUFFIXES.get(state.format, f".{state.format}")
             stem = "coefficients" if is_table and len(state.runs) > 1 else Path(state.runs[0]).stem
             name = "exported" if is_folder else stem + suffix
-            self._is_own_place = False
+            self._is_output_typed = False
             self._update(output=str(self._folder / name))
         self._update(is_folder=is_folder, preview="")
         self._submit(self._preview_task())

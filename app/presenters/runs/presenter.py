@@ -1,4 +1,4 @@
-"""What the Runs screen does: the library listed, filtered and sorted, and work on the selected runs."""
+"""Presenter of the Runs screen: lists, filters and sorts runs, and works on the selected ones."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,22 +9,25 @@ from app.presenters.results import sentence
 from app.presenters.runs.analysis_queue import AnalysisQueue, AnalysisSummary
 from app.presenters.runs.export_presenter import ExportPresenter
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.import_tasks import ImportFile, ImportTask, PreviewImport, SurveyFile
-from app.presenters.runs.run_list import RunList
 from app.presenters.runs.state import Column, Overlay, RunFilter, RunsState
+from app.presenters.runs.table import RunList
 from app.presenters.runs.tasks import (
+    EXECUTE,
     BatchOutcome,
     CopyRuns,
     EditRuns,
     ExportRuns,
+    ImportFile,
+    ImportTask,
     ListRuns,
     LoadOverlay,
     PreviewExport,
+    PreviewImport,
     RestoreRuns,
     RunsTask,
+    SurveyFile,
     TrashRuns,
     UndoEdits,
-    execute,
 )
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
@@ -37,20 +40,20 @@ RUN_SUFFIX = ".h5"
 
 
 class RunsPresenter(Presenter[RunsState]):
-    """The library.
+    """Runs of a folder.
 
     Parameters
     ----------
     worker : Worker
-        Its own one: a long analysis elsewhere does not keep the table waiting. Closed by `close`.
-    analyst : Worker
-        Does the analyses, which everything else does not wait for; closed as well.
+        Used by this screen only. Closed by `close`.
+    analysis_worker : Worker
+        Used for analyses only. Closed by `close`.
     folder : str
-        Whose runs are shown at first.
+        Folder at first.
     all_series : tuple of str
         Series codes of the stand.
     author : str
-        Who edits.
+        Recorded with each edit.
     open_run : callable
         Shows a run on Identify.
     """
@@ -58,7 +61,7 @@ class RunsPresenter(Presenter[RunsState]):
     def __init__(
         self,
         worker: Worker,
-        analyst: Worker,
+        analysis_worker: Worker,
         folder: str,
         all_series: tuple[str, ...],
         author: str,
@@ -72,24 +75,18 @@ class RunsPresenter(Presenter[RunsState]):
         self._open_run = open_run
         self._library = RunList()
         self._undos = UndoStack()
-        self._analyses = AnalysisQueue(analyst)
+        self._analyses = AnalysisQueue(analysis_worker)
         self._progress: Progress | None = None
         self._is_listing = False
 
-    # --- what the operator does ---
-
-    def enter(self) -> None:
-        """The screen is shown: what was recorded meanwhile belongs into the table."""
-        self.refresh()
-
     def refresh(self) -> None:
-        """Look into the folder again."""
+        """List the folder again."""
         if not self._is_listing:
             self._is_listing = True
             self._submit(ListRuns(self.state.folder))
 
     def set_author(self, name: str) -> None:
-        """Who edits from now on."""
+        """Set the author of later edits."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
@@ -102,19 +99,19 @@ class RunsPresenter(Presenter[RunsState]):
         )  # fmt: skip
         self.refresh()
 
-    def set_filter(self, wanted: RunFilter) -> None:
-        """Show only these runs."""
-        self._update(filter=wanted)
+    def set_filter(self, run_filter: RunFilter) -> None:
+        """Filter the table."""
+        self._update(filter=run_filter)
         self._show_rows()
 
     def sort_by(self, column: Column) -> None:
-        """Sort by a column; by the same again, the other way round."""
+        """Sort by a column; a second time in the opposite order."""
         again = column is self.state.sorted_by
         self._update(sorted_by=column, descending=not self.state.descending if again else False)
         self._show_rows()
 
     def select(self, paths: tuple[str, ...]) -> None:
-        """These runs are selected: preview them, and show what can be edited of them."""
+        """Select runs: preview them, and show their editable metadata."""
         if paths == self.state.selected:
             return
         self._update(selected=paths, metadata=self._library.metadata(paths))
@@ -131,7 +128,7 @@ class RunsPresenter(Presenter[RunsState]):
             self._open_run(self.state.selected[0])
 
     def edit(self, field: str, text: str) -> None:
-        """Give a field a new value in all selected runs; what cannot be is said and leaves all as it was."""
+        """Set a field in all selected runs; an invalid text changes nothing."""
         before = self.state.metadata
         paths = self._readable()
         if before is None or not paths or (text == getattr(before, field) and field not in before.mixed):
@@ -141,43 +138,43 @@ class RunsPresenter(Presenter[RunsState]):
         except ValueError as error:
             self._set_message(Chip(str(error), Tone.BAD))
             self._update(metadata=None)
-            self._update(metadata=before)  # writes the old text back into the field
+            self._update(metadata=before)  # restores the old text in the view
             return
         self._submit(EditRuns(paths, field, value, self._author))
 
     def undo(self) -> None:
-        """Take back the last edit, or bring back what was put into the trash."""
+        """Undo the last edit or move to the trash."""
         task = self._undos.pop()
         if task is not None:
             self._submit(task)
 
     def trash(self) -> None:
-        """Put the selected runs aside; nothing is ever deleted."""
+        """Move the selected runs to the trash; nothing is deleted."""
         if self.state.selected:
             self._submit(TrashRuns(self.state.selected))
 
-    def analyse(self, *, anew: bool = False) -> None:
-        """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
+    def analyse(self, *, reanalyse: bool = False) -> None:
+        """Analyse the selected runs and save the results; `reanalyse` includes up-to-date ones."""
         self._set_message(EMPTY_CHIP)
-        self._analyses.submit(self._readable(), anew=anew)
+        self._analyses.submit(self._readable(), reanalyse=reanalyse)
         self._show_progress()
 
     def open_export(self) -> bool:
-        """Make the export dialog ready for the selected runs; False where none can be exported."""
+        """Prepare the export dialog for the selected runs; False if none can be exported."""
         runs = self._readable()
         if runs:
             self.export_dialog.open(runs, self.state.folder)
         return bool(runs)
 
     def cancel(self) -> None:
-        """Give up the work whose progress is shown; what is done stays."""
+        """Cancel the work whose progress is shown; what is done stays."""
         if self._analyses.progress is None:
             self._worker.cancel()
         else:
             self._on_analyses_ended(self._analyses.cancel())
 
     def add_files(self, paths: tuple[str, ...]) -> bool:
-        """Run files are copied into the folder; True where others wait to be imported."""
+        """Copy run files into the folder, queue others for import; True if there are any to import."""
         runs = tuple(path for path in paths if path.lower().endswith(RUN_SUFFIX))
         if runs:
             self._submit(CopyRuns(runs, self.state.folder))
@@ -186,35 +183,31 @@ class RunsPresenter(Presenter[RunsState]):
             self.import_dialog.open(others, self.state.folder, self._author)
         return bool(others)
 
-    # --- what time brings ---
-
     def tick(self) -> None:
-        """Take in what the workers have said."""
-        for news in self._worker.poll():
-            self._on_event(news)
-        account = self._analyses.poll()
-        if account is None:
+        """Process the events of the workers."""
+        for event in self._worker.poll():
+            self._on_event(event)
+        summary = self._analyses.poll()
+        if summary is None:
             self._show_progress()
         else:
-            self._on_analyses_ended(account)
+            self._on_analyses_ended(summary)
 
     def close(self) -> None:
         """End the workers."""
         self._worker.close()
         self._analyses.close()
 
-    # --- inside ---
-
     def _submit(self, task: RunsTask) -> None:
-        self._worker.submit(execute, task)
+        self._worker.submit(EXECUTE, task)
 
-    def _on_event(self, news: WorkerEvent) -> None:
-        if isinstance(news, TaskProgress):
-            self._on_progress(news.argument, news.progress)
-        elif isinstance(news, TaskFailed):
-            self._on_failed(news.argument, news.message)
+    def _on_event(self, event: WorkerEvent) -> None:
+        if isinstance(event, TaskProgress):
+            self._on_progress(event.argument, event.progress)
+        elif isinstance(event, TaskFailed):
+            self._on_failed(event.argument, event.message)
         else:
-            self._on_done(news)
+            self._on_done(event)
 
     def _on_progress(self, task: RunsTask, progress: Progress) -> None:
         if isinstance(task, ExportRuns):
@@ -236,8 +229,8 @@ class RunsPresenter(Presenter[RunsState]):
         if message != CANCELLED:
             self._set_message(Chip(sentence(message), Tone.BAD))
 
-    def _on_done(self, news: TaskDone[Any]) -> None:
-        task, answer = news.argument, news.answer
+    def _on_done(self, event: TaskDone[Any]) -> None:
+        task, answer = event.argument, event.answer
         if not isinstance(task, ExportRuns | PreviewExport | ImportTask):
             self._progress = None
         match task:
@@ -268,7 +261,7 @@ class RunsPresenter(Presenter[RunsState]):
         self._show_rows()
 
     def _show_rows(self) -> None:
-        """Show what is wanted of what is known; what is selected stays so as far as it is still there."""
+        """Filter and sort again; runs that are still shown stay selected."""
         state = self.state
         rows = self._library.rows(state.filter, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
@@ -283,17 +276,17 @@ class RunsPresenter(Presenter[RunsState]):
         self._show_outcome(outcome.done, outcome.faults, words)
         self.refresh()
 
-    def _on_analyses_ended(self, account: AnalysisSummary) -> None:
+    def _on_analyses_ended(self, summary: AnalysisSummary) -> None:
         self._show_progress()
-        self._show_outcome(account.done, tuple(account.faults), account.text())
+        self._show_outcome(summary.done, tuple(summary.faults), summary.text())
         self.refresh()
 
     def _show_progress(self) -> None:
-        """Analyses are what one waits for; how far other work is shows without them."""
+        """Show the progress of the analyses, else that of other work."""
         self._update(progress=self._analyses.progress or self._progress)
 
     def _show_outcome(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
-        """Say what came of the work, and of each run that it failed for."""
+        """Show the outcome of work, with a line for each fault."""
         self._set_message(outcome_chip(words, done, faults), faults)
 
     def _set_message(self, message: Chip, details: tuple[str, ...] = ()) -> None:

@@ -1,8 +1,7 @@
-"""What the Runs screen shows, as values."""
+"""State of the Runs screen."""
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from messages.i18n import N_
 
 
 class Column(StrEnum):
-    """The columns of the table, in their order; the value is the title."""
+    """Columns of the table, in order; the value is the title."""
 
     NAME = N_("Run")
     DATE = N_("Recorded")
@@ -26,7 +25,7 @@ class Column(StrEnum):
 
 
 class StatusFilter(StrEnum):
-    """Which runs are wanted, beside series and words."""
+    """Condition on the state of a run; the value is the label."""
 
     ALL = N_("All runs")
     STALE = N_("Stale results")
@@ -37,7 +36,7 @@ class StatusFilter(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunFilter:
-    """What the operator looks for; empty words or series take everything."""
+    """Filter of the table; empty text or series match every run."""
 
     text: str = ""
     series: str = ""
@@ -46,7 +45,7 @@ class RunFilter:
 
 @dataclass(frozen=True, slots=True)
 class RunRow:
-    """A line of the table: a text for each `Column`, and the tone and hint of the verdict."""
+    """Row of the table: a text for each `Column`, and tone and hint of the verdict."""
 
     path: str
     cells: tuple[str, ...]
@@ -56,9 +55,9 @@ class RunRow:
 
 @dataclass(frozen=True, slots=True)
 class MetadataForm:
-    """What may be edited of the selected runs, as typed.
+    """Editable metadata of the selected runs, as typed.
 
-    Of several runs only what they agree on is shown; `mixed` names the fields in which they differ.
+    Fields in which the runs differ are empty and named in `mixed`.
     """
 
     series: str = ""
@@ -70,7 +69,7 @@ class MetadataForm:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
-    """One run of the overlay: both gauges (mm), condensed for drawing; NaN breaks the line.
+    """One run of the overlay: both gauges (mm), decimated for drawing; NaN breaks the line.
 
     Attributes
     ----------
@@ -89,7 +88,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Overlay:
-    """The selected runs, drawn over one another; `words` says what is not drawn, and why."""
+    """The selected runs, overlaid; `message` says which are not drawn, and why."""
 
     traces: tuple[Trace, ...] = ()
     time_label: str = ""
@@ -99,10 +98,18 @@ class Overlay:
 
 @dataclass(frozen=True, slots=True)
 class RunsState:
-    """The whole screen.
+    """State of the screen.
 
-    `rows` are those wanted, sorted; `total` counts all of the folder. `undo` says what undoing would take
-    back, empty where there is nothing. `message` tells what came of the last work, `details` each fault.
+    Attributes
+    ----------
+    rows : tuple of RunRow
+        Runs that match the filter, sorted.
+    total : int
+        Number of runs in the folder.
+    message : Chip
+        Outcome of the last work; `details` holds a line for each fault.
+    undo_text : str
+        Change that undo would undo; empty without one.
     """
 
     folder: str = ""
@@ -120,43 +127,3 @@ class RunsState:
     message: Chip = EMPTY_CHIP
     details: tuple[str, ...] = ()
     undo_text: str = ""
-
-
-class RunsEvents(Protocol):
-    """What the Runs screen tells its presenter."""
-
-    def refresh(self) -> None:
-        """Look into the folder again."""
-
-    def choose_folder(self, folder: str) -> None:
-        """Show the runs of another folder."""
-
-    def set_filter(self, wanted: RunFilter) -> None:
-        """Show only these runs."""
-
-    def sort_by(self, column: Column) -> None:
-        """Sort by a column; by the same again, the other way round."""
-
-    def select(self, paths: tuple[str, ...]) -> None:
-        """These runs are selected."""
-
-    def open_selected(self) -> None:
-        """Show the first selected run on Identify."""
-
-    def edit(self, field: str, text: str) -> None:
-        """Give a field of `Facts` a new value in all selected runs."""
-
-    def undo(self) -> None:
-        """Take back the last edit, or bring back what was put into the trash."""
-
-    def trash(self) -> None:
-        """Put the selected runs aside."""
-
-    def analyse(self, *, anew: bool = False) -> None:
-        """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
-
-    def cancel(self) -> None:
-        """Give up the work that goes on; what is done stays."""
-
-    def add_files(self, paths: tuple[str, ...]) -> bool:
-        """Files were dropped on the screen or chosen; True where some wait to be imported."""

@@ -1,7 +1,7 @@
-"""The lines of the table: which runs are wanted, in which order, and as which words."""
+"""Rows of the table of runs: filtered, sorted and formatted."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from messages.i18n import N_, gettext
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
-_ENDED = {
+_END_REASONS = {
     "rest": N_("at rest"),
     "enough": N_("enough"),
     "duration": N_("duration"),
@@ -29,22 +29,59 @@ _ENDED = {
 }
 
 
-def select_runs(
-    runs: "Iterable[RunSummary]", wanted: RunFilter, by: Column, *, descending: bool
-) -> "list[RunSummary]":
-    """Runs that are wanted, sorted; those without a value in that column come last either way."""
-    from app.runs.listing import RunFilter  # brings h5py along, which the start of the window does without
+class RunList:
+    """Runs of a folder by path. The row of a run is formatted again only when the run has changed."""
 
-    words = RunFilter(series=wanted.series or None, text=wanted.text.strip() or None)
-    kept = [run for run in runs if words.matches(run) and _ONLY[wanted.status](run)]
-    keyed = [(_KEYS[by](run), run) for run in kept]
+    def __init__(self) -> None:
+        self._by_path: dict[str, RunSummary] = {}
+        self._rows: dict[str, tuple[RunSummary, RunRow]] = {}
+
+    def set_runs(self, runs: "Sequence[RunSummary]") -> None:
+        """Replace all runs."""
+        self._by_path = {run.path: run for run in runs}
+
+    def rows(self, run_filter: RunFilter, by: Column, *, descending: bool) -> tuple[RunRow, ...]:
+        """Rows of the runs that match a filter, sorted by a column."""
+        kept = select_runs(self._by_path.values(), run_filter, by, descending=descending)
+        return tuple(self._row(run) for run in kept)
+
+    def metadata(self, paths: Sequence[str]) -> MetadataForm | None:
+        """Editable metadata of runs; None if none of them can be read."""
+        return metadata_form([self._by_path[path] for path in paths])
+
+    def readable(self, paths: Sequence[str]) -> tuple[str, ...]:
+        """Paths of the runs that can be read."""
+        return tuple(path for path in paths if not self._by_path[path].fault)
+
+    def fault(self, path: str) -> str:
+        """Why a run cannot be read; empty if it can."""
+        return self._by_path[path].fault
+
+    def _row(self, run: "RunSummary") -> RunRow:
+        known = self._rows.get(run.path)
+        if known is None or known[0] != run:
+            known = run, make_row(run)
+            self._rows[run.path] = known
+        return known[1]
+
+
+def select_runs(
+    runs: "Iterable[RunSummary]", run_filter: RunFilter, by: Column, *, descending: bool
+) -> "list[RunSummary]":
+    """Runs that match, sorted; those without a value in the column come last in both orders."""
+    # Imported here: it loads h5py, which the window does without until it has started.
+    from app.runs.listing import RunFilter as ListingFilter
+
+    condition = ListingFilter(series=run_filter.series or None, text=run_filter.text.strip() or None)
+    kept = [run for run in runs if condition.matches(run) and _STATUS_CONDITIONS[run_filter.status](run)]
+    keyed = [(_SORT_KEYS[by](run), run) for run in kept]
     valued = [pair for pair in keyed if pair[0] is not None]
     valued.sort(key=lambda pair: pair[0], reverse=descending)
     return [run for _, run in valued] + [run for key, run in keyed if key is None]
 
 
 def make_row(run: "RunSummary") -> RunRow:
-    """A line of the table."""
+    """Format the row of a run."""
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
         return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
@@ -61,7 +98,7 @@ def make_row(run: "RunSummary") -> RunRow:
         Column.FRICTION: _friction(run),
         Column.VERDICT: verdict,
         Column.DURATION: number_text.format_fixed(run.duration_s, 1),
-        Column.ENDED: gettext(_ENDED.get(run.ended, run.ended))
+        Column.ENDED: gettext(_END_REASONS.get(run.ended, run.ended))
         or (gettext("imported") if run.source else gettext("not closed")),
         Column.OPERATOR: run.operator,
         Column.NOTE: run.note,
@@ -70,7 +107,7 @@ def make_row(run: "RunSummary") -> RunRow:
 
 
 def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
-    """What may be edited of the selected runs; None where that is nothing."""
+    """Editable metadata of runs; None if none of them can be read."""
     readable = [run for run in runs if not run.fault]
     if not readable:
         return None
@@ -90,7 +127,7 @@ def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
 
 
 def parse_mass_kg(text: str) -> float:
-    """Plate mass as typed. Raises ValueError that names value and remedy."""
+    """Parse a plate mass (kg). Raises ValueError that names value and remedy."""
     try:
         value_kg = float(text.replace(",", "."))
     except ValueError:
@@ -137,7 +174,7 @@ def _friction(run: "RunSummary") -> str:
     return f"{value} ± {spread}" if spread else value
 
 
-_ONLY: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
+_STATUS_CONDITIONS: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
     StatusFilter.ALL: lambda _: True,
     StatusFilter.STALE: lambda run: run.stale,
     StatusFilter.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
@@ -146,7 +183,7 @@ _ONLY: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
 }
 
 
-_KEYS: "dict[Column, Callable[[RunSummary], Any]]" = {
+_SORT_KEYS: "dict[Column, Callable[[RunSummary], Any]]" = {
     Column.NAME: lambda run: Path(run.path).name.casefold(),
     Column.DATE: lambda run: run.start_time,
     Column.SERIES: lambda run: run.series or None,

@@ -1,4 +1,4 @@
-"""What was changed in runs, and how it is taken back: what is typed as a value, words, and the way back."""
+"""Changes of runs: parsing of edited fields, messages, and the undo stack."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreR
 from messages.i18n import N_, gettext, ngettext
 
 Change = EditRuns | UndoEdits | TrashRuns | RestoreRuns | CopyRuns
-_NAMES = {
+_FIELD_NAMES = {
     "series": N_("series"),
     "operator": N_("operator"),
     "note": N_("note"),
@@ -21,39 +21,39 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class UndoAction:
-    """How a change is taken back, and how that is called."""
+    """A task that undoes a change, and its description."""
 
     text: str
     task: UndoEdits | RestoreRuns
 
 
 class UndoStack:
-    """The changes that can be taken back, the last one first."""
+    """Changes that can be undone, the last one first."""
 
     def __init__(self) -> None:
         self._undos: list[UndoAction] = []
 
     @property
     def text(self) -> str:
-        """What would be taken back; empty where there is nothing."""
+        """Description of the change on top; empty without one."""
         return self._undos[-1].text if self._undos else ""
 
     def push(self, undo: UndoAction | None) -> None:
-        """Remember a way back, if there is one."""
+        """Push an action, unless it is None."""
         if undo is not None:
             self._undos.append(undo)
 
     def pop(self) -> UndoEdits | RestoreRuns | None:
-        """What is to be done to take the last change back."""
+        """Remove and return the task on top; None without one."""
         return self._undos.pop().task if self._undos else None
 
     def clear(self) -> None:
-        """There is no way back."""
+        """Remove all actions."""
         self._undos.clear()
 
 
 def parse_field(field: str, text: str, all_series: Sequence[str]) -> str | float:
-    """What was typed for a field, as a value. Raises ValueError with words for the operator."""
+    """Parse the text of a field. Raises ValueError that names value and remedy."""
     text = text.strip()
     if field == "plate_mass_kg":
         return parse_mass_kg(text)
@@ -72,11 +72,11 @@ def parse_field(field: str, text: str, all_series: Sequence[str]) -> str | float
 
 
 def change_text(change: Change, outcome: BatchOutcome) -> str:
-    """What was done, with the runs that it was done to."""
+    """Sentence about a change and its runs."""
     runs = run_count_text(outcome.done)
     match change:
         case EditRuns(field=field):
-            return gettext("Changed the {field} of {runs}", field=gettext(_NAMES[field]), runs=runs)
+            return gettext("Changed the {field} of {runs}", field=gettext(_FIELD_NAMES[field]), runs=runs)
         case UndoEdits():
             return gettext("Undone in {runs}", runs=runs)
         case TrashRuns():
@@ -88,7 +88,7 @@ def change_text(change: Change, outcome: BatchOutcome) -> str:
 
 
 def outcome_chip(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
-    """Say what was done, in `words`, and what it failed for: the fault itself where it is one."""
+    """Chip of a change: `words`, and the fault, or the number of faults if there are several."""
     if not faults:
         return Chip(words, Tone.OK)
     said = f"{words}. " if done else ""
@@ -99,13 +99,13 @@ def outcome_chip(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip
 
 
 def undo_action(change: Change, outcome: BatchOutcome, author: str) -> UndoAction | None:
-    """How `author` takes it back in the runs that it was done to; None where there is no way."""
+    """Action that undoes a change in the runs that were changed; None if it cannot be undone."""
     done = outcome.done
     if not done:
         return None
     match change:
         case EditRuns(field=field):
-            words = gettext("change of {field}", field=gettext(_NAMES[field]))
+            words = gettext("change of {field}", field=gettext(_FIELD_NAMES[field]))
             return UndoAction(words, UndoEdits(done, author, field))
         case TrashRuns():
             return UndoAction(

@@ -14,7 +14,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.runs.state import RunsEvents, RunsState
+from app.presenters.runs.presenter import RunsPresenter
+from app.presenters.runs.state import RunsState
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -25,27 +26,26 @@ class ActionBar(QFrame):
 
     Parameters
     ----------
-    events : RunsEvents
-        Told which button was pressed.
+    presenter : RunsPresenter
     ask_for_export : callable
         Opens the dialog.
     """
 
-    def __init__(self, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
+    def __init__(self, presenter: RunsPresenter, ask_for_export: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "bar")
-        self._open = _button(gettext("Open"), events.open_selected)
-        self._analyse = _button(gettext("Analyse"), events.analyse)
-        self._analyse_anew = partial(events.analyse, anew=True)
+        self._open = _button(gettext("Open"), presenter.open_selected)
+        self._analyse = _button(gettext("Analyse"), presenter.analyse)
+        self._analyse_anew = partial(presenter.analyse, reanalyse=True)
         self._export = _button(gettext("Export…"), ask_for_export)
-        self._trash = _button(gettext("Trash"), events.trash)
-        self._undo = _button(gettext("Undo"), events.undo)
+        self._trash = _button(gettext("Trash"), presenter.trash)
+        self._undo = _button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._details = _button(gettext("Details"), self._fold)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(160)
-        self._cancel = _button(gettext("Cancel"), events.cancel)
+        self._cancel = _button(gettext("Cancel"), presenter.cancel)
         self._cancel.setToolTip(gettext("Give up the work; what is done stays"))
         self._list = label(wrap=True)
         self._lay_out()

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip
-from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportEvents, ExportState
+from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportPresenter, ExportState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox, ComboBox
 from app.qt.widgets.text import label, show_chip
@@ -28,9 +28,9 @@ from messages.i18n import gettext, ngettext
 class ExportDialog(QDialog):
     """Draws `ExportState`."""
 
-    def __init__(self, events: ExportEvents, parent: QWidget) -> None:
+    def __init__(self, presenter: ExportPresenter, parent: QWidget) -> None:
         super().__init__(parent)
-        self._events = events
+        self._presenter = presenter
         self._shown = ExportState()
         self._title = label(role=TextRole.HEADING)
         self._format = ComboBox()
@@ -86,16 +86,16 @@ class ExportDialog(QDialog):
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
             dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the box below says whether
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._events.set_output)
+        dialog.fileSelected.connect(self._presenter.set_output)
         dialog.open()
 
     def _connect(self) -> None:
-        self._format.activated.connect(lambda _: self._events.set_format(self._format.currentData()))
-        self._content.activated.connect(lambda _: self._events.set_content(self._content.currentData()))
-        self._output.textEdited.connect(self._events.set_output)
+        self._format.activated.connect(lambda _: self._presenter.set_format(self._format.currentData()))
+        self._content.activated.connect(lambda _: self._presenter.set_content(self._content.currentData()))
+        self._output.textEdited.connect(self._presenter.set_output)
         self._browse.clicked.connect(self._choose_output)
-        self._replace.toggled.connect(self._events.set_replace)
-        self._export.clicked.connect(lambda _checked: self._events.export())
+        self._replace.toggled.connect(self._presenter.set_replace)
+        self._export.clicked.connect(lambda _checked: self._presenter.export())
         self._close.clicked.connect(self.close)
 
     def _lay_out(self) -> None:

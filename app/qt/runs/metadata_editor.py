@@ -1,4 +1,4 @@
-"""What may be edited of the selected runs; an edit is kept beside the old value and can be undone."""
+"""Editor of the metadata of the selected runs."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
@@ -22,13 +22,13 @@ _FIELDS = {
 
 
 class MetadataEditor(QWidget):
-    """Fields that take effect when left, or on Enter; Escape gives the old text back."""
+    """Fields that take effect when the focus leaves them, or on Enter; Escape restores the old text."""
 
     edited = Signal(str, str)
 
     def __init__(self) -> None:
         super().__init__()
-        self._facts: MetadataForm | None = None
+        self._metadata: MetadataForm | None = None
         self._fields = {name: QLineEdit() for name in _FIELDS}
         grid = QGridLayout(self)
         grid.setContentsMargins(12, 4, 12, 12)
@@ -40,24 +40,24 @@ class MetadataEditor(QWidget):
             title.setBuddy(field)
             field.setAccessibleName(gettext(_FIELDS[name][0]))
             field.setToolTip(gettext(_FIELDS[name][1]))
-            field.editingFinished.connect(lambda name=name: self._tell(name))
+            field.editingFinished.connect(lambda name=name: self._on_edited(name))
             grid.addWidget(title, line, 0)
             grid.addWidget(field, line, 1)
 
-    def show_metadata(self, facts: MetadataForm | None) -> None:
-        """Write what is known; None where nothing can be edited."""
-        self._facts = facts
+    def show_metadata(self, metadata: MetadataForm | None) -> None:
+        """Show metadata; None disables the fields."""
+        self._metadata = metadata
         for name, field in self._fields.items():
-            field.setEnabled(facts is not None)
-            field.setText("" if facts is None else getattr(facts, name))
+            field.setEnabled(metadata is not None)
+            field.setText("" if metadata is None else getattr(metadata, name))
             field.setPlaceholderText(
-                gettext("several values") if facts is not None and name in facts.mixed else ""
+                gettext("several values") if metadata is not None and name in metadata.mixed else ""
             )
             field.setModified(False)
             field.setCursorPosition(0)  # the beginning of a long note in sight
 
-    def _tell(self, name: str) -> None:
+    def _on_edited(self, name: str) -> None:
         field = self._fields[name]
-        if self._facts is not None and field.isModified():
+        if self._metadata is not None and field.isModified():
             field.setModified(False)
             self.edited.emit(name, field.text())

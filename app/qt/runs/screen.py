@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.runs.import_presenter import SUFFIXES
-from app.presenters.runs.presenter import RUN_SUFFIX
-from app.presenters.runs.state import RunFilter, RunsEvents, RunsState, StatusFilter
+from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
+from app.presenters.runs.state import RunFilter, RunsState, StatusFilter
 from app.qt.runs.action_bar import ActionBar
 from app.qt.runs.metadata_editor import MetadataEditor
 from app.qt.runs.preview import RunsPreview
@@ -41,20 +41,20 @@ class RunsScreen(QWidget):
     Parameters
     ----------
     theme : Theme
-    events : RunsEvents
+    presenter : RunsPresenter
         Told what the operator does.
     dialogs : Dialogs
         Opens those for export and import.
     """
 
-    def __init__(self, theme: Theme, events: RunsEvents, dialogs: WindowDialogs) -> None:
+    def __init__(self, theme: Theme, presenter: RunsPresenter, dialogs: WindowDialogs) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._dialogs = dialogs
         self._shown: RunsState | None = None
-        self._words = QLineEdit()
+        self._text = QLineEdit()
         self._series = ComboBox()
-        self._only = ComboBox()
+        self._status = ComboBox()
         self._count = label(muted=True)
         self._import = QPushButton(gettext("Import…"))
         self._folder = QPushButton(gettext("Folder…"))
@@ -62,9 +62,9 @@ class RunsScreen(QWidget):
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
         self._preview = RunsPreview(theme)
-        self._facts = MetadataEditor()
+        self._metadata = MetadataEditor()
         self._side = self._make_side()
-        self._actions = ActionBar(events, dialogs.ask_for_export)
+        self._actions = ActionBar(presenter, dialogs.ask_for_export)
         self._lay_out()
         self._connect()
         self.setAcceptDrops(True)
@@ -83,20 +83,20 @@ class RunsScreen(QWidget):
         if old is None or state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
         if old is None or state.metadata != old.metadata:
-            self._facts.show_metadata(state.metadata)
+            self._metadata.show_metadata(state.metadata)
         self._actions.show_state(state)
 
     def _show_wanted(self, wanted: RunFilter) -> None:
         """Another screen may have asked for certain runs."""
         self._series.setCurrentText(wanted.series or _ALL_SERIES)
-        self._only.setCurrentText(wanted.status.value)
-        if self._words.text() != wanted.text:
-            self._words.setText(wanted.text)
+        self._status.setCurrentText(wanted.status.value)
+        if self._text.text() != wanted.text:
+            self._text.setText(wanted.text)
 
     def focus_search(self) -> None:
         """Let the operator type what to look for."""
-        self._words.setFocus()
-        self._words.selectAll()
+        self._text.setFocus()
+        self._text.selectAll()
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Let the table be the first that the keyboard meets."""
@@ -121,7 +121,7 @@ class RunsScreen(QWidget):
             self._take_files(paths)
 
     def _take_files(self, paths: Sequence[str]) -> None:
-        if self._events.add_files(tuple(paths)):
+        if self._presenter.add_files(tuple(paths)):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:
@@ -141,15 +141,17 @@ class RunsScreen(QWidget):
         self._folder.setToolTip(
             gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
         )
-        self._empty.setText(_empty_words(state))
+        self._empty.setText(_empty_text(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
-        if state.rows and was_empty and not self._words.text():
+        if state.rows and was_empty and not self._text.text():
             self._table.setFocus()
 
-    def _want(self) -> None:
+    def _apply_filter(self) -> None:
         series = self._series.currentText() if self._series.currentIndex() > 0 else ""
-        self._events.set_filter(RunFilter(self._words.text(), series, StatusFilter(self._only.currentData())))
+        self._presenter.set_filter(
+            RunFilter(self._text.text(), series, StatusFilter(self._status.currentData()))
+        )
 
     def _choose_folder(self) -> None:
         dialog = QFileDialog(
@@ -157,37 +159,37 @@ class RunsScreen(QWidget):
         )
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._events.choose_folder)
+        dialog.fileSelected.connect(self._presenter.choose_folder)
         dialog.open()
 
     def _connect(self) -> None:
-        self._words.textChanged.connect(lambda _: self._want())
-        self._series.activated.connect(lambda _: self._want())
-        self._only.activated.connect(lambda _: self._want())
+        self._text.textChanged.connect(lambda _: self._apply_filter())
+        self._series.activated.connect(lambda _: self._apply_filter())
+        self._status.activated.connect(lambda _: self._apply_filter())
         self._import.clicked.connect(lambda _checked: self._choose_files())
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._folder.clicked.connect(lambda _checked: self._choose_folder())
-        self._table.selected.connect(self._events.select)
-        self._table.sort_requested.connect(self._events.sort_by)
-        self._table.open_requested.connect(self._events.open_selected)
-        self._facts.edited.connect(self._events.edit)
+        self._table.selected.connect(self._presenter.select)
+        self._table.sort_requested.connect(self._presenter.sort_by)
+        self._table.open_requested.connect(self._presenter.open_selected)
+        self._metadata.edited.connect(self._presenter.edit)
         add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
         add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
-        add_shortcut(self, "F5", gettext("Look into the folder again"), self._events.refresh)
+        add_shortcut(self, "F5", gettext("Look into the folder again"), self._presenter.refresh)
         self._actions.add_keys(self, self._table)
 
     def _lay_out(self) -> None:
-        self._words.setPlaceholderText(gettext("Search name, series, operator, note   Ctrl+F"))
-        self._words.setClearButtonEnabled(True)
-        self._words.setAccessibleName(gettext("Search"))
+        self._text.setPlaceholderText(gettext("Search name, series, operator, note   Ctrl+F"))
+        self._text.setClearButtonEnabled(True)
+        self._text.setAccessibleName(gettext("Search"))
         self._series.setAccessibleName(gettext("Series"))
-        self._only.setAccessibleName(gettext("Which runs"))
-        for only in StatusFilter:
-            self._only.addItem(gettext(only.value), only)
+        self._status.setAccessibleName(gettext("Which runs"))
+        for status in StatusFilter:
+            self._status.addItem(gettext(status.value), status)
         top = QHBoxLayout()
         top.setSpacing(8)
-        top.addWidget(self._words, 1)
-        for widget in (self._series, self._only, self._count, self._import, self._folder):
+        top.addWidget(self._text, 1)
+        for widget in (self._series, self._status, self._count, self._import, self._folder):
             top.addWidget(widget)
         self._middle.addWidget(self._table)
         self._middle.addWidget(_centred(self._empty))
@@ -207,7 +209,7 @@ class RunsScreen(QWidget):
         column = QVBoxLayout(content)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._preview, 1)
-        column.addWidget(self._facts)
+        column.addWidget(self._metadata)
         return _card(content)
 
 
@@ -229,7 +231,7 @@ def _centred(words: QLabel) -> QWidget:
     return page
 
 
-def _empty_words(state: RunsState) -> str:
+def _empty_text(state: RunsState) -> str:
     if not state.is_listed:
         return gettext("Looking into the folder")
     if state.total:

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from app.presenters.base import Progress
-from app.presenters.runs.analysis_tasks import AnalyseRuns, RunAnalysed, analyse_runs
+from app.presenters.runs.tasks import AnalyseRuns, RunAnalysed
+from app.presenters.runs.work import analyse_runs
 from app.presenters.worker import TaskProgress, Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run

@@ -7,7 +7,8 @@ import pytest
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.base import Progress, Tone
 from app.presenters.runs.export_presenter import ExportPresenter
-from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport, execute
+from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
+from app.presenters.runs.work import execute
 from app.runs.simulated import write_simulated_run
 
 RUNS = ("/runs/a.h5", "/runs/b.h5")

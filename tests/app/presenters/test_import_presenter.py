@@ -2,23 +2,25 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import typer
 
 from app.presenters.base import Tone
-from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat, csv_import, validate
+from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat, validate
 from app.presenters.runs.import_presenter import ImportPresenter, pending_text
-from app.presenters.runs.import_tasks import (
+from app.presenters.runs.state import Overlay
+from app.presenters.runs.tasks import (
     ImportFile,
     ImportPreview,
     ImportTask,
     PreviewImport,
     SurveyFile,
-    execute,
 )
-from app.presenters.runs.state import Overlay
+from app.presenters.runs.work import csv_import
+from app.presenters.runs.work import execute as execute_task
 from app.runs.errors import ImportFileError, RunError
 from app.runs.exchange.preview import FilePreview, ParseOptions
 from app.runs.reader import open_run
@@ -47,6 +49,10 @@ class Desk:
     def make_ready(self) -> None:
         self.answer(FOUND)
         self.answer(PREVIEW)
+
+
+def execute(task: ImportTask) -> Any:
+    return execute_task(task, lambda _progress: None)
 
 
 def test_columns_are_offered_and_the_record_is_previewed() -> None:

@@ -3,11 +3,11 @@
 import pytest
 
 from app.presenters.base import Chip, Tone
-from app.presenters.runs.overlay import MAX_OVERLAID_RUNS, load_overlay
-from app.presenters.runs.run_list import RunList
 from app.presenters.runs.state import Column, RunFilter
+from app.presenters.runs.table import RunList
 from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
+from app.presenters.runs.work import MAX_OVERLAID_RUNS, load_overlay
 from app.runs.summary import RunSummary
 
 TWO = ("/runs/a.h5", "/runs/b.h5")

@@ -7,18 +7,20 @@ from msgspec.structs import replace
 from stage import FakeWorker
 
 from app.presenters.base import Progress, Tone
-from app.presenters.runs.analysis_tasks import AnalyseRuns, RunAnalysed
-from app.presenters.runs.import_tasks import ImportFile, SurveyFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Overlay, RunFilter, StatusFilter
 from app.presenters.runs.tasks import (
+    AnalyseRuns,
     BatchOutcome,
     CopyRuns,
     EditRuns,
+    ImportFile,
     ListRuns,
     LoadOverlay,
     RestoreRuns,
+    RunAnalysed,
     RunsTask,
+    SurveyFile,
     TrashRuns,
     UndoEdits,
 )
@@ -68,7 +70,7 @@ class Desk:
             "me",
             self.opened.append,
         )
-        self.runs.enter()
+        self.runs.refresh()
         self.answer(ListRuns("/runs"), ALL)
 
     @property
@@ -258,7 +260,7 @@ def test_what_is_up_to_date_is_said_with_the_key_that_analyses_it_anew(desk: Des
     desk.analysed(task, D, is_up_to_date=True)
     desk.analyst_says(TaskDone(task, None))
     assert desk.runs.state.message.text == "2 runs were up to date. Shift+R analyses them anew"
-    desk.runs.analyse(anew=True)
+    desk.runs.analyse(reanalyse=True)
     assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), reanalyse=True)
 
 

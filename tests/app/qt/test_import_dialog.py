@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton,
 from pytestqt.qtbot import QtBot
 
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
 from app.presenters.runs.state import Overlay, Trace
+from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.exchange.preview import FilePreview, ParseOptions

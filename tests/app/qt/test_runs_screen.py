@@ -11,11 +11,10 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from app.presenters.runs.analysis_tasks import AnalyseRuns
-from app.presenters.runs.import_tasks import SurveyFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Overlay, Trace
 from app.presenters.runs.tasks import (
+    AnalyseRuns,
     BatchOutcome,
     CopyRuns,
     EditRuns,
@@ -25,6 +24,7 @@ from app.presenters.runs.tasks import (
     LoadOverlay,
     PreviewExport,
     RunsTask,
+    SurveyFile,
     TrashRuns,
 )
 from app.presenters.worker import TaskDone
