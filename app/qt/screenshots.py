@@ -141,9 +141,9 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
 
 def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camera) -> None:
     """Settings, an export, the keys, and an import: the run drawn on Runs as the file of another program."""
-    from app.qt.help_dialog import HelpDialog
     from app.qt.runs.export_dialog import ExportDialog
     from app.qt.runs.import_dialog import ImportDialog
+    from app.qt.widgets.shortcuts import HelpDialog
 
     presenter.show_screen(Screen.SETTINGS)
     camera.shoot("settings")

@@ -133,7 +133,7 @@ class MainWindow(QMainWindow):
 
     def show_help(self) -> None:
         """List the keys of the screen that is shown, and of the window."""
-        from app.qt.help_dialog import HelpDialog
+        from app.qt.widgets.shortcuts import HelpDialog
 
         if self._help is not None:
             self._help.close()

@@ -1,10 +1,12 @@
-"""The strip at the bottom of Record: series and plan, what is known of the next tests, the large buttons."""
+"""Bar at the bottom of Record: series and plan, form of the next runs, large buttons."""
+
+from dataclasses import asdict
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
-    QHBoxLayout,
+    QGridLayout,
     QLabel,
     QPushButton,
     QSizePolicy,
@@ -13,46 +15,53 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.record.state import Action, PlanState, RunChoices, RunForm
-from app.qt.record.plan_strip import PlanStrip
-from app.qt.record.run_form import RunFormFields
+from app.presenters.conditions import CONDITION_TITLES
+from app.presenters.record.state import Action, PlanState, RunChoices, RunForm, SeriesProgress
 from app.qt.theme import TextRole, font, set_property
-from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
-from messages.i18n import N_, gettext
+from app.qt.widgets.text import label
+from messages.i18n import N_, gettext, ngettext
 
 _BUTTONS = {
-    Action.TARE: (
-        N_("Tare"),
-        "T",
-        ("T",),
-        N_("Read both gauges from here; calibration and runs stay"),
-    ),
+    Action.TARE: (N_("Tare"), "T", ("T",), N_("Read both gauges from here; calibration and runs stay")),
     Action.ARM: (N_("Arm"), "A", ("A",), N_("Record the next pullback")),
     Action.STOP: (N_("Stop"), "Esc", ("Esc",), N_("End the recording now and keep it")),
-    Action.NEXT: (
-        N_("Next"),
-        "Enter",
-        ("Return", "Enter"),
-        N_("Make ready for the next run"),
-    ),
+    Action.NEXT: (N_("Next"), "Enter", ("Return", "Enter"), N_("Make ready for the next run")),
 }
+"""Label, shown key, keys and description of each action."""
 _FOLD = N_("Operator, conditions, runs in a row, note")
 _KEEP = (N_("Keep"), N_("Keep the run with what was found in it, and go on"))
+_STRIP_SPACING = 4
+_FORM_FIELDS = {
+    "operator": (N_("Operator"), N_("name")),
+    "temperature_c": (CONDITION_TITLES["temperature_c"], "21.5"),
+    "humidity_percent": (CONDITION_TITLES["humidity_percent"], "45"),
+    "plate_id": (CONDITION_TITLES["plate_id"], N_("which one")),
+    "contact_id": (CONDITION_TITLES["contact_id"], N_("which pair of surfaces")),
+    "surface_preparation": (CONDITION_TITLES["surface_preparation"], N_("how prepared")),
+    "run_in_number": (CONDITION_TITLES["run_in_number"], N_("counts up by itself")),
+    "count": (N_("Runs in a row"), "1"),
+    "note": (N_("Note"), N_("kept with the next run")),
+}
+"""Title and placeholder of each field of `RunForm`."""
+_FORM_COLUMNS = 5
+_WIDE = {"note": 2}
 
 
 class RunBar(QFrame):
-    """Series, plan, fold; Tare, Arm, Stop, Keep."""
+    """Series, plan and form of the next runs; Tare, Arm, Stop, Keep."""
 
     acted = Signal(Action)
     series_chosen = Signal(str)
-    filled = Signal(RunForm)
+    form_edited = Signal(RunForm)
     plan_wanted = Signal()
-    left_form = Signal()
-    """The keyboard is wanted by the buttons again."""
+    form_left = Signal()
+    """The keyboard focus belongs to the buttons again."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setProperty("role", "bar")
         self._series = ComboBox()
         self._series.setMinimumWidth(112)
@@ -69,7 +78,7 @@ class RunBar(QFrame):
         self._connect()
 
     def show_choices(self, choices: RunChoices, plan: PlanState) -> None:
-        """Write what the next runs are."""
+        """Show the choices for the next runs."""
         self._shown = choices
         if self._series.count() != len(choices.all_series):
             self._series.addItems(choices.all_series)
@@ -88,18 +97,18 @@ class RunBar(QFrame):
         self._show_summary()
 
     def show_actions(self, allowed: frozenset[Action], primary: Action | None, *, keeps: bool) -> None:
-        """Enable what can be done, and bring out what comes next; `keeps` where a run waits for it."""
+        """Enable the allowed actions and emphasize the primary one; `keeps` while a decision is pending."""
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
-            is_primary = action is primary and not keeps  # the button beside the result is, then
+            is_primary = action is primary and not keeps  # the button of the decision panel is, then
             set_property(button, "primary", "true" if is_primary else "false")
-        text, key, _, words = _BUTTONS[Action.NEXT]
-        text, words = _KEEP if keeps else (text, words)
+        text, key, _, description = _BUTTONS[Action.NEXT]
+        text, description = _KEEP if keeps else (text, description)
         self._buttons[Action.NEXT].setText(f"{gettext(text)}   {key}")
-        set_button_hint(self._buttons[Action.NEXT], gettext(words))
+        set_button_hint(self._buttons[Action.NEXT], gettext(description))
 
     def take_focus(self) -> None:
-        """Focus the button that comes next, or else the first that can be pressed."""
+        """Focus the primary button, or else the first enabled one."""
         usable = [button for button in self._buttons.values() if button.isEnabled()]
         usable.sort(key=lambda button: button.property("primary") != "true")
         (usable[0] if usable else self).setFocus()
@@ -110,23 +119,23 @@ class RunBar(QFrame):
         self._fold.setArrowType(Qt.ArrowType.DownArrow if unfolded else Qt.ArrowType.RightArrow)
         nothing = gettext(_FOLD)
         usual = nothing if unfolded else choices.summary or nothing
-        self._summary.write(choices.form_error or usual, is_fault=bool(choices.form_error))
+        self._summary.set_line(choices.form_error or usual, is_error=bool(choices.form_error))
 
     def _toggle(self) -> None:
         self._form.setVisible(not self._form.isVisibleTo(self))
         if self._form.isVisibleTo(self):
             self._form.take_focus()
         else:
-            self.left_form.emit()
+            self.form_left.emit()
         self._show_summary()
 
     def _button(self, action: Action) -> QPushButton:
-        text, key, keys, words = _BUTTONS[action]
+        text, key, keys, description = _BUTTONS[action]
         button = QPushButton(f"{gettext(text)}   {key}")
         button.setProperty("scale", "large")
         button.setMinimumWidth(108)
         button.clicked.connect(lambda: self.acted.emit(action))
-        bind_button(button, keys, gettext(words), self)
+        bind_button(button, keys, gettext(description), self)
         return button
 
     def _connect(self) -> None:
@@ -138,40 +147,22 @@ class RunBar(QFrame):
         self._fold.setAccessibleName(gettext(_FOLD))
         self._fold.clicked.connect(self._toggle)
         bind_button(self._fold, "F2", gettext("What is known of the next tests"), self)
-        self._form.filled.connect(self.filled)
-        self._form.left.connect(self.left_form)
+        self._form.edited.connect(self.form_edited)
+        self._form.left.connect(self.form_left)
         add_shortcut(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
         untare = gettext("Read both gauges by the calibration again")
         add_shortcut(self, "Shift+T", untare, lambda: self.acted.emit(Action.UNTARE))
 
     def _lay_out(self) -> None:
-        first = QHBoxLayout()
-        first.setSpacing(8)
-        first.addWidget(self._series)
-        first.addWidget(self._strip, 1)
-        first.addWidget(self._plan)
-        second = QHBoxLayout()
-        second.setSpacing(4)
-        second.addWidget(self._fold)
-        second.addWidget(self._summary, 1)
-        left = QVBoxLayout()
-        left.setSpacing(4)
-        left.addLayout(first)
-        left.addLayout(second)
-        row = QHBoxLayout()
-        row.setSpacing(12)
-        row.addLayout(left, 1)
-        for button in self._buttons.values():
-            row.addWidget(button)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 8, 12, 8)
-        layout.setSpacing(4)
-        layout.addLayout(row)
-        layout.addWidget(self._form)
+        series = make_row(self._series, (self._strip, 1), self._plan, spacing=8)
+        summary = make_row(self._fold, (self._summary, 1), spacing=4)
+        left = make_column(series, summary, spacing=4)
+        row = make_row((left, 1), *self._buttons.values(), spacing=12)
+        make_column(row, self._form, spacing=4, margins=(12, 8), of=self)
 
 
 class _Elided(QLabel):
-    """A line that is cut short where it does not fit; the tool tip has the whole."""
+    """Line of text that is elided where it does not fit; the tool tip holds the whole text."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -179,12 +170,12 @@ class _Elided(QLabel):
         self.setFont(font(TextRole.TEXT))
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
-    def write(self, text: str, *, is_fault: bool) -> None:
-        """Write a line."""
+    def set_line(self, text: str, *, is_error: bool) -> None:
+        """Set the text."""
         self._text = text
         self.setToolTip(text)
-        set_property(self, "tone", "bad" if is_fault else "plain")
-        set_property(self, "role", "" if is_fault else "muted")
+        set_property(self, "tone", "bad" if is_error else "plain")
+        set_property(self, "role", "" if is_error else "muted")
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
@@ -194,3 +185,135 @@ class _Elided(QLabel):
 
     def _fit(self) -> None:
         self.setText(self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, self.width()))
+
+
+class PlanStrip(QWidget):
+    """Series plan on one line: as many series around the chosen one as fit. A click chooses a series."""
+
+    chosen = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._progress: tuple[SeriesProgress, ...] = ()
+        self._series = ""
+        self._buttons: list[QPushButton] = []
+        self._empty = label(gettext("No series is planned yet"), muted=True)
+        self._more = label(muted=True)
+        self._layout = make_row(self._empty, self._more, STRETCH, spacing=_STRIP_SPACING, of=self)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.setAccessibleName(gettext("Series plan"))
+
+    def show_plan(self, plan: PlanState, series: str, *, choosable: bool) -> None:
+        """Show a plan and the chosen series."""
+        self._progress, self._series = plan.progress, series
+        while len(self._buttons) < len(plan.progress):
+            self._add_button()
+        for button, one in zip(self._buttons, plan.progress, strict=False):
+            button.setText(f"{one.series}  {one.dots}")
+            button.setToolTip(one.description)
+            button.setAccessibleName(one.description)
+            button.setEnabled(choosable)
+            set_property(button, "state", _series_state(one, series))
+        self._arrange()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Show as many series as fit."""
+        super().resizeEvent(event)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        first, end = self._fitting()
+        for number, button in enumerate(self._buttons):
+            button.setVisible(first <= number < end)
+        hidden = len(self._progress) - (end - first)
+        self._more.setText(f"+{hidden}")
+        self._more.setToolTip(
+            ngettext("One more series is planned", "{count} more series are planned", hidden)
+        )
+        self._more.setVisible(hidden > 0)
+        self._empty.setVisible(not self._progress and self._empty.sizeHint().width() <= self.width())
+
+    def _fitting(self) -> tuple[int, int]:
+        """First and end index of the series that fit: one before the chosen one, it, and those after it."""
+        widths = [
+            button.sizeHint().width() + _STRIP_SPACING for button in self._buttons[: len(self._progress)]
+        ]
+        names = [one.series for one in self._progress]
+        chosen = names.index(self._series) if self._series in names else 0
+        room = self.width() + _STRIP_SPACING
+        if sum(widths) > room:
+            room -= self._more.fontMetrics().horizontalAdvance("+999") + _STRIP_SPACING
+        first, end, left = chosen, chosen, room
+        for number in (chosen, chosen - 1, *range(chosen + 1, len(names)), *range(chosen - 2, -1, -1)):
+            if not 0 <= number < len(names):
+                continue
+            left -= widths[number]
+            if left < 0:
+                break
+            first, end = min(first, number), max(end, number + 1)
+        return first, end
+
+    def _add_button(self) -> None:
+        made = QPushButton(self)
+        made.setProperty("role", "plan")
+        made.clicked.connect(lambda: self.chosen.emit(made.text().split()[0]))
+        self._buttons.append(made)
+        self._layout.insertWidget(self._layout.count() - 2, made)
+
+
+def _series_state(one: SeriesProgress, series: str) -> str:
+    if one.series == series:
+        return "now"
+    return "full" if one.is_full else "ahead"
+
+
+class RunFormFields(QWidget):
+    """Fields of a `RunForm`."""
+
+    edited = Signal(RunForm)
+    left = Signal()
+    """The keyboard focus belongs to the buttons again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._fields = {name: ShortcutSafeEdit(ESCAPE_AND_ENTER) for name in _FORM_FIELDS}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 4, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(8)
+        for number, (name, field) in enumerate(self._fields.items()):
+            title, hint = _FORM_FIELDS[name]
+            field.setPlaceholderText(gettext(hint))
+            field.textEdited.connect(self._emit_form)
+            field.left.connect(self.left)
+            grid.addLayout(
+                _titled(gettext(title), field),
+                number // _FORM_COLUMNS,
+                number % _FORM_COLUMNS,
+                1,
+                _WIDE.get(name, 1),
+            )
+        for column in range(_FORM_COLUMNS):
+            grid.setColumnStretch(column, 1)
+
+    def show_form(self, form: RunForm, *, editable: bool) -> None:
+        """Show a form."""
+        for name, text in asdict(form).items():
+            field = self._fields[name]
+            field.setEnabled(editable)
+            if field.text() != text:
+                field.setText(text)
+
+    def take_focus(self) -> None:
+        """Focus the first field."""
+        next(iter(self._fields.values())).setFocus()
+
+    def _emit_form(self) -> None:
+        self.edited.emit(RunForm(**{name: field.text() for name, field in self._fields.items()}))
+
+
+def _titled(name: str, field: QWidget) -> QVBoxLayout:
+    title = label(name, TextRole.LABEL, muted=True)
+    title.setBuddy(field)
+    field.setAccessibleName(name)
+    return make_column(title, field, spacing=4)

@@ -1,41 +1,43 @@
-"""The Record screen: header, live traces, the column that guides or tells the result, the run bar."""
+"""Record screen: status bar, live traces, column of guidance or result, run bar."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
-    QHBoxLayout,
+    QLabel,
     QLineEdit,
+    QPushButton,
+    QSizePolicy,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
+from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, NoteEdited, PlotResized, RecordState, SeriesChosen
+from app.presenters.record.state import Action, NoteEdited, PlotResized, RecordState, SeriesChosen, StatusBar
 from app.presenters.results import Result
-from app.qt.record.decision_panel import DecisionPanel
-from app.qt.record.guidance_panel import GuidancePanel
 from app.qt.record.live_plots import LivePlots
+from app.qt.record.panels import DecisionPanel, GuidancePanel, ResultPanel
 from app.qt.record.plan_dialog import PlanDialog
-from app.qt.record.result_panel import ResultPanel
 from app.qt.record.run_bar import RunBar
 from app.qt.record.sound import CuePlayer
-from app.qt.record.status_bar import StatusBarWidget
-from app.qt.record.status_line import StatusLine
-from app.qt.theme import Theme
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
+from app.qt.widgets.shortcuts import bind_button, set_button_hint
+from app.qt.widgets.text import label, padded, set_text_or_hide, show_chip
+from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.31
 _COLUMN_WIDTHS = (356, 480)
-"""The narrowest holds f_d with its uncertainty beside a scroll bar."""
+"""The narrowest column holds f_d with its uncertainty beside a scroll bar."""
 
 
 class RecordScreen(QWidget):
-    """Draws `RecordState`, part by part where a part has changed.
+    """Shows `RecordState`; parts that have not changed are not touched.
 
     Parameters
     ----------
@@ -54,13 +56,13 @@ class RecordScreen(QWidget):
         super().__init__()
         self._presenter = presenter
         self._shown: RecordState | None = None
-        self._header = StatusBarWidget()
+        self._status_bar = StatusBarWidget()
         self._plots = LivePlots(theme)
         self._guidance = GuidancePanel(theme)
         self._result = ResultPanel()
         self._decision = DecisionPanel()
-        self._news = StatusLine()
-        self._column = _Column((self._guidance, self._result), (self._decision, self._news))
+        self._status_line = StatusLine()
+        self._column = _Column((self._guidance, self._result), (self._decision, self._status_line))
         self._bar = RunBar()
         self._plan: PlanDialog | None = None
         self._sound = CuePlayer()
@@ -68,11 +70,11 @@ class RecordScreen(QWidget):
         self._connect(connect_device)
 
     def show_state(self, state: RecordState) -> None:
-        """Draw what differs from what is shown."""
+        """Show the parts of a state that differ from the state shown."""
         old, self._shown = self._shown, state
-        typed_into = QApplication.focusWidget()
+        focused = QApplication.focusWidget()
         if old is None or state.status_bar != old.status_bar:
-            self._header.show_status(state.status_bar)
+            self._status_bar.show_status(state.status_bar)
         self._plots.show_traces(state.traces)
         if old is None or state.guidance != old.guidance:
             self._guidance.show_guidance(state.guidance)
@@ -91,17 +93,17 @@ class RecordScreen(QWidget):
             if self._plan is not None:
                 self._plan.show_plan(state.plan)
         if old is None or (state.status_message, state.undo) != (old.status_message, old.undo):
-            self._news.show_status(state.status_message, state.undo)
-        if old is None or _to_do(state) != _to_do(old):
+            self._status_line.show_status(state.status_message, state.undo)
+        if old is None or _actions(state) != _actions(old):
             self._show_actions(state)
-            is_typing = isinstance(typed_into, QLineEdit) and typed_into.isVisible()
+            is_typing = isinstance(focused, QLineEdit) and focused.isVisible()
             if self.isVisible() and not is_typing:
-                self._take_focus()  # a button that is disabled passes it on, perhaps to a field
+                self._take_focus()  # a disabled button passes the focus on, perhaps to a field
         if state.cue is not None and (old is None or state.cue is not old.cue):
             self._sound.play(state.cue)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Let the buttons be the first that the keyboard meets."""
+        """Focus the buttons."""
         super().showEvent(event)
         self._take_focus()
 
@@ -112,7 +114,7 @@ class RecordScreen(QWidget):
         self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
     def _take_focus(self) -> None:
-        """Focus what comes next: what becomes of a run, if that is to be decided."""
+        """Focus the usual next action: the decision about a run if one is pending."""
         decides = self._shown is not None and self._shown.decision is not None
         (self._decision if decides else self._bar).take_focus()
 
@@ -137,39 +139,29 @@ class RecordScreen(QWidget):
         for panel in (self._bar, self._decision):
             panel.acted.connect(dispatch)
         self._bar.series_chosen.connect(lambda series: dispatch(SeriesChosen(series)))
-        self._bar.filled.connect(dispatch)
+        self._bar.form_edited.connect(dispatch)
         self._bar.plan_wanted.connect(self._edit_plan)
         self._decision.noted.connect(lambda note: dispatch(NoteEdited(note)))
-        self._decision.left_note.connect(self._take_focus)
-        self._bar.left_form.connect(self._take_focus)
-        self._news.undone.connect(lambda: dispatch(Action.UNDO))
+        self._decision.note_left.connect(self._take_focus)
+        self._bar.form_left.connect(self._take_focus)
+        self._status_line.undone.connect(lambda: dispatch(Action.UNDO))
         self._plots.resized.connect(lambda width_px: dispatch(PlotResized(width_px)))
         self._guidance.connect_wanted.connect(connect_device)
 
     def _lay_out(self) -> None:
         card = QFrame()
         card.setProperty("role", "card")
-        inside = QVBoxLayout(card)
-        inside.setContentsMargins(1, 1, 1, 1)
-        inside.addWidget(self._plots)
-        middle = QHBoxLayout()
-        middle.setSpacing(8)
-        middle.addWidget(card, 1)
-        middle.addWidget(self._column)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addWidget(self._header)
-        layout.addLayout(middle, 1)
-        layout.addWidget(self._bar)
+        make_column(self._plots, margins=(1, 1), of=card)
+        middle = make_row((card, 1), self._column, spacing=8)
+        make_column(self._status_bar, (middle, 1), self._bar, spacing=8, margins=(8, 8), of=self)
 
 
-def _to_do(state: RecordState) -> tuple[object, ...]:
+def _actions(state: RecordState) -> tuple[object, ...]:
     return state.allowed, state.primary, state.decision
 
 
 class _Column(QFrame):
-    """A card that shows one of two panels, which scroll where the window is low, and what is below both."""
+    """Card with one of two panels, which scroll in a low window, and widgets below them."""
 
     def __init__(self, panels: Sequence[QWidget], below: Sequence[QWidget]) -> None:
         super().__init__()
@@ -179,12 +171,92 @@ class _Column(QFrame):
             area = make_scroll_area(panel)
             area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self._stack.addWidget(area)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(1, 1, 1, 1)
-        layout.setSpacing(0)
-        layout.addWidget(self._stack, 1)
-        for widget in below:
-            layout.addWidget(widget)
+        make_column((self._stack, 1), *below, margins=(1, 1), of=self)
 
     def show_second(self, second: bool) -> None:
         self._stack.setCurrentIndex(int(second))
+
+
+_WIDE, _NARROW = 24, 10
+_MARGIN = 12
+_ELIDED_MIN = 72
+"""Pixels of an elided name: some letters stay readable."""
+
+
+class StatusBarWidget(QFrame):
+    """Shows `StatusBar`. In a narrow window gaps shrink, then the names of device and run are elided."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "bar")
+        self._device = label(role=TextRole.STRONG)
+        self._rate, self._lost_samples, self._disk = label(), label(), label()
+        self._gauges = (label(), label())
+        self._run = label(role=TextRole.STRONG)
+        self._names = {self._device: "", self._run: ""}
+        left = (self._device, self._rate, self._lost_samples, *self._gauges)
+        self._row = make_row(*left, STRETCH, self._run, self._disk, margins=(_MARGIN, 8), of=self)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        for widget, name in (
+            (self._device, gettext("Device")),
+            (self._rate, gettext("Measured sample rate")),
+            (self._lost_samples, gettext("Lost samples")),
+            (self._disk, gettext("Free disk space")),
+            (self._run, gettext("Run of its series")),
+        ):
+            widget.setAccessibleName(name)
+
+    def show_status(self, status: StatusBar) -> None:
+        """Show a status."""
+        show_chip(self._device, replace(status.device, text=gettext(status.device.text)))  # "no device"
+        set_text_or_hide(self._rate, status.rate)
+        show_chip(self._run, status.run)
+        show_chip(self._lost_samples, status.lost_samples)
+        show_chip(self._disk, status.disk)
+        for target, chip in zip(self._gauges, padded(status.gauges, 2, EMPTY_CHIP), strict=True):
+            show_chip(target, chip)
+        self._names = {target: target.text() for target in self._names}
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Show as much of the names as fits."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        for target, text in self._names.items():
+            target.setText(text)
+        spacing = _WIDE if self._excess(_WIDE) <= 0 else _NARROW
+        self._row.setSpacing(spacing)
+        for target, text in self._names.items():
+            if (excess := self._excess(spacing)) > 0:
+                room = max(target.sizeHint().width() - excess, _ELIDED_MIN)
+                target.setText(target.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, room))
+                target.setToolTip(target.toolTip() or text)
+
+    def _excess(self, spacing: int) -> int:
+        """Pixels by which the labels are too wide."""
+        shown = [w for w in self.findChildren(QLabel) if w.isVisibleTo(self)]
+        wanted = sum(w.sizeHint().width() for w in shown) + spacing * len(shown)
+        return wanted + 2 * _MARGIN + 2 - self.width()
+
+
+class StatusLine(QFrame):
+    """Outcome of the last action, with an Undo button where it can be taken back; hidden if empty."""
+
+    undone = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._message = label(wrap=True)
+        self._undo = QPushButton(gettext("Undo"))
+        self._undo.clicked.connect(self.undone)
+        bind_button(self._undo, "Ctrl+Z", gettext("Take back what was decided about the last run"), self)
+        make_row((self._message, 1), self._undo, spacing=8, margins=(16, 8), of=self)
+
+    def show_status(self, message: Chip, undo: str) -> None:
+        """Show a message; `undo` describes what the button takes back."""
+        self.setVisible(bool(message.text or undo))
+        show_chip(self._message, message)
+        self._undo.setVisible(bool(undo))
+        set_button_hint(self._undo, undo)

@@ -2,6 +2,8 @@
 
 import html
 import re
+from collections.abc import Sequence
+from typing import TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QTextDocumentFragment
@@ -11,6 +13,8 @@ from app.presenters.base import Chip
 from app.presenters.results import ResultRow
 from app.qt.theme import TextRole, font, set_property
 
+_Value = TypeVar("_Value")
+_Fill = TypeVar("_Fill")
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")
 _MARKUP = re.compile(r"</?\w+>|&\w+;")
 
@@ -41,6 +45,17 @@ def show_chip(target: QLabel, chip: Chip) -> None:
     target.setToolTip(chip.hint)
     target.setVisible(bool(chip.text))
     set_property(target, "tone", chip.tone.value)
+
+
+def set_text_or_hide(target: QLabel, text: str) -> None:
+    """Set the text of a label; an empty one is hidden."""
+    target.setText(text)
+    target.setVisible(bool(text))
+
+
+def padded(values: Sequence[_Value], count: int, fill: _Fill) -> list[_Value | _Fill]:
+    """Cut or fill values up to the number of labels that show them."""
+    return [*values[:count], *[fill] * (count - len(values))]
 
 
 def set_subscripts(text: str) -> str:

@@ -30,8 +30,8 @@ from app.presenters.recovery import RecoverFolder
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.worker import TaskDone
-from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
+from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow
 from config.schema import WindowLayout
 

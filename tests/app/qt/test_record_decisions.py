@@ -30,12 +30,11 @@ from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Connecting, Cue, PlanState, RunForm
 from app.presenters.worker import TaskDone
 from app.qt.record import sound
+from app.qt.record.panels import Stepper, TargetBar
 from app.qt.record.plan_dialog import PlanDialog
-from app.qt.record.plan_strip import PlanStrip
+from app.qt.record.run_bar import PlanStrip
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
-from app.qt.widgets.stepper import Stepper
-from app.qt.widgets.target_bar import TargetBar
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, PlannedSeries
 from config.schema import Settings

@@ -1,0 +1,342 @@
+"""Panels of the right column: guidance while recording, result and decision after a run."""
+
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QWidget,
+)
+
+from app.presenters.base import Chip, Progress, Tone
+from app.presenters.record.state import (
+    Action,
+    GuidanceState,
+    LiveEstimate,
+    LiveReadings,
+    PendingDecision,
+    PullbackTarget,
+    Step,
+    StepStatus,
+)
+from app.presenters.results import Result
+from app.qt.theme import TextRole, Theme, colour, set_property
+from app.qt.widgets.inputs import ShortcutSafeEdit
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
+from app.qt.widgets.shortcuts import add_shortcut, bind_button
+from app.qt.widgets.text import ValueLabel, break_path, label, padded, set_text_or_hide, show_chip
+from messages.i18n import N_, gettext
+
+_ESTIMATES_MAX = 3
+"""T, n1 and f_d."""
+_RESULT_ROWS_MAX = 4
+_WARNINGS_MAX = 6
+_BAR_HEIGHT = 40
+_BAR_RADIUS = 6.0
+
+
+class GuidancePanel(QWidget):
+    """Stepper, instruction, target bar, live estimate and current readings."""
+
+    connect_wanted = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._connect = QPushButton(gettext("Connect"))
+        self._connect.setProperty("scale", "large")
+        self._connect.setProperty("primary", "true")
+        self._connect.clicked.connect(self.connect_wanted)
+        self._instruction = label(role=TextRole.INSTRUCTION, wrap=True)
+        self._detail = label(role=TextRole.HEADING, wrap=True)
+        for sentence in (self._instruction, self._detail):
+            sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._target = TargetBar(theme)
+        self._stepper = Stepper()
+        self._progress = QProgressBar()
+        self._progress.setTextVisible(False)
+        self._progress_text = label(muted=True)
+        self._estimates = [
+            ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_ESTIMATES_MAX)
+        ]
+        self._note = label(muted=True, wrap=True)
+        self._readings = (
+            _Reading(gettext("u<sub>1</sub>, mm"), "1"),
+            _Reading(gettext("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
+        )
+        self._origin = label(role=TextRole.LABEL, muted=True)
+        make_column(
+            self._stepper,  # at the top: instructions of different length do not move it
+            self._instruction,
+            self._detail,
+            self._target,
+            self._progress_text,
+            self._progress,
+            self._connect,
+            STRETCH,
+            *self._estimates,
+            self._note,
+            STRETCH,
+            make_row(*((reading, 1) for reading in self._readings), spacing=16),
+            self._origin,
+            spacing=12,
+            margins=(16, 16),
+            of=self,
+        )
+
+    def show_guidance(self, guidance: GuidanceState) -> None:
+        """Show the instruction."""
+        self._instruction.setText(guidance.instruction)
+        self._detail.setText(guidance.detail)
+        for widget in (self._instruction, self._detail):
+            set_property(widget, "tone", guidance.tone.value)
+        for widget, lines in ((self._instruction, 1), (self._detail, 2)):
+            _reserve_height(widget, lines if guidance.target is not None else 0)
+        self._target.show_target(guidance.target)
+        self._stepper.show_steps(guidance.steps)
+
+    def show_connected(self, connected: bool) -> None:
+        """Offer to connect a device while none is connected."""
+        self._connect.setVisible(not connected)
+
+    def show_progress(self, progress: Progress | None) -> None:
+        """Show the progress of the identification; None hides it."""
+        self._progress_text.setVisible(progress is not None)
+        self._progress.setVisible(progress is not None)
+        if progress is None:
+            return
+        self._progress_text.setText(progress.text)
+        self._progress.setRange(0, 0 if progress.fraction is None else 100)
+        self._progress.setValue(round(100 * (progress.fraction or 0.0)))
+
+    def show_live_estimate(self, estimate: LiveEstimate) -> None:
+        """Show the live estimate; without rows it is hidden."""
+        for target, row in zip(self._estimates, padded(estimate.rows, _ESTIMATES_MAX, None), strict=True):
+            target.show_row(row)
+        set_text_or_hide(self._note, estimate.note)
+
+    def show_readings(self, readings: LiveReadings) -> None:
+        """Show the current readings."""
+        for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
+            target.value.setText(text)
+        self._origin.setText(readings.origin)
+
+
+class _Reading(QWidget):
+    """Name of a channel and its current reading."""
+
+    def __init__(self, name: str, channel: str) -> None:
+        super().__init__()
+        self.value = label(role=TextRole.NUMBER)
+        self.value.setProperty("channel", channel)
+        make_column(label(name, TextRole.LABEL, muted=True), self.value, of=self)
+
+
+def _reserve_height(target: QLabel, lines_min: int) -> None:
+    """Keep the largest height so far, so that a shorter text moves nothing; `lines_min` = 0 resets it."""
+    line = target.fontMetrics().lineSpacing() + 1  # text that can be selected rounds each line up
+    needed = max(target.heightForWidth(target.width()), lines_min * line)
+    target.setMinimumHeight(max(needed, target.minimumHeight()) if lines_min else 0)
+
+
+class Stepper(QWidget):
+    """Steps of a pullback test: the current one is filled, completed ones carry a tick."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._steps: tuple[Step, ...] = ()
+        self._labels: list[QLabel] = []
+        self._layout = make_row(spacing=4, of=self)
+
+    def show_steps(self, steps: tuple[Step, ...]) -> None:
+        """Show steps."""
+        if steps == self._steps:
+            return
+        self._steps = steps
+        while len(self._labels) < len(steps):
+            self._add_label()
+        for target, step in zip(self._labels, steps, strict=True):
+            mark = "✓" if step.status is StepStatus.DONE else ""
+            target.setText(f"{mark}{step.name}")
+            set_property(target, "step", step.status.value)
+        now = next((step.name for step in steps if step.status is StepStatus.NOW), gettext("none"))
+        self.setAccessibleName(gettext("Step: {name}", name=now))
+
+    def _add_label(self) -> None:
+        made = label(role=TextRole.LABEL)
+        made.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        made.setMinimumHeight(24)
+        self._labels.append(made)
+        self._layout.addWidget(made, 1)
+
+
+class TargetBar(QWidget):
+    """Bar from zero to beyond the target; green once the target is reached."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._target: PullbackTarget | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Preferred size."""
+        return QSize(240, _BAR_HEIGHT)
+
+    def show_target(self, target: PullbackTarget | None) -> None:
+        """Show current and nominal pullback; None hides the bar."""
+        self.setVisible(target is not None)
+        if target == self._target:
+            return
+        self._target = target
+        if target is not None:
+            self.setAccessibleName(
+                gettext("Pulled {now:.1f} of {target:.1f} mm", now=target.now_mm, target=target.target_mm)
+            )
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Draw backbackground, fill and target mark."""
+        if self._target is None:
+            return
+        tokens = self._theme.tokens
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        background = QRectF(self.rect()).adjusted(0.0, 6.0, 0.0, -6.0)
+        painter.setBrush(colour(tokens.line))
+        painter.drawRoundedRect(background, _BAR_RADIUS, _BAR_RADIUS)
+        painter.setClipRect(QRectF(0.0, 0.0, self._x(self._target.now_mm), self.height()))
+        painter.setBrush(colour(tokens.ok if self._target.is_reached else tokens.accent))
+        painter.drawRoundedRect(background, _BAR_RADIUS, _BAR_RADIUS)
+        painter.setClipping(False)
+        painter.setBrush(colour(tokens.text))
+        painter.drawRect(QRectF(self._x(self._target.target_mm) - 1.5, 0.0, 3.0, self.height()))
+        painter.end()
+
+    def _x(self, value_mm: float) -> float:
+        full_mm = self._target.full_mm if self._target else 1.0
+        return min(max(value_mm / full_mm, 0.0), 1.0) * self.width()
+
+
+class ResultPanel(QWidget):
+    """Result of a run: main quantity, verdict on the model, further quantities, warnings, path."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._name = label(role=TextRole.HEADING)
+        self._headline = ValueLabel(TextRole.INSTRUCTION, TextRole.NUMBER)
+        self._comparison = label(muted=True, wrap=True)
+        self._model_status = label(role=TextRole.HEADING)
+        self._fit = label(muted=True, wrap=True)
+        self._rows = [
+            ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_RESULT_ROWS_MAX)
+        ]
+        self._end_status = label(wrap=True)
+        self._warnings = [label(wrap=True) for _ in range(_WARNINGS_MAX)]
+        self._path = label(role=TextRole.LABEL, muted=True, wrap=True)
+        make_column(
+            make_column(self._name, self._headline, self._comparison, spacing=8),
+            make_column(self._model_status, self._fit, spacing=8),
+            make_column(*self._rows, *self._warnings, spacing=8),
+            STRETCH,
+            make_column(self._end_status, self._path, spacing=8),
+            spacing=12,
+            margins=(16, 16),
+            of=self,
+        )
+
+    def show_result(self, result: Result) -> None:
+        """Show a result."""
+        self._name.setText(f"{result.headline.symbol} {result.headline.name}".strip())
+        self._headline.show_row(result.headline)
+        set_text_or_hide(self._comparison, result.comparison)
+        set_text_or_hide(self._fit, result.fit)
+        set_text_or_hide(self._path, break_path(result.path))
+        show_chip(self._model_status, result.model_status)
+        show_chip(self._end_status, result.end_status)
+        for target, row in zip(self._rows, padded(result.rows, _RESULT_ROWS_MAX, None), strict=True):
+            target.show_row(row)
+        for warning, text in zip(self._warnings, padded(result.warnings, _WARNINGS_MAX, ""), strict=True):
+            show_chip(warning, Chip(text, Tone.WARN))
+
+
+_DECISION_BUTTONS = {
+    Action.NEXT: (
+        N_("Keep"),
+        "Enter",
+        (),
+        N_("Keep the run with what was found in it (Enter)"),
+    ),
+    Action.REPEAT: (
+        N_("Repeat"),
+        "R",
+        ("R",),
+        N_("Move the run to the trash, and record the same series again at once"),
+    ),
+    Action.DISCARD: (N_("Discard"), "Del", ("Del", "D"), N_("Move the run to the trash")),
+}
+
+
+class DecisionPanel(QFrame):
+    """Note and decision about a run: Keep, Repeat, Discard. Hidden while no run waits for a decision."""
+
+    acted = Signal(Action)
+    noted = Signal(str)
+    note_left = Signal()
+    """The keyboard focus belongs to the buttons again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._note = ShortcutSafeEdit()
+        self._note.setPlaceholderText(gettext("Note, kept with the run (N)"))
+        self._note.setToolTip(gettext("Enter keeps the run with this note, Esc leaves the field"))
+        self._note.setAccessibleName(gettext("Note on this run"))
+        self._note.textEdited.connect(self.noted)
+        self._note.left.connect(self.note_left)
+        add_shortcut(self, "N", gettext("Write a note on the run; Esc leaves the field"), self._note.setFocus)
+        self._buttons = {action: self._button(action) for action in _DECISION_BUTTONS}
+        buttons = make_row(*((button, 1) for button in self._buttons.values()), spacing=8)
+        make_column(self._note, buttons, spacing=8, margins=(16, 8), of=self)
+
+    def show_decision(self, decision: PendingDecision | None, allowed: frozenset[Action]) -> None:
+        """Show a pending decision; None hides the panel."""
+        self.setVisible(decision is not None)
+        if decision is not None and self._note.text() != decision.note:
+            self._note.setText(decision.note)
+        for action, button in self._buttons.items():
+            button.setEnabled(action in allowed)
+            set_property(button, "primary", "true" if action is Action.NEXT else "false")
+
+    def take_focus(self) -> None:
+        """Focus Keep, so that Enter and Space keep the run."""
+        self._buttons[Action.NEXT].setFocus()
+
+    def _button(self, action: Action) -> QPushButton:
+        text, key, keys, description = _DECISION_BUTTONS[action]
+        button = _EnterButton(f"{gettext(text)}\n{key}")
+        button.setProperty("scale", "large")
+        button.clicked.connect(lambda: self.acted.emit(action))
+        if keys:
+            bind_button(button, keys, gettext(description), self)
+        else:  # the run bar has the shortcut
+            button.setToolTip(gettext(description))
+        return button
+
+
+class _EnterButton(QPushButton):
+    """Button that Enter presses while it has the focus, even if Enter is a shortcut of the screen."""
+
+    def event(self, event: QEvent) -> bool:
+        """Handle Enter before the shortcuts."""
+        is_enter = isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if is_enter and event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()
+            return True
+        if is_enter and event.type() == QEvent.Type.KeyPress:
+            self.click()
+            return True
+        return super().event(event)
