@@ -5,8 +5,6 @@ ends, whoever gave the commands is gone: a run that needs nobody goes on to its 
 either way it is stored, and the process ends.
 """
 
-import contextlib
-import os
 import signal
 import sys
 import tempfile
@@ -16,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
 from app.acquisition.live_client import LiveIdentifier
@@ -26,7 +23,10 @@ from app.acquisition.messages import (
     Connect,
     Connected,
     EndReason,
+    Event,
+    Failed,
     Health,
+    LiveResult,
     PortSettings,
     PullbackState,
     Quit,
@@ -34,6 +34,7 @@ from app.acquisition.messages import (
     RunSettings,
     StateChanged,
     Stop,
+    decode_command,
 )
 from app.acquisition.poll_schedule import Latency, PollSchedule
 from app.acquisition.pullback.plan import ObservedSlip
@@ -56,6 +57,13 @@ from app.acquisition.stream.live_stream import (
     open_stream,
 )
 from app.acquisition.stream.reads import DecodedRead, ReadHistory
+from app.child_process import (
+    CommandReader,
+    EventSender,
+    LineDecoder,
+    ignore_session_signals,
+    reserve_stdout,
+)
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
@@ -136,8 +144,8 @@ class Engine:
         gauges: Gauges,
         stream: LiveStream,
         ring: RingWriter,
-        commands: CommandReader,
-        events: EventSender,
+        commands: CommandReader[Command],
+        events: EventSender[Event],
         *,
         low_latency: bool = False,
     ) -> None:
@@ -394,7 +402,7 @@ class Engine:
         return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
 
 
-def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
+def serve(commands: CommandReader[Command], events: EventSender[Event], folder: Path) -> None:
     """Be an engine: connect as the first command says, and work until the end.
 
     Parameters
@@ -424,25 +432,29 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
 
 def main() -> int:
     """Run the process. Whatever ends it early is told in one `Failed` event."""
-    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):  # they reach all of a terminal's processes
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    ignore_session_signals()
     sys.setswitchinterval(_SWITCH_S)
-    events = EventSender(os.dup(1))
-    with contextlib.suppress(OSError):  # a program without a console may have no stderr
-        os.dup2(2, 1)  # nothing but events may reach the owner
+    events: EventSender[Event] = EventSender(
+        reserve_stdout(), lambda event: isinstance(event, Health | LiveResult)
+    )
     try:
         with live_folder() as folder:
-            serve(CommandReader(0), events, folder)
+            serve(CommandReader(0, LineDecoder(decode_command)), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
-        events.fail(str(error))
+        events.send(_failed(str(error)))
         return 1
     except Exception as error:
-        events.fail(f"Slipstand's engine failed ({type(error).__name__}: {error}). Please report this")
+        events.send(
+            _failed(f"Slipstand's engine failed ({type(error).__name__}: {error}). Please report this")
+        )
         raise
     finally:
         events.close()
     return 0
+
+
+def _failed(message: str) -> Failed:
+    return Failed(" ".join(message.split()))
 
 
 if __name__ == "__main__":

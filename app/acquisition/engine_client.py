@@ -5,15 +5,11 @@ import queue
 import shutil
 import signal
 import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
-
-import msgspec
+from typing import Self
 
 from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
 from app.acquisition.messages import (
@@ -32,9 +28,9 @@ from app.acquisition.messages import (
     RunSettings,
     Stop,
     decode_event,
-    encode,
 )
 from app.acquisition.ring import RingReader, RingRows, open_ring
+from app.child_process import ChildProcess, encode_line, spawn
 
 _WAIT_S = 0.1
 
@@ -42,32 +38,28 @@ _WAIT_S = 0.1
 class EngineClient:
     """An engine in a process of its own. It outlives this handle only to finish a run.
 
-    Make it with `EngineClient.start`; use it in a `with` statement, or call `close`. Events are read by a
-    thread and may be taken from any one thread.
+    Make it with `EngineClient.start`; use it in a `with` statement, or call `close`. One thread at a time may
+    take events and rows.
     """
 
     _QUEUE_EVENTS = 1024
-    """Health and live results are left out when so many events wait: nobody takes them."""
+    """Health and live results are dropped while so many events wait."""
     _CLOSE_S = 180.0
-    """An engine that is to end is killed after so long without a word. While it closes a run, which takes as
-    long as that is large, it tells of its health."""
+    """An engine that is to end is killed after so long without an event. Closing a run takes as long as the
+    run is large; the engine sends its health meanwhile."""
+    _SEND_S = 1.0
+    """An engine that takes no command for so long hangs; the command is lost."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
-        if process.stdin is None or process.stdout is None:
-            raise ValueError("the engine has no pipes: start it with EngineClient.start")
-        self._process = process
-        self._to_engine = process.stdin
         self._events: queue.Queue[Event] = queue.Queue()
-        self._heard_s = time.monotonic()
-        self._has_ended = threading.Event()
+        self._has_failed = False
         self._ring: RingReader | None = None
         self._ring_folder: Path | None = None
         self._next_row = 0
-        self._recording_in = ""
-        self._listener = threading.Thread(
-            target=self._listen, args=(process.stdout,), name="engine events", daemon=True
+        self._run_folder = ""
+        self._child: ChildProcess[Command, Event] = ChildProcess(
+            process, encode_line, decode_event, self._on_event, self._on_exit
         )
-        self._listener.start()
 
     @classmethod
     def start(
@@ -75,36 +67,27 @@ class EngineClient:
     ) -> Self:
         """Start an engine and let it connect; `Connected` or `Failed` will be among its events.
 
-        With `is_watched`, new rows are there within some 20 ms, else within 0.14 s, at less cost.
+        With `low_latency`, new rows are in the ring within about 20 ms, else within 0.14 s at less cost.
         """
-        no_window = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console for it otherwise
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.acquisition.engine"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            creationflags=no_window,
-        )
-        engine = cls(process)
+        engine = cls(spawn("app.acquisition.engine"))
         engine.send(Connect(port, stand_file, gauges_file, low_latency))
         return engine
 
     @property
     def process_id(self) -> int:
-        """Of the engine."""
-        return self._process.pid
+        """Process number of the engine."""
+        return self._child.pid
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the process is gone, and all its events were taken."""
-        return self._has_ended.is_set() and self._events.empty()
+        """Tell whether the process has ended and all its events were taken."""
+        return self._child.has_ended and self._events.empty()
 
     def send(self, command: Command) -> None:
-        """Give a command. An engine that has ended has said why in its events."""
+        """Give a command. An engine that has ended has sent the reason as an event."""
         if isinstance(command, Arm):
-            self._recording_in = command.run.directory
-        with contextlib.suppress(OSError, ValueError):
-            self._to_engine.write(encode(command))
-            self._to_engine.flush()
+            self._run_folder = command.run.directory
+        self._child.send(command, self._SEND_S)
 
     def poll(self) -> list[Event]:
         """Events since the last call; the last one of an engine is `Failed` unless it was closed."""
@@ -132,10 +115,7 @@ class EngineClient:
     def close(self) -> None:
         """Finish a run that is being recorded, and end the engine. Harmless when it has ended."""
         self.send(Quit())
-        with contextlib.suppress(OSError):
-            self._to_engine.close()
-        self._await_end()
-        self._listener.join()
+        self._child.stop(self._CLOSE_S, wait_while_active=True)
         if self._ring is not None:
             self._ring.close()
             self._ring = None
@@ -150,44 +130,25 @@ class EngineClient:
     ) -> None:
         self.close()
 
-    def _await_end(self) -> None:
-        """Wait for the process; kill it when it has said nothing for long."""
-        self._heard_s = time.monotonic()
-        while time.monotonic() - self._heard_s < self._CLOSE_S:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(_WAIT_S)
-                return
-        self._process.kill()
-        self._process.wait()
+    def _on_event(self, event: Event) -> None:
+        self._has_failed = self._has_failed or isinstance(event, Failed)
+        if isinstance(event, Connected):
+            self._ring_folder = Path(event.ring_path).parent
+            with contextlib.suppress(RingError):  # the engine has ended meanwhile, and sends the reason
+                self._ring = open_ring(event.ring_path)
+        elif isinstance(event, RunEnded):
+            self._run_folder = ""
+        if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS:
+            self._events.put(event)
+
+    def _on_exit(self, code: int) -> None:
+        if code and not self._has_failed:
+            self._events.put(Failed(f"the engine ended by itself (code {code}). {self._remedy()}"))
 
     def _remedy(self) -> str:
-        if not self._recording_in:
+        if not self._run_folder:
             return "Connect again"
-        return f"What came of the run is in its journal: slipstand recover {self._recording_in}"
-
-    def _listen(self, stream: IO[bytes]) -> None:
-        """Thread: events until the engine ends."""
-        has_failed = False
-        with stream:
-            for line in stream:
-                self._heard_s = time.monotonic()
-                try:
-                    event = decode_event(line)
-                except msgspec.DecodeError:  # half a line is the last word of an engine that was killed
-                    continue
-                has_failed = has_failed or isinstance(event, Failed)
-                if isinstance(event, Connected):
-                    self._ring_folder = Path(event.ring_path).parent
-                    with contextlib.suppress(RingError):  # its engine has ended meanwhile, and says so
-                        self._ring = open_ring(event.ring_path)
-                elif isinstance(event, RunEnded):
-                    self._recording_in = ""
-                if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS:
-                    self._events.put(event)
-        code = self._process.wait()
-        if code and not has_failed:
-            self._events.put(Failed(f"the engine ended by itself (code {code}). {self._remedy()}"))
-        self._has_ended.set()
+        return f"What came of the run is in its journal: slipstand recover {self._run_folder}"
 
 
 def record_run(

@@ -1,134 +1,92 @@
 """The engine's side of the live identification. A run goes on without it, should it fail."""
 
 import contextlib
-import os
-import queue
 import subprocess
-import sys
-import threading
 from collections.abc import Callable
-from typing import IO, Self
+from typing import Self
 
 from app.acquisition.messages import (
     ClockUpdate,
     EndRun,
     FollowRun,
+    LiveAnswer,
     LiveCommand,
     LiveResult,
-    decode_answer,
-    encode_line,
+    decode_live_answer,
 )
 from app.acquisition.recording import CLOCK_UNCERTAINTY
+from app.child_process import ChildProcess, encode_line, spawn
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate
 from drivers.skew import Skew
 
-_STOP_S = 5.0
-_WAITING_LINES = 32
-"""A process that takes no more commands than that, beside what its pipe holds, is given up."""
 _TIMED_EVERY_S = 1.0
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 DIED_NOTE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
 
 
 class LiveClient:
-    """One process that identifies a run while it goes on; make it with `LiveClient.start`."""
+    """A process that identifies runs while they are recorded; make it with `LiveClient.start`."""
+
+    _STOP_S = 5.0
+    _QUEUE_COMMANDS = 32
+    """A process that leaves so many commands waiting, besides those in its pipe, is killed."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
-        if process.stdin is None or process.stdout is None:
-            raise ValueError("the live identification has no pipes. Start it with LiveClient.start")
-        self._process = process
-        self._to_process = process.stdin
-        self._lines: queue.Queue[bytes | None] = queue.Queue(_WAITING_LINES)
         self._first_row: int | None = None
-        self._newest: LiveResult | None = None
-        self._has_ended = False
-        self._threads = [
-            threading.Thread(target=self._listen, args=(process.stdout,), daemon=True),
-            threading.Thread(target=self._speak, daemon=True),
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._latest: LiveResult | None = None
+        self._child: ChildProcess[LiveCommand, LiveAnswer] = ChildProcess(
+            process,
+            encode_line,
+            decode_live_answer,
+            self._on_answer,
+            queue_size=self._QUEUE_COMMANDS,
+        )
 
     @classmethod
     def start(cls) -> Self:
-        """Start the process; some seconds later it is ready. Raises OSError."""
-        flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-        flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.acquisition.live_process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,  # its end is told of in a word
-            env=os.environ | _ONE_THREAD,
-            creationflags=flags,
-        )
-        return cls(process)
+        """Start the process, which is ready some seconds later. Raises OSError."""
+        return cls(spawn("app.acquisition.live_process", is_background=True, discard_stderr=True))
 
     @property
     def pid(self) -> int:
         """Process number."""
-        return self._process.pid
+        return self._child.pid
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the process is gone."""
-        return self._has_ended
+        """Tell whether the process has ended."""
+        return self._child.has_ended
 
-    def follow(self, follow: FollowRun) -> None:
+    def follow(self, command: FollowRun) -> None:
         """Identify a run from now on."""
-        self._newest, self._first_row = None, follow.first_row
-        self._send(follow)
+        self._latest, self._first_row = None, command.first_row
+        self._send(command)
 
     def update_clock(self, clock: ClockUpdate) -> None:
-        """Tell how the device's clock is found to go."""
+        """Pass on the latest estimate of the device's clock."""
         self._send(clock)
 
     def end_run(self) -> None:
-        """The run has ended."""
+        """Stop identifying: the run has ended."""
         self._first_row = None
         self._send(EndRun())
 
     def take_result(self) -> LiveResult | None:
-        """Newest result since the last call, of the run that is followed; none between two runs."""
-        newest, self._newest = self._newest, None
-        return None if self._first_row is None else newest
+        """Latest result since the last call, of the run that is followed; None between two runs."""
+        latest, self._latest = self._latest, None
+        return None if self._first_row is None else latest
 
     def stop(self) -> None:
         """End the process."""
-        self._put(None)
-        try:
-            self._process.wait(_STOP_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        for thread in self._threads:
-            thread.join()
+        self._child.stop(self._STOP_S)
 
     def _send(self, command: LiveCommand) -> None:
-        self._put(encode_line(command))
+        if not self._child.send(command):
+            self._child.kill()
 
-    def _put(self, line: bytes | None) -> None:
-        """Hand a line over without waiting: the engine must not stand still with this process."""
-        try:
-            self._lines.put_nowait(line)
-        except queue.Full:
-            self._process.kill()
-
-    def _speak(self) -> None:
-        """Thread: lines to the process, until told to end or nobody reads; that is seen by `has_ended`."""
-        with contextlib.suppress(OSError), self._to_process as stream:
-            while (line := self._lines.get()) is not None:
-                stream.write(line)
-                stream.flush()
-
-    def _listen(self, stream: IO[bytes]) -> None:
-        with contextlib.suppress(Exception), stream:  # half a line is the last word of a process that died
-            for line in stream:
-                answer = decode_answer(line)
-                if answer.first_row == self._first_row:
-                    self._newest = answer.result
-        self._has_ended = True
+    def _on_answer(self, answer: LiveAnswer) -> None:
+        if answer.first_row == self._first_row:
+            self._latest = answer.result
 
 
 class LiveIdentifier:

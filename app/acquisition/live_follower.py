@@ -1,18 +1,62 @@
 """One run followed from its first row in the ring to the newest, and identified again and again."""
 
+import contextlib
 import math
+import time
 
 from analysis.averaging import BlockAverager, block_size, mask
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveResult, LiveValue
-from app.acquisition.ring import Floats, RingReader, RingRows
+from analysis.synthetic import Truth, simulate_record
+from app.acquisition.errors import RingError
+from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCommand, LiveResult, LiveValue
+from app.acquisition.ring import Floats, RingReader, RingRows, open_ring
+from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
+PERIOD_S = 0.04
+"""Between two answers: 25 a second look continuous on a screen. Longer where one takes over half of it."""
+_IDLE_S = 1.0
 _FOLLOWED_S = 30.0
 """After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
+
+
+def serve(commands: CommandReader[LiveCommand], events: EventSender[LiveAnswer]) -> None:
+    """Follow one run after another until the commands end."""
+    command: LiveCommand | None = None
+    while not commands.is_closed:
+        command = command or commands.take(_IDLE_S)
+        if isinstance(command, FollowRun):
+            with contextlib.suppress(RingError), open_ring(command.ring_path) as ring:
+                command = _follow(RunFollower(ring, command), commands, events)
+                continue
+        command = None
+
+
+def _follow(
+    run: "RunFollower", commands: CommandReader[LiveCommand], events: EventSender[LiveAnswer]
+) -> LiveCommand | None:
+    """Answer at an even pace until the run or the commands end; return the command that ended it."""
+    while not commands.is_closed:
+        while (command := commands.take()) is not None:
+            if not isinstance(command, ClockUpdate):
+                return command
+            run.update_clock(command)
+        began, computed = time.monotonic(), time.process_time()
+        answer = run.answer()
+        if answer is not None:
+            events.send(answer)
+        # Other processes get as much processor time as the answer took.
+        time.sleep(max(began + PERIOD_S - time.monotonic(), time.process_time() - computed))
+    return None
+
+
+def warm_up() -> None:
+    """Compile, or load from the cache, what an identification needs, before there is anything to identify."""
+    synthetic = simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
+    LiveIdentification().update(synthetic)
 
 
 class RunFollower:

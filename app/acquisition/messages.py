@@ -1,10 +1,12 @@
 """What window or command line and the engine say to each other: one JSON document a line, typed here."""
 
+from collections.abc import Callable
 from enum import StrEnum
 from typing import Annotated
 
 import msgspec
 
+from app.child_process import json_decoder
 from app.runs.metadata import Conditions, RunMetadata
 
 _GUESS = 0.2
@@ -281,23 +283,11 @@ Event = (
 )
 
 
-_COMMANDS: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
-_EVENTS: msgspec.json.Decoder[Event] = msgspec.json.Decoder(Event)
+decode_command: Callable[[bytes], Command] = json_decoder(Command)
+decode_event: Callable[[bytes], Event] = json_decoder(Event)
 
 
-def encode(message: Command | Event) -> bytes:
-    """One line, newline included."""
-    return msgspec.json.encode(message) + b"\n"
-
-
-def decode_command(line: bytes) -> Command:
-    """Parse one line of the command channel. Raises msgspec.ValidationError."""
-    return _COMMANDS.decode(line)
-
-
-def decode_event(line: bytes) -> Event:
-    """Parse one line of the event channel. Raises msgspec.ValidationError."""
-    return _EVENTS.decode(line)
+# --- live identification -----------------------------------------------------------------
 
 
 class ClockUpdate(msgspec.Struct, frozen=True, tag=True):
@@ -332,20 +322,5 @@ class LiveAnswer(msgspec.Struct, frozen=True):
 
 LiveCommand = FollowRun | ClockUpdate | EndRun
 
-_LIVE_COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
-_LIVE_ANSWERS: msgspec.json.Decoder[LiveAnswer] = msgspec.json.Decoder(LiveAnswer)
-
-
-def encode_line(message: LiveCommand | LiveAnswer) -> bytes:
-    """One line, newline included."""
-    return msgspec.json.encode(message) + b"\n"
-
-
-def decode_live_command(line: bytes) -> LiveCommand:
-    """Parse one line to the process. Raises msgspec.ValidationError."""
-    return _LIVE_COMMANDS.decode(line)
-
-
-def decode_answer(line: bytes) -> LiveAnswer:
-    """Parse one line from the process. Raises msgspec.ValidationError."""
-    return _LIVE_ANSWERS.decode(line)
+decode_live_command: Callable[[bytes], LiveCommand] = json_decoder(LiveCommand)
+decode_live_answer: Callable[[bytes], LiveAnswer] = json_decoder(LiveAnswer)

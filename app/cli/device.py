@@ -174,7 +174,7 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
 
     from app.cli import output as out
     from app.simulated_stand.client import Ready
-    from app.simulated_stand.process import DisturbanceInput, serve, stop_on_signal_or_orphaned
+    from app.simulated_stand.process import read_disturbances, serve, stop_on_signal_or_orphaned
 
     def announce(ready: Ready) -> None:
         if as_json:
@@ -187,7 +187,7 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
 
     if not as_json:
         out.print_status("starting; Ctrl-C ends it")
-    orders = DisturbanceInput(lambda fault: out.print_status(f"error: {fault}")) if control else None
+    orders = read_disturbances(lambda fault: out.print_status(f"error: {fault}")) if control else None
     ended = stop_on_signal_or_orphaned()
     if orders is None:
         serve(options, announce, ended)

@@ -3,17 +3,16 @@
 import atexit
 import contextlib
 import functools
-import json
 import queue
-import subprocess
-import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
 import msgspec
 
+from app.child_process import ChildProcess, encode_line, json_decoder, spawn
 from app.runs.errors import (
     BeingRecordedError,
     DamagedRunError,
@@ -24,7 +23,8 @@ from app.runs.errors import (
 from app.runs.summary import RunSummary
 
 _START_S = 60.0
-_VERDICT_S = 60.0
+_STOP_S = 5.0
+_REPLY_S = 60.0
 """For a slow disk, or a computer that is too busy; over a file that hangs HDF5 the process ends itself."""
 
 Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
@@ -35,12 +35,20 @@ _ERRORS: dict[Fault, type[RunError]] = {
 }
 
 
-class ValidationReply(msgspec.Struct, frozen=True):
-    """What the examining process found: a summary, or the kind and text of a fault."""
+class ValidatorReady(msgspec.Struct, frozen=True, tag=True):
+    """The process takes paths."""
+
+
+class ValidationReply(msgspec.Struct, frozen=True, tag=True):
+    """Result for one path: a summary, or the kind and text of a fault."""
 
     summary: RunSummary | None = None
     fault: Fault = ""
     message: str = ""
+
+
+ValidatorEvent = ValidatorReady | ValidationReply
+decode_validator_event: Callable[[bytes], ValidatorEvent] = json_decoder(ValidatorEvent)
 
 
 class Validator:
@@ -72,8 +80,8 @@ class Validator:
         with self._turn:
             self._child = self._child or _Child()
             try:
-                line = self._child.ask(str(path))
-            except _BrokenDownError:
+                reply = self._child.validate(str(path))
+            except _CrashedError:
                 self.stop()
                 raise DamagedRunError(
                     f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
@@ -81,13 +89,12 @@ class Validator:
             except queue.Empty:
                 self.stop()
                 raise ValidationTimeoutError(
-                    f"{path} was not looked over within {_VERDICT_S:g} s: this computer or the file's disk is"
+                    f"{path} was not looked over within {_REPLY_S:g} s: this computer or the file's disk is"
                     " too busy. Try again later"
                 ) from None
-        verdict = msgspec.convert(json.loads(line), ValidationReply)
-        if verdict.summary is None:
-            raise _ERRORS[verdict.fault](verdict.message)
-        return verdict.summary
+        if reply.summary is None:
+            raise _ERRORS[reply.fault](reply.message)
+        return reply.summary
 
     @property
     def pid(self) -> int | None:
@@ -120,65 +127,46 @@ def shared_validator() -> Validator:
     return validator
 
 
-class _BrokenDownError(Exception):
+class _CrashedError(Exception):
     """The process ended over a file."""
 
 
 class _Child:
-    """The process, and a thread that hears it, so that waiting for it can have an end."""
+    """The process; its replies come in the order of the paths."""
 
     def __init__(self) -> None:
-        command = [sys.executable, "-P", "-m", "app.runs.validator_process"]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,  # a crash is told as a verdict
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        self._replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
+        self._child: ChildProcess[str, ValidatorEvent] = ChildProcess(
+            spawn("app.runs.validator_process", discard_stderr=True),  # a crash becomes a fault of the file
+            encode_line,
+            decode_validator_event,
+            self._replies.put,
+            lambda _: self._replies.put(None),
         )
-        self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._hear, daemon=True)
-        self._thread.start()
-        self._ready = False
+        self._is_ready = False
 
     @property
     def pid(self) -> int:
-        return self._process.pid
+        return self._child.pid
 
-    def ask(self, path: str) -> bytes:
-        """Verdict on a path. Raises _BrokenDownError if the process ends, queue.Empty if none comes."""
+    def validate(self, path: str) -> ValidationReply:
+        """Return the reply for a path. Raises _CrashedError; queue.Empty where no reply comes."""
         self._await_start()
-        line = b""
-        if self._process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self._process.stdin.write(json.dumps(path).encode() + b"\n")
-                self._process.stdin.flush()
-                line = self._lines.get(timeout=_VERDICT_S)
-        if not line:
-            raise _BrokenDownError
-        return line
+        self._child.send(path)
+        reply = self._replies.get(timeout=_REPLY_S)
+        if not isinstance(reply, ValidationReply):
+            raise _CrashedError
+        return reply
 
     def _await_start(self) -> None:
-        if self._ready:
+        if self._is_ready:
             return
         with contextlib.suppress(queue.Empty):
-            self._ready = bool(self._lines.get(timeout=_START_S))
-        if not self._ready:
+            self._is_ready = isinstance(self._replies.get(timeout=_START_S), ValidatorReady)
+        if not self._is_ready:
             raise RunError("the process that examines run files does not start. Run `slipstand doctor`")
 
     def stop(self) -> None:
         """End the process, which has nothing to lose."""
-        self._process.kill()
-        self._thread.join()
-        if self._process.stdin:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
-        self._process.wait()
-
-    def _hear(self) -> None:
-        if self._process.stdout is None:
-            return
-        with self._process.stdout as stream:
-            for line in stream:
-                self._lines.put(line)
-        self._lines.put(b"")
+        self._child.kill()
+        self._child.stop(_STOP_S)

@@ -6,7 +6,6 @@ where the system can, so that a hostile file ends this process and nothing else.
 
 import contextlib
 import faulthandler
-import json
 import math
 import signal
 import sys
@@ -14,27 +13,38 @@ import sys
 import h5py
 import msgspec
 
+from app.child_process import (
+    CommandReader,
+    EventSender,
+    LineDecoder,
+    ignore_session_signals,
+    json_decoder,
+    reserve_stdout,
+)
 from app.runs.errors import NotARunError, RunError
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
-from app.runs.validator import ValidationReply
+from app.runs.validator import ValidationReply, ValidatorEvent, ValidatorReady
 
 _MEMORY_BYTES = 2 << 30
 _CPU_S = 2.0
+_IDLE_S = 60.0
 
 
 def main() -> None:
     """Answer until stdin ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides when to give up
+    ignore_session_signals()
     _limit_memory()
-    sys.stdout.buffer.write(b"ready\n")
-    sys.stdout.buffer.flush()
-    for line in sys.stdin.buffer:
-        _limit_time(_CPU_S)
-        reply = answer(line)
-        _limit_time(0.0)
-        sys.stdout.buffer.write(reply)
-        sys.stdout.buffer.flush()
+    events: EventSender[ValidatorEvent] = EventSender(reserve_stdout())
+    paths: CommandReader[str] = CommandReader(0, LineDecoder(json_decoder(str)))
+    events.send(ValidatorReady())
+    while not paths.is_closed:
+        if (path := paths.take(_IDLE_S)) is not None:
+            _limit_time(_CPU_S)
+            reply = _validate(path)
+            _limit_time(0.0)
+            events.send(reply)
+    events.close()
 
 
 def _limit_memory() -> None:
@@ -59,11 +69,6 @@ def _limit_time(seconds: float) -> None:
         faulthandler.cancel_dump_traceback_later()
 
 
-def answer(line: bytes) -> bytes:
-    """Verdict, as one line of JSON, on the file whose path is in `line`."""
-    return json.dumps(msgspec.to_builtins(_judge(json.loads(line)))).encode() + b"\n"
-
-
 def _checked(summary: RunSummary) -> RunSummary:
     """A summary whose values are of their types, and finite: they are as the file says. Raises ValueError."""
     for name, value in msgspec.structs.asdict(summary).items():
@@ -72,7 +77,7 @@ def _checked(summary: RunSummary) -> RunSummary:
     return msgspec.convert(msgspec.to_builtins(summary), RunSummary)
 
 
-def _judge(path: str) -> ValidationReply:
+def _validate(path: str) -> ValidationReply:
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
             validate_file(file)

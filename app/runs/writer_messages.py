@@ -1,12 +1,17 @@
-"""What is said over the pipes of a writer process: framed bytes to it, JSON lines back."""
+"""Messages of the writer process.
+
+Commands carry arrays and are frames of bytes; replies are lines of JSON.
+"""
 
 import struct
-from typing import IO, Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from app.child_process import json_decoder
 from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.errors import DiskFullError, MetadataError, RunError, RunExistsError, WriteError
 from app.runs.journal import JournalSpan
@@ -36,13 +41,6 @@ class OpenRun(msgspec.Struct, frozen=True):
     """UUID of the run, a new one if empty."""
 
 
-class Frame(NamedTuple):
-    """One message to the writer, not yet unpacked."""
-
-    kind: int
-    payload: bytes
-
-
 class Opened(msgspec.Struct, frozen=True, tag=True):
     """The run file exists under its final name."""
 
@@ -64,59 +62,61 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     """Rows that the file holds all the same."""
 
 
+WriterCommand = OpenRun | RunBlock | EndMetadata
 Reply = Opened | Closed | Failed
-_REPLIES: msgspec.json.Decoder[Reply] = msgspec.json.Decoder(Reply)
+decode_reply: Callable[[bytes], Reply] = json_decoder(Reply)
 _OPEN_RUN = msgspec.json.Decoder(OpenRun)
 _ENDING = msgspec.json.Decoder(EndMetadata)
 
 
-def pack_open(request: OpenRun) -> bytes:
-    """Frame of a request."""
-    return _frame(_OPEN, msgspec.json.encode(request))
+class FrameEncoder:
+    """Encodes commands; blocks by the layout of the run that was opened last."""
+
+    def __init__(self) -> None:
+        self._layout = BlockLayout()
+
+    def __call__(self, command: WriterCommand) -> bytes:
+        """Return the frame of a command. Raises ValueError for a block that does not fit the layout."""
+        if isinstance(command, OpenRun):
+            self._layout = command.layout
+            return _frame(_OPEN, msgspec.json.encode(command))
+        if isinstance(command, EndMetadata):
+            return _frame(_CLOSE, msgspec.json.encode(command))
+        columns = command.columns(self._layout)
+        return _frame(_APPEND, _ROWS.pack(len(command)) + b"".join(column.tobytes() for column in columns))
 
 
-def pack_append(block: RunBlock, layout: BlockLayout) -> bytes:
-    """Frame of a block. Raises ValueError where it does not fit `layout`."""
-    columns = block.columns(layout)
-    return _frame(_APPEND, _ROWS.pack(len(block)) + b"".join(column.tobytes() for column in columns))
+class FrameDecoder:
+    """Decodes frames that come cut anywhere."""
 
+    def __init__(self) -> None:
+        self._layout = BlockLayout()
+        self._rest = bytearray()
 
-def pack_close(ending: EndMetadata) -> bytes:
-    """Frame of an ending."""
-    return _frame(_CLOSE, msgspec.json.encode(ending))
+    def feed(self, data: bytes) -> Iterator[WriterCommand]:
+        """Yield the commands that `data` completes. Raises ValueError, msgspec.DecodeError."""
+        self._rest += data
+        while len(self._rest) >= _FRAME.size:
+            kind, length = _FRAME.unpack_from(self._rest)
+            if length > FRAME_BYTES_MAX:
+                raise ValueError(f"a frame of {length} bytes")
+            end = _FRAME.size + length
+            if len(self._rest) < end:
+                return
+            payload = bytes(self._rest[_FRAME.size : end])
+            del self._rest[:end]
+            yield self._command(kind, payload)
 
-
-def read_frame(stream: IO[bytes]) -> Frame | None:
-    """Next whole frame; None at the end of the stream, or where it was cut off or is none."""
-    header = stream.read(_FRAME.size)
-    if len(header) < _FRAME.size:
-        return None
-    kind, length = _FRAME.unpack(header)
-    if length > FRAME_BYTES_MAX:
-        return None
-    payload = stream.read(length)
-    return Frame(kind, payload) if len(payload) == length else None
-
-
-def unpack(frame: Frame, layout: BlockLayout) -> OpenRun | RunBlock | EndMetadata:
-    """Value of a frame; `layout` is that of the run being written. Raises ValueError."""
-    if frame.kind == _OPEN:
-        return _OPEN_RUN.decode(frame.payload)
-    if frame.kind == _CLOSE:
-        return _ENDING.decode(frame.payload)
-    if frame.kind == _APPEND:
-        return _unpack_block(frame.payload, layout)
-    raise ValueError(f"frame of unknown kind {frame.kind}")
-
-
-def encode_reply(reply: Reply) -> bytes:
-    """One line, newline included."""
-    return msgspec.json.encode(reply) + b"\n"
-
-
-def decode_reply(line: bytes) -> Reply:
-    """Parse one line. Raises msgspec.ValidationError."""
-    return _REPLIES.decode(line)
+    def _command(self, kind: int, payload: bytes) -> WriterCommand:
+        if kind == _OPEN:
+            request = _OPEN_RUN.decode(payload)
+            self._layout = request.layout
+            return request
+        if kind == _CLOSE:
+            return _ENDING.decode(payload)
+        if kind == _APPEND:
+            return _unpack_block(payload, self._layout)
+        raise ValueError(f"frame of unknown kind {kind}")
 
 
 def failure(error: RunError, samples: int = 0) -> Failed:

@@ -6,65 +6,55 @@ ends, the engine is gone: the run is closed as interrupted and the process ends.
 """
 
 import os
-import queue
-import signal
-import sys
-import threading
 from pathlib import Path
-from typing import IO
 
-from app.runs.blocks import BlockLayout, RunBlock
+from app.child_process import CommandReader, EventSender, ignore_session_signals, reserve_stdout
+from app.runs.blocks import RunBlock
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
 from app.runs.writer import RunWriter, create_run_in
-from app.runs.writer_messages import (
-    Closed,
-    Frame,
-    Opened,
-    OpenRun,
-    Reply,
-    encode_reply,
-    failure,
-    read_frame,
-    unpack,
-)
+from app.runs.writer_messages import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
+
+_QUEUE_COMMANDS = 64
+_IDLE_S = 0.05
 
 
 def main() -> None:
     """Serve until stdin ends. Signals that end a session are left to the engine, whose end is seen here."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    WriterServer(sys.stdin.buffer, sys.stdout.buffer).serve()
-
-
-_QUEUE_FRAMES = 64
-_IDLE_S = 0.05
+    ignore_session_signals("SIGTERM")
+    commands: CommandReader[WriterCommand] = CommandReader(0, FrameDecoder(), queue_size=_QUEUE_COMMANDS)
+    WriterServer(commands, EventSender(reserve_stdout())).serve()
 
 
 class WriterServer:
     """Writes runs, one after another, until its input ends."""
 
-    def __init__(self, requests: IO[bytes], replies: IO[bytes]) -> None:
-        self._requests = requests
+    def __init__(self, commands: CommandReader[WriterCommand], replies: EventSender[Reply]) -> None:
+        self._commands = commands
         self._replies = replies
-        self._frames: queue.Queue[Frame | None] = queue.Queue(_QUEUE_FRAMES)
         self._writer: RunWriter | None = None
-        self._layout = BlockLayout()
 
     def serve(self) -> None:
         """Work until the input ends. A failure ends the process at once.
 
         Python would close the file on its way out; where HDF5 has failed that can crash or hang.
         """
-        threading.Thread(target=self._read, name="frames", daemon=True).start()
         try:
-            while (frame := self._next()) is not None:
-                self._handle(frame)
+            while not self._commands.is_closed:
+                self._step(self._commands.take(_IDLE_S))
             self._finish("interrupted", "the program that recorded ended")
         except Exception as error:
             self._fail(error)
+            self._replies.close()
             os._exit(1)
+        self._replies.close()
+
+    def _step(self, command: WriterCommand | None) -> None:
+        """Execute a command; bring older rows to disk while none comes."""
+        if command is not None:
+            self._execute(command)
+        elif self._writer is not None:
+            self._writer.flush_if_due()
 
     def _fail(self, error: Exception) -> None:
         """Close the run if that can be done, and say what went wrong."""
@@ -74,24 +64,9 @@ class WriterServer:
             self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(told))
         except RunError as second:
             told = second
-        self._reply(failure(told, writer.flushed_samples if writer else 0))
+        self._replies.send(failure(told, writer.flushed_samples if writer else 0))
 
-    def _read(self) -> None:
-        while (frame := read_frame(self._requests)) is not None:
-            self._frames.put(frame)
-        self._frames.put(None)
-
-    def _next(self) -> Frame | None:
-        """Next frame; brings older rows to disk while none comes."""
-        while True:
-            try:
-                return self._frames.get(timeout=_IDLE_S)
-            except queue.Empty:
-                if self._writer:
-                    self._writer.flush_if_due()
-
-    def _handle(self, frame: Frame) -> None:
-        message = unpack(frame, self._layout)
+    def _execute(self, message: WriterCommand) -> None:
         if isinstance(message, OpenRun):
             self._open(message)
         elif self._writer is None:
@@ -103,28 +78,20 @@ class WriterServer:
 
     def _open(self, request: OpenRun) -> None:
         self._finish("interrupted", "another run was begun")
-        self._layout = request.layout
         self._writer = create_run_in(
             Path(request.folder), request.metadata, request.layout, request.journal, request.identifier
         )
-        self._reply(Opened(str(self._writer.path)))
+        self._replies.send(Opened(str(self._writer.path)))
 
     def _close(self, writer: RunWriter, ending: EndMetadata) -> None:
         stored = writer.close(ending)
         self._writer = None
-        self._reply(Closed(stored))
+        self._replies.send(Closed(stored))
 
     def _finish(self, ended: str, message: str) -> None:
         writer, self._writer = self._writer, None
         if writer and writer.usable:
             writer.interrupt(ended, message)
-
-    def _reply(self, reply: Reply) -> None:
-        try:
-            self._replies.write(encode_reply(reply))
-            self._replies.flush()
-        except OSError:  # nobody listens any more; the run is finished all the same
-            pass
 
 
 if __name__ == "__main__":

@@ -1,14 +1,15 @@
 """The handle of whoever starts a simulated stand; it loads nothing of the simulation itself."""
 
 import contextlib
+import queue
 import subprocess
-import sys
-import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
 import msgspec
 
+from app.child_process import ChildProcess, json_decoder, spawn
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from drivers.simulated.disturbances import parse_disturbance
@@ -24,10 +25,26 @@ class Ready(msgspec.Struct, frozen=True):
     truth_file: str | None
 
 
-class Refused(msgspec.Struct, frozen=True):
-    """What the process says instead when it cannot be set up."""
+class Started(msgspec.Struct, frozen=True, tag=True):
+    """The stand can be read. Its truth follows."""
+
+    ready: Ready
+
+
+class TruthChanged(msgspec.Struct, frozen=True, tag=True):
+    """Something happened to the stand; or it ends, and this is all of its truth."""
+
+    truth: Truth
+
+
+class Refused(msgspec.Struct, frozen=True, tag=True):
+    """The stand cannot be set up; the process ends."""
 
     error: str
+
+
+StandEvent = Started | TruthChanged | Refused
+decode_stand_event: Callable[[bytes], StandEvent] = json_decoder(StandEvent)
 
 
 class SimulatedStand:
@@ -39,12 +56,19 @@ class SimulatedStand:
     _READY_S = 120.0
     """A first start compiles the solver."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]", ready: Ready, truth: Truth) -> None:
-        self._process = process
-        self._ready = ready
-        self._truth = truth
-        self._listener = threading.Thread(target=self._listen, name="simulated stand", daemon=True)
-        self._listener.start()
+    _STOP_S = 5.0
+
+    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        self._first: queue.SimpleQueue[StandEvent | int] = queue.SimpleQueue()
+        self._truth: Truth | None = None
+        self._child: ChildProcess[str, StandEvent] = ChildProcess(
+            process, _encode_disturbance, decode_stand_event, self._on_event, self._first.put
+        )
+        try:
+            self._ready = self._await_start()
+        except BaseException:
+            self.stop()
+            raise
 
     @classmethod
     def start(cls, options: SimulatedStandOptions) -> Self:
@@ -55,18 +79,7 @@ class SimulatedStand:
         SimulatedStandError
             If it cannot be set up as asked, or does not get ready.
         """
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.simulated_stand", msgspec.json.encode(options).decode()],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        )
-        try:
-            return cls(process, *_await_ready(process, cls._READY_S))
-        except BaseException:
-            _end(process)
-            if process.stdout:
-                process.stdout.close()
-            raise
+        return cls(spawn("app.simulated_stand", msgspec.json.encode(options).decode()))
 
     @property
     def port(self) -> str:
@@ -76,18 +89,20 @@ class SimulatedStand:
     @property
     def process_id(self) -> int:
         """Of the stand's process."""
-        return self._process.pid
+        return self._child.pid
 
     @property
     def is_running(self) -> bool:
         """Tell whether the process lives."""
-        return self._process.poll() is None
+        return self._child.is_running
 
     def truth(self) -> Truth:
         """The truth as last told: at each turn of events, and when stopped.
 
         Turns are the start and end of a stream, a release, a disturbance and a port that goes or comes.
         """
+        if self._truth is None:
+            raise SimulatedStandError("the simulated stand has not started")
         return self._truth
 
     def disturb(self, text: str) -> None:
@@ -103,19 +118,15 @@ class SimulatedStand:
             If the stand has ended.
         """
         parse_disturbance(text)
-        try:
-            if self._process.stdin:
-                self._process.stdin.write(text.encode() + b"\n")
-                self._process.stdin.flush()
-        except (OSError, ValueError):
+        if not self._child.is_running:
             raise SimulatedStandError(
                 f"{text!r} cannot be done: the simulated stand has ended. Start another one"
-            ) from None
+            )
+        self._child.send(text, self._STOP_S)
 
     def stop(self) -> None:
         """End the process; `truth` tells all of it from then on. Harmless when it has ended before."""
-        _end(self._process)
-        self._listener.join()
+        self._child.stop(self._STOP_S)
 
     def __enter__(self) -> Self:
         return self
@@ -125,41 +136,26 @@ class SimulatedStand:
     ) -> None:
         self.stop()
 
-    def _listen(self) -> None:
-        """Thread: truths until the process ends."""
-        if self._process.stdout is None:
-            return
-        # The last line of a killed process may be a part of one.
-        with self._process.stdout as stream, contextlib.suppress(msgspec.DecodeError):
-            for line in stream:
-                self._truth = msgspec.json.decode(line, type=Truth)
+    def _on_event(self, event: StandEvent) -> None:
+        has_started = self._truth is not None
+        if isinstance(event, TruthChanged):
+            self._truth = event.truth
+        if not has_started:
+            self._first.put(event)
+
+    def _await_start(self) -> Ready:
+        ready, code = None, ""
+        with contextlib.suppress(queue.Empty):
+            while isinstance(event := self._first.get(timeout=self._READY_S), Started | TruthChanged):
+                if isinstance(event, Started):
+                    ready = event.ready
+                elif ready is not None:
+                    return ready
+            if isinstance(event, Refused):
+                raise SimulatedStandError(event.error)
+            code = f" (exit code {event})"
+        raise SimulatedStandError(f"the simulated stand did not start{code}. Its own message stands above")
 
 
-def _await_ready(process: "subprocess.Popen[bytes]", patience_s: float) -> tuple[Ready, Truth]:
-    # A process that does not get ready is ended, and that ends the wait for its lines.
-    watchdog = threading.Timer(patience_s, process.kill)
-    watchdog.start()
-    try:
-        lines = [process.stdout.readline() for _ in range(2)] if process.stdout else []
-    finally:
-        watchdog.cancel()
-        watchdog.join()
-    with contextlib.suppress(msgspec.ValidationError, msgspec.DecodeError):
-        raise SimulatedStandError(msgspec.json.decode(lines[0], type=Refused).error)
-    try:
-        return msgspec.json.decode(lines[0], type=Ready), msgspec.json.decode(lines[1], type=Truth)
-    except msgspec.DecodeError:
-        raise SimulatedStandError(
-            f"the simulated stand did not start (exit code {process.poll()}). Its own message stands above"
-        ) from None
-
-
-def _end(process: "subprocess.Popen[bytes]", patience_s: float = 5.0) -> None:
-    if process.stdin:
-        with contextlib.suppress(OSError):
-            process.stdin.close()
-    try:
-        process.wait(patience_s)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+def _encode_disturbance(text: str) -> bytes:
+    return text.encode() + b"\n"

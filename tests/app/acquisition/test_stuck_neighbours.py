@@ -7,15 +7,15 @@ import threading
 
 import pytest
 
-from app.acquisition import live_client as live_client
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
 from app.acquisition.live_client import LiveClient
-from app.acquisition.messages import ClockUpdate, Failed, Health, encode
+from app.acquisition.messages import ClockUpdate, Failed, Health
 from app.acquisition.stream.connection import Reconnection
 from app.acquisition.stream.monitors import StallDetector
+from app.child_process import encode_line
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
 from drivers.errors import PortUnavailableError
@@ -41,7 +41,7 @@ def test_an_engine_killed_in_the_middle_of_a_word_is_told_of():
 
 def test_an_engine_that_still_says_something_is_not_killed(monkeypatch):
     monkeypatch.setattr(EngineClient, "_CLOSE_S", 3.0)
-    word = encode(Health(1.0, 0, 0, 0, 0, 0, 0, 0.0))
+    word = encode_line(Health(1.0, 0, 0, 0, 0, 0, 0, 0.0))
     talks = f"import os, time\nfor _ in range(25): os.write(1, {word!r}); time.sleep(0.2)\nos._exit(4)"
     process = python(talks)
     EngineClient(process).close()
@@ -56,7 +56,7 @@ def test_an_engine_that_has_hung_up_on_everybody_is_killed(monkeypatch):
 
 
 def test_a_live_identification_that_hears_nothing_holds_nobody_up(monkeypatch):
-    monkeypatch.setattr(live_client, "_STOP_S", 0.1)
+    monkeypatch.setattr(LiveClient, "_STOP_S", 0.1)
     client = LiveClient(python(DEAF))
     for _ in range(200_000):  # some megabytes: no pipe holds them
         client.update_clock(ClockUpdate(1.0, 1e-4))

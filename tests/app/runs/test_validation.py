@@ -248,7 +248,7 @@ def test_a_crash_is_the_fault_of_the_file(run_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_computer_that_is_too_busy_is_not_the_fault_of_the_file(run_path, monkeypatch):
-    monkeypatch.setattr(validator_module, "_VERDICT_S", 0.5)
+    monkeypatch.setattr(validator_module, "_REPLY_S", 0.5)
     with Validator.start() as validator:
         validator.validate(run_path)
         os.kill(validator.pid, signal.SIGSTOP)

@@ -104,7 +104,7 @@ metadata = msgspec.json.decode(Path({metadata!r}).read_bytes(), type=RunMetadata
 client = WriterClient.start()
 path = client.open(OpenRun({folder!r}, metadata)).result()
 client.append(block(0, 500))
-while client._frames.qsize():
+while client._child._commands.qsize():
     time.sleep(0.01)
 print(path, flush=True)
 time.sleep(600)
@@ -186,7 +186,7 @@ def _append_slowly(client):
 
 @POSIX
 def test_a_writer_that_falls_behind_is_told_and_can_still_close(tmp_path, metadata, monkeypatch):
-    monkeypatch.setattr(writer_client, "_QUEUE_FRAMES", 20)
+    monkeypatch.setattr(writer_client, "_QUEUE_COMMANDS", 20)
     with WriterClient.start() as client:
         client.open(OpenRun(str(tmp_path), metadata)).result(WAIT_S)
         os.kill(client.pid, signal.SIGSTOP)

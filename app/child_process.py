@@ -1,0 +1,387 @@
+"""Child processes that exchange typed messages with their parent over stdin and stdout.
+
+The parent holds a `ChildProcess`: commands go to the child's stdin, events come from its stdout. The child
+holds a `CommandReader` and an `EventSender` on its end of the pipes. On both sides a thread reads and a
+thread writes, so that neither process ever waits for the other one.
+
+Death is seen at the pipes. When the parent dies, the child's stdin ends and `CommandReader.is_closed` becomes
+true. When the child dies, its stdout ends and the parent's `on_exit` is called with the exit code.
+"""
+
+import contextlib
+import json
+import logging
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, Protocol, TypeVar
+
+import msgspec
+
+_log = logging.getLogger(__name__)
+
+Command = TypeVar("Command")
+Event = TypeVar("Event")
+Decoded_co = TypeVar("Decoded_co", covariant=True)
+Decoded = TypeVar("Decoded")
+
+READ_BYTES = 1 << 16
+"""Of one read: what a pipe holds on Linux."""
+
+_KILLED_S = 5.0
+"""Wait for a killed process no longer: one that is blocked by a dead disk does not end even then."""
+_POLL_S = 0.1
+_LINE_BYTES = 1 << 24
+"""Longest line. More than that without a newline is no message."""
+_SESSION_SIGNALS = ("SIGINT", "SIGHUP", "SIGBREAK")
+"""They reach all processes of a terminal; the parent decides what they mean."""
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+class StreamDecoder(Protocol[Decoded_co]):
+    """Turns bytes, cut anywhere, into messages. Keeps what is not a whole message yet."""
+
+    def feed(self, data: bytes) -> Iterator[Decoded_co]:
+        """Yield the messages that `data` completes. Raises ValueError for others."""
+        ...
+
+
+class LineDecoder(Generic[Decoded]):
+    """Decodes messages of one line each. Blank lines are skipped.
+
+    Parameters
+    ----------
+    decode : callable
+        Decodes one line, without its newline. Raises ValueError.
+    on_invalid : callable, optional
+        Receives the error of an undecodable line, which is skipped. Without it, `feed` raises the error.
+    """
+
+    def __init__(
+        self, decode: Callable[[bytes], Decoded], on_invalid: Callable[[Exception], None] | None = None
+    ) -> None:
+        self._decode = decode
+        self._on_invalid = on_invalid
+        self._rest = b""
+
+    def feed(self, data: bytes) -> Iterator[Decoded]:
+        """Yield the messages of all lines that `data` completes. Raises what `decode` raises."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in filter(bytes.strip, lines):
+            try:
+                yield self._decode(line)
+            except ValueError as error:
+                if self._on_invalid is None:
+                    raise
+                self._on_invalid(error)
+        if len(self._rest) > _LINE_BYTES:
+            raise ValueError(f"{len(self._rest)} bytes without a newline")
+
+
+def encode_line(message: object) -> bytes:
+    """Encode a message as one line of JSON, newline included."""
+    try:
+        return msgspec.json.encode(message) + b"\n"
+    except UnicodeEncodeError:  # a file name that is no text, which Python holds with lone surrogates
+        return json.dumps(msgspec.to_builtins(message)).encode() + b"\n"
+
+
+def spawn(
+    module: str, *arguments: str, is_background: bool = False, discard_stderr: bool = False
+) -> "subprocess.Popen[bytes]":
+    """Start `python -m module` with pipes for stdin and stdout. Raises OSError.
+
+    Parameters
+    ----------
+    module : str
+    *arguments : str
+    is_background : bool
+        Numerical libraries use one thread. On Windows the process gets a lower priority; elsewhere it lowers
+        its own.
+    discard_stderr : bool
+        For a process whose death is reported by its parent, and whose own traceback would only confuse.
+    """
+    flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console window otherwise
+    if is_background:
+        flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL if discard_stderr else None,
+        env=os.environ | _ONE_THREAD if is_background else None,
+        creationflags=flags,
+    )
+
+
+class ChildProcess(Generic[Command, Event]):
+    """Parent's side of a child process. `send` never waits for the child, unless asked to.
+
+    Parameters
+    ----------
+    process : subprocess.Popen
+        With pipes for stdin and stdout, as `spawn` starts it. Belongs to this object from now on.
+    encode : callable
+        Encodes a command.
+    decode : callable
+        Decodes an event from one line. Undecodable lines are skipped.
+    on_event : callable
+        Receives each event, in the reading thread.
+    on_exit : callable, optional
+        Receives the exit code, in the same thread, after the last event.
+    queue_size : int
+        Commands that may wait until the child takes them.
+    """
+
+    def __init__(
+        self,
+        process: "subprocess.Popen[bytes]",
+        encode: Callable[[Command], bytes],
+        decode: Callable[[bytes], Event],
+        on_event: Callable[[Event], None],
+        on_exit: Callable[[int], None] = lambda _: None,
+        queue_size: int = 1024,
+    ) -> None:
+        if process.stdin is None or process.stdout is None:
+            raise ValueError("the process has no pipes: start it with spawn()")
+        self._process = process
+        self._stdin, self._stdout = process.stdin, process.stdout
+        self._encode = encode
+        self._decoder = LineDecoder(decode, lambda error: _log.warning("child %d: %s", process.pid, error))
+        self._on_event = on_event
+        self._on_exit = on_exit
+        self._commands: queue.Queue[bytes | None] = queue.Queue(queue_size)
+        self._last_event_s = time.monotonic()
+        self._has_ended = threading.Event()
+        self._threads = [
+            threading.Thread(target=work, name=f"child {name}", daemon=True)
+            for name, work in (("commands", self._write), ("events", self._read))
+        ]
+        _log.info("child %d started: %s", process.pid, process.args)
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def pid(self) -> int:
+        """Process number."""
+        return self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """Tell whether the process has ended and its last event was delivered."""
+        return self._has_ended.is_set()
+
+    @property
+    def is_running(self) -> bool:
+        """Tell whether the process lives."""
+        return self._process.poll() is None
+
+    def send(self, command: Command, timeout_s: float = 0.0) -> bool:
+        """Queue a command for the child.
+
+        Returns
+        -------
+        bool
+            False when the queue is full, and stays full for `timeout_s`: the child takes nothing. A child
+            that has ended takes everything.
+        """
+        return self._put(self._encode(command), timeout_s)
+
+    def stop(self, timeout_s: float, *, wait_while_active: bool = False) -> None:
+        """Close the child's stdin after the queued commands, and wait for its end.
+
+        Parameters
+        ----------
+        timeout_s : float
+            The child is killed after so long.
+        wait_while_active : bool
+            Count the time from the child's last event, not from this call.
+        """
+        start_s = time.monotonic()
+        is_closing = self._put(None, timeout_s)
+        while is_closing:
+            since_s = max(start_s, self._last_event_s) if wait_while_active else start_s
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(max(0.0, min(_POLL_S, since_s + timeout_s - time.monotonic())))
+                break
+            is_closing = time.monotonic() - since_s < timeout_s
+        self.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_KILLED_S)
+        self._end_writing()
+        for thread in self._threads:
+            thread.join(_KILLED_S)
+
+    def kill(self) -> None:
+        """Kill the process, if it lives, without waiting for its end."""
+        if self.is_running:
+            _log.warning("child %d is killed", self.pid)
+            self._process.kill()
+
+    def _end_writing(self) -> None:
+        with contextlib.suppress(queue.Full):  # a thread that is busy writing ends with its pipe
+            self._commands.put_nowait(None)
+
+    def _put(self, data: bytes | None, timeout_s: float) -> bool:
+        try:
+            self._commands.put(data, block=timeout_s > 0.0, timeout=timeout_s or None)
+        except queue.Full:
+            return self._has_ended.is_set()
+        return True
+
+    def _write(self) -> None:
+        """Write queued commands until told to end, or until nobody reads them."""
+        with contextlib.suppress(OSError), self._stdin:
+            while (data := self._commands.get()) is not None:
+                self._stdin.write(data)
+                self._stdin.flush()
+
+    def _read(self) -> None:
+        """Deliver events until the child ends."""
+        with contextlib.suppress(OSError, ValueError), self._stdout:
+            while data := self._stdout.read1(READ_BYTES):  # type: ignore[attr-defined]
+                self._last_event_s = time.monotonic()
+                for event in self._decoder.feed(data):
+                    self._on_event(event)
+        code = self._process.wait()
+        _log.log(logging.WARNING if code else logging.INFO, "child %d ended with code %d", self.pid, code)
+        self._on_exit(code)
+        self._has_ended.set()
+        self._end_writing()
+
+
+class CommandReader(Generic[Command]):
+    """Child's side: reads commands from a pipe in a thread of its own.
+
+    Parameters
+    ----------
+    descriptor : int
+        Read end of the pipe. It is not read through a buffered file: the lock of one would be held by the
+        thread for ever, and the interpreter could not finish.
+    decoder : StreamDecoder
+        An error of it closes the reader like the end of the pipe.
+    on_closed : callable, optional
+        Called in the reading thread when the pipe has ended.
+    queue_size : int
+        Commands that may wait. More of them wait in the pipe, and then at the parent.
+    """
+
+    def __init__(
+        self,
+        descriptor: int,
+        decoder: StreamDecoder[Command],
+        on_closed: Callable[[], None] = lambda: None,
+        queue_size: int = 1024,
+    ) -> None:
+        self._descriptor = descriptor
+        self._decoder = decoder
+        self._on_closed = on_closed
+        self._commands: queue.Queue[Command | None] = queue.Queue(queue_size)
+        self._is_closed = False
+        threading.Thread(target=self._read, name="commands", daemon=True).start()
+
+    @property
+    def is_closed(self) -> bool:
+        """Tell whether `take` has come to the end of the pipe: the parent has gone or closed it."""
+        return self._is_closed
+
+    def take(self, timeout_s: float = 0.0) -> Command | None:
+        """Return the next command; None if none comes in time, and from the end of the pipe on."""
+        if self._is_closed:
+            return None
+        try:
+            command = self._commands.get(block=timeout_s > 0.0, timeout=timeout_s or None)
+        except queue.Empty:
+            return None
+        self._is_closed = command is None
+        return command
+
+    def _read(self) -> None:
+        try:
+            while data := os.read(self._descriptor, READ_BYTES):
+                for command in self._decoder.feed(data):
+                    self._commands.put(command)
+        except (OSError, ValueError) as error:
+            _log.warning("commands: %s", error)
+        self._on_closed()
+        self._commands.put(None)
+
+
+class EventSender(Generic[Event]):
+    """Child's side: writes events to a pipe in a thread of its own.
+
+    A parent that does not read misses events; it never blocks the child.
+
+    Parameters
+    ----------
+    descriptor : int
+        Write end of the pipe.
+    is_transient : callable, optional
+        Tells of an event whether it is soon replaced by a newer one. Such events are dropped first.
+    """
+
+    _QUEUE_EVENTS = 4096
+    _CLOSE_S = 2.0
+
+    def __init__(self, descriptor: int, is_transient: Callable[[Event], bool] = lambda _: False) -> None:
+        self._descriptor = descriptor
+        self._is_transient = is_transient
+        # `send` bounds it: a queue that bounds itself takes several times as long for each event.
+        self._events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._write, name="events", daemon=True)
+        self._thread.start()
+
+    def send(self, event: Event) -> None:
+        """Queue an event for the parent."""
+        if self._events.qsize() < self._QUEUE_EVENTS // (2 if self._is_transient(event) else 1):
+            self._events.put(event)
+
+    def close(self) -> None:
+        """Write the queued events, and wait for that up to 2 s."""
+        self._events.put(None)
+        self._thread.join(self._CLOSE_S)
+
+    def _write(self) -> None:
+        with contextlib.suppress(OSError):
+            while (event := self._events.get()) is not None:
+                line = encode_line(event)
+                while line:
+                    line = line[os.write(self._descriptor, line) :]
+
+
+def reserve_stdout() -> int:
+    """Return a descriptor of stdout for events alone; whatever else is printed goes to stderr."""
+    descriptor = os.dup(1)
+    with contextlib.suppress(OSError):  # a program without a console may have no stderr
+        os.dup2(2, 1)
+    return descriptor
+
+
+def ignore_session_signals(*more: str) -> None:
+    """Ignore the signals that reach all processes of a terminal, and those named besides."""
+    for name in (*_SESSION_SIGNALS, *more):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+
+
+def json_decoder(kind: Any) -> Callable[[bytes], Any]:  # mypy has no type for a union as a value
+    """Return a function that decodes one line of JSON as `kind`.
+
+    It raises ValueError, of which msgspec.DecodeError is a kind.
+    """
+    decoder = msgspec.json.Decoder(kind)
+
+    def decode(line: bytes) -> Any:
+        try:
+            return decoder.decode(line)
+        except msgspec.DecodeError:
+            if b"\\ud" not in line:
+                raise
+            return msgspec.convert(json.loads(line), kind)  # lone surrogates, see `encode_line`
+
+    return decode
