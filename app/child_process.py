@@ -157,6 +157,7 @@ class ChildProcess(Generic[Command, Event]):
         self._on_exit = on_exit
         self._commands: queue.Queue[bytes | None] = queue.Queue(queue_size)
         self._last_event_s = time.monotonic()
+        self._is_killed = False
         self._has_ended = threading.Event()
         self._threads = [
             threading.Thread(target=work, name=f"child {name}", daemon=True)
@@ -220,7 +221,8 @@ class ChildProcess(Generic[Command, Event]):
     def kill(self) -> None:
         """Kill the process, if it lives, without waiting for its end."""
         if self.is_running:
-            _log.warning("child %d is killed", self.pid)
+            _log.info("child %d is killed", self.pid)
+            self._is_killed = True
             self._process.kill()
 
     def _end_writing(self) -> None:
@@ -249,7 +251,8 @@ class ChildProcess(Generic[Command, Event]):
                 for event in self._decoder.feed(data):
                     self._on_event(event)
         code = self._process.wait()
-        _log.log(logging.WARNING if code else logging.INFO, "child %d ended with code %d", self.pid, code)
+        level = logging.WARNING if code and not self._is_killed else logging.INFO
+        _log.log(level, "child %d ended with code %d", self._process.pid, code)
         self._on_exit(code)
         self._has_ended.set()
         self._end_writing()

@@ -102,9 +102,9 @@ def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadat
     first = fill(ring)
     client.follow(FollowRun(str(ring.path), first, metadata, TIMED))
     deadline = time.monotonic() + PATIENCE_S
-    while client._newest is None and time.monotonic() < deadline:
+    while client._latest is None and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert client._newest is not None
+    assert client._latest is not None
 
     client.end_run()
 
