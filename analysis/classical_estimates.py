@@ -15,7 +15,7 @@ from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.one_mass.turning_points import classical_log_decrement, find_crossings, find_turning_points
 from analysis.preparation.channels import Channel
-from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
+from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.mounting import relative_to_table
 from analysis.record import Record, RecordError
 
@@ -90,7 +90,9 @@ def zero_crossings(x: Floats, y: Floats) -> tuple[float, ...]:
 
 def _with_fitted_tail(decay: FreeDecay, identification: Identification) -> FreeDecay:
     end = identification.events.slip_end_s
-    return decay if end is None else fit_tail(decay, float(decay.channels.from_record_time(np.array(end))))
+    return (
+        decay if end is None else decay.with_tail_from(float(decay.channels.from_record_time(np.array(end))))
+    )
 
 
 def _turning_points(decay: FreeDecay) -> tuple[float | None, float | None, float | None, int]:

@@ -1,18 +1,18 @@
 """The whole way from a record to friction with its uncertainty and verdict."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from analysis.arrays import Floats
 from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess, initial_points
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit, Search, may_be_friction
 from analysis.formatting import format_number
-from analysis.identification import Events, Identification, ModelSelection, MonteCarlo
+from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, law_by_name, law_without
-from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
-from analysis.preparation.plausibility import check_friction, pullback_warnings
+from analysis.preparation.free_decay import FreeDecay, prepare
+from analysis.preparation.plausibility import pullback_warnings
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError
 from analysis.results.curves import fitted_curves, friction_curves, friction_objective, named_parameters
@@ -22,20 +22,20 @@ from analysis.results.decay_constants import (
     constants_from_joint_fit,
     constants_from_tail,
 )
-from analysis.results.events import SlipEnd, build_events, find_slip_end
-from analysis.results.fitted_quantities import add_fitted_quantities, joint_fit_uncertainty
+from analysis.results.events import build_events, find_slip_end
+from analysis.results.fitted_quantities import add_fitted_quantities
+from analysis.results.joint_fit import JointFit, choose_law
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
 from analysis.results.static_bounds import add_no_slip_bound, add_static_friction_bounds
 from analysis.results.verdict import (
     assess_model,
     identifiability_warnings,
-    identifiable_fits,
     inadequate_warning,
     tail_warnings,
 )
 from analysis.synthetic import Truth, simulate_record
-from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstated_gains
+from analysis.uncertainty import UncertaintyBudget, unstated_gains
 from messages.message import message
 
 Progress = Callable[[float, str], None]
@@ -54,8 +54,8 @@ def identify(
     ----------
     record : Record
     model : str
-        "auto" (the likeliest law is chosen; Stribeck friction is tried only where none of the others is
-        adequate) or one of `Model`'s values.
+        "auto" (the likeliest of the compared laws; the fallback laws of `analysis.laws.catalogue` are tried
+        only where none of these is adequate) or the name of a law.
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
     monte_carlo : int, optional
@@ -68,59 +68,124 @@ def identify(
     AnalysisError
         Unknown model.
     """
-    models = _models(model)
+    laws = COMPARED_LAWS if model == "auto" else (law_by_name(model),)
     report = progress or (lambda _share, _what: None)
+
     report(0.0, "looking for the release")
     decay = prepare(record)
     if not decay.slips:
-        return _without_slip(record, decay, drawn=monte_carlo is not None)
-    problem = build_problem(record, decay)
-    search, widest = _searched(record, decay, problem, report)
-    report(0.6, "fitting " + ", ".join(law.name for law in models))
-    fits = _fits(search, models, widest)
-    if model == "auto" and _wants_other_friction(problem, decay, fits):
-        for law in FALLBACK_LAWS:
-            report(0.7, f"fitting {law.name}")
-            fits.append(search.fit_fallback(law, fits[len(COMPARED_LAWS) - 1]))
-    result = _result(record, decay, problem, fits, monte_carlo, report)
-    if model != "auto":
-        result.warnings.extend(_needless_static(search, fits[0], widest))
-    report(1.0, "done")
-    return result
+        return _identify_without_slip(record, decay, with_monte_carlo=monte_carlo is not None)
 
-
-def _searched(
-    record: Record, decay: FreeDecay, problem: FitProblem, report: Progress
-) -> tuple[Search, list[Floats]]:
-    """Minima of the widest law without Stribeck friction."""
     report(0.1, "first estimate")
-    start, guided = initial_guess(problem, decay)
-    search = Search(problem, guided, decay.period_s, decay.dense_until_s)
+    problem = build_problem(record, decay)
+    start, informed_problem = initial_guess(problem, decay)
+    search = Search(problem, informed_problem, decay.period_s, decay.dense_until_s)
     if decay.plateau is not None:
         points = [search.fit_first_slip(point) for point in initial_points(start, decay)]
     else:
-        points = guess_release(guided, start, decay.period_s, record.pullback_m)
+        points = guess_release(informed_problem, start, decay.period_s, record.pullback_m)
+
     report(0.3, "following the motion")
-    return search, search.find_minima(points)
+    minima = search.find_minima(points)
+
+    report(0.6, "fitting " + ", ".join(law.name for law in laws))
+    fits = search.fit_all(laws, minima)
+    if model == "auto" and _may_need_other_law(problem, decay, fits):
+        widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
+        for law in FALLBACK_LAWS:
+            report(0.7, f"fitting {law.name}")
+            fits.append(search.fit_fallback(law, widest))
+
+    report(0.8, "uncertainty")
+    joint = choose_law(record, decay, problem, fits)
+    adequate = joint.selection.adequate
+    slip_end = find_slip_end(joint)
+    slip_ended = slip_end is not None or (decay.slip_end_s is not None and not adequate)
+    decay = decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
+    joint = replace(joint, decay=decay)
+    if decay.tail is not None:
+        constants = constants_from_tail(record, decay)
+    else:
+        constants = constants_from_joint_fit(joint.chosen, joint.uncertainty)
+
+    budget = UncertaintyBudget()
+    add_constants(constants, budget)
+    labels = add_fitted_quantities(joint, budget, slip_ended=slip_ended)
+    add_static_friction_bounds(joint, budget)
+    warnings = [
+        *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
+        *(tail_warnings(decay) if decay.tail is not None else [_no_tail_warning()]),
+        *identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
+        *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
+        *([] if adequate else [inadequate_warning(joint.selection), *mass_warnings(joint)]),
+        *([] if model == "auto" else _needless_static(search, joint.chosen, minima)),
+    ]
+    drawn = None
+    if monte_carlo is not None:
+        drawn = _check_by_monte_carlo(joint, constants, budget, monte_carlo, report)
+    delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
+    report(1.0, "done")
+    return Identification(
+        "two-mass",
+        budget.results,
+        labels,
+        joint.selection,
+        budget.lines + unstated_gains(record),
+        build_events(joint, slip_end),
+        warnings,
+        named_parameters(joint.chosen.parameters, decay),
+        fitted_curves(joint.chosen, decay, delays_s),
+        friction_objective(problem, joint.chosen),
+        friction_curves(joint.chosen, decay, delays_s),
+        drawn,
+    )
 
 
-def _fits(search: Search, models: tuple[FrictionLaw, ...], widest: list[Floats]) -> list[Fit]:
-    if models[0] in FALLBACK_LAWS:
-        return [search.fit_fallback(models[0], search.fit(WIDEST_LAW, widest))]
-    return search.fit_all(models, widest)
+def warm_up() -> None:
+    """Compile and load everything that an identification needs, before anybody waits for a result."""
+    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
 
 
-def _wants_other_friction(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
-    """Whether no law of `fits` explains the record, and another friction may be why."""
-    return not _judge(problem, decay, fits, fits).adequate and may_be_friction(problem, fits)
+def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo: bool) -> Identification:
+    """Period, damping and a lower bound of f_s: all that a record without slip gives."""
+    if decay.tail is None:
+        raise RecordError(
+            "the decay lasts {length} s, under two periods. Record until rest.",
+            length=format_number(decay.table.time_s[-1] - decay.release.time_s),
+        )
+    budget = UncertaintyBudget()
+    constants = constants_from_tail(record, decay)
+    add_constants(constants, budget)
+    add_no_slip_bound(record, constants, decay, budget)
+    seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
+    if decay.plateau is None:
+        seen += ", unless it came before the record"
+    text = message("{seen}: period and damping are given, and the least f_s that prevents slip.", seen=seen)
+    warnings = [*decay.warnings, *tail_warnings(decay), ResultWarning("no-slip", text)]
+    if with_monte_carlo:
+        text = message(
+            "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
+        )
+        warnings.append(ResultWarning("nothing-to-draw", text))
+    release = decay.channels.to_record_time(decay.release.time_s)
+    return Identification(
+        "two-mass", budget.results, budget=budget.lines, events=Events(release), warnings=warnings
+    )
 
 
-def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[ResultWarning]:
-    """Say so where the law that was asked for has an f_s that the record does not need."""
+def _may_need_other_law(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
+    """Whether none of `fits` explains the record, and another friction law may."""
+    best = min(fits, key=lambda fit: fit.bic)
+    selection = assess_model(problem, best, fits, decay.noise_reading_counts, decay.period_s)
+    return not selection.adequate and may_be_friction(problem, fits)
+
+
+def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[ResultWarning]:
+    """Warn where the law that was asked for has an f_s that the record does not need."""
     plain = law_without(asked.law, Parameter.FRICTION_STATIC)
     if plain is None or not asked.determines(Parameter.FRICTION_STATIC):
         return []
-    without = search.fit(plain, [*starts, asked.parameters])
+    without = search.fit(plain, [*minima, asked.parameters])
     if without.bic > asked.bic:
         return []
     text = message(
@@ -133,137 +198,22 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[R
     return [ResultWarning("static-not-needed", text)]
 
 
-def _judge(problem: FitProblem, decay: FreeDecay, candidates: list[Fit], fits: list[Fit]) -> ModelSelection:
-    chosen = min(candidates, key=lambda fit: fit.bic)
-    return assess_model(problem, chosen, fits, decay.noise_reading_counts, decay.period_s)
-
-
-def _models(name: str) -> tuple[FrictionLaw, ...]:
-    if name == "auto":
-        return COMPARED_LAWS
-    return (law_by_name(name),)
-
-
-def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identification:
-    """Period, damping and a lower bound of f_s are all that a record without slip gives."""
-    if decay.tail is None:
-        raise RecordError(
-            f"the decay lasts {format_number(decay.table.time_s[-1] - decay.release.time_s)} s, under two"
-            f" periods."
-            " Record until rest."
-        )
-    budget = UncertaintyBudget()
-    constants = constants_from_tail(record, decay)
-    decay.warnings.extend(tail_warnings(decay))
-    add_constants(constants, budget)
-    add_no_slip_bound(record, constants, decay, budget)
-    seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
-    if decay.plateau is None:
-        seen += ", unless it came before the record"
-    text = message("{seen}: period and damping are given, and the least f_s that prevents slip.", seen=seen)
-    warnings = [*decay.warnings, ResultWarning("no-slip", text)]
-    if drawn:
-        text = message(
-            "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
-        )
-        warnings.append(ResultWarning("nothing-to-draw", text))
-    release = decay.channels.to_record_time(decay.release.time_s)
-    return Identification(
-        "two-mass", budget.results, budget=budget.lines, events=Events(release), warnings=warnings
-    )
-
-
-def _result(
-    record: Record,
-    decay: FreeDecay,
-    problem: FitProblem,
-    fits: list[Fit],
-    refits: int | None,
-    report: Progress,
-) -> Identification:
-    report(0.8, "uncertainty")
-    candidates = identifiable_fits(fits)
-    chosen = min(candidates, key=lambda fit: fit.bic)
-    check_friction(chosen.value(Parameter.FRICTION_DYNAMIC))
-    fitted = joint_fit_uncertainty(record, decay, problem, chosen, candidates)
-    judged = _judge(problem, decay, candidates, fits)
-    slip_end = find_slip_end(problem, decay, chosen, candidates, adequate=judged.adequate)
-    ended = slip_end is not None or (decay.slip_end_s is not None and not judged.adequate)
-    decay, constants = _constants(record, decay, slip_end, chosen, fitted)
-    budget = UncertaintyBudget()
-    add_constants(constants, budget)
-    labels = add_fitted_quantities(
-        record, decay, problem, chosen, fitted, budget, ended=ended, profiled=_profiled(chosen, judged)
-    )
-    add_static_friction_bounds(problem, decay, chosen, candidates, fitted, budget)
-    warnings = [
-        *(warning for warning in decay.warnings if not _refuted(warning, decay, chosen)),
-        *identifiability_warnings(chosen, fitted, ended=ended),
-        *pullback_warnings(chosen.value(Parameter.PULLBACK), record.pullback_m),
-        *_inadequate(record, decay, chosen, judged),
-    ]
-    delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
-    return Identification(
-        "two-mass",
-        budget.results,
-        labels,
-        judged,
-        budget.lines + unstated_gains(record),
-        build_events(decay, chosen, slip_end),
-        warnings,
-        named_parameters(chosen.parameters, decay),
-        fitted_curves(chosen, decay, delays_s),
-        friction_objective(problem, chosen),
-        friction_curves(chosen, decay, delays_s),
-        _drawn(
-            MonteCarloModel(record, problem, chosen, fitted, decay.tail, constants), budget, refits, report
-        ),
-    )
-
-
-def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelSelection) -> list[ResultWarning]:
-    """What is to be said of a law that does not explain the record, none of one that does."""
-    if judged.adequate:
-        return []
-    return [inadequate_warning(judged), *mass_warnings(record, decay, chosen)]
-
-
-def _profiled(chosen: Fit, judged: ModelSelection) -> bool:
-    """Whether intervals are worth following chi-square: with Stribeck friction that takes seconds."""
-    return judged.adequate or chosen.law.solver.is_closed_form
-
-
-def _refuted(warning: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:
+def _is_refuted(warning: ResultWarning, joint: JointFit) -> bool:
     """Whether the fit shows that the record begins with the release and not after it."""
-    begins_s = float(decay.table.time_s[0]) - decay.channels.interval_s
-    return warning.code == "release-not-recorded" and chosen.value(Parameter.RELEASE) >= begins_s
+    begins_s = float(joint.decay.table.time_s[0]) - joint.decay.channels.interval_s
+    return warning.code == "release-not-recorded" and joint.chosen.value(Parameter.RELEASE) >= begins_s
 
 
-def _drawn(
-    drawing: MonteCarloModel, budget: UncertaintyBudget, refits: int | None, report: Progress
-) -> MonteCarlo | None:
-    if refits is None:
-        return None
+def _no_tail_warning() -> ResultWarning:
+    text = message("the stick tail is shorter than two periods: period and damping come from the joint fit.")
+    return ResultWarning("tail-too-short", text)
 
+
+def _check_by_monte_carlo(
+    joint: JointFit, constants: DecayConstants, budget: UncertaintyBudget, refits: int, report: Progress
+) -> MonteCarlo:
     def progress(done: int) -> None:
         report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
 
-    return run_monte_carlo(drawing, budget.results, refits=refits, progress=progress)
-
-
-def _constants(
-    record: Record, decay: FreeDecay, slip_end: SlipEnd | None, chosen: Fit, fitted: ParameterUncertainty
-) -> tuple[FreeDecay, DecayConstants]:
-    """Period and damping from the stick tail once slip has surely ended, or from the joint fit."""
-    decay = fit_tail(decay, None if slip_end is None else slip_end.upper_limit_s)
-    if decay.tail is not None:
-        decay.warnings.extend(tail_warnings(decay))
-        return decay, constants_from_tail(record, decay)
-    text = message("the stick tail is shorter than two periods: period and damping come from the joint fit.")
-    decay.warnings.append(ResultWarning("tail-too-short", text))
-    return decay, constants_from_joint_fit(chosen, fitted)
-
-
-def warm_up() -> None:
-    """Identify a simulated record."""
-    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
+    model = MonteCarloModel(joint, constants)
+    return run_monte_carlo(model, budget.results, refits=refits, progress=progress)

@@ -20,11 +20,11 @@ from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 from analysis.preparation.drift import remove_drift
-from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
+from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.quantities import BudgetSource, Quantity
 from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.results.decay_constants import DecayConstants, constants_from_joint_fit, constants_from_tail
-from analysis.results.fitted_quantities import joint_fit_uncertainty
+from analysis.results.joint_fit import joint_fit_uncertainty
 from analysis.results.verdict import assess_model, identifiable_fits
 from analysis.stopping_rule import (
     LATEST_END_S,
@@ -264,7 +264,7 @@ def _joined(before: Channel, after: Channel) -> Channel:
 def _with_tail(decay: FreeDecay, stuck_s: float | None, before: DampedCosine | None) -> FreeDecay:
     """The stick tail from the fitted slip end, as refined from the last one where that began there."""
     if stuck_s is None or before is None or abs(before.start_s - stuck_s) > _SAME_START * decay.period_s:
-        return fit_tail(decay, stuck_s)
+        return decay.with_tail_from(stuck_s)
     tail = refit_damped_cosine(decay.table.between(before.start_s, np.inf), before)
     return replace(decay, tail=tail, period_s=tail.period_s)
 

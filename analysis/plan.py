@@ -24,7 +24,8 @@ from analysis.preparation.channels import SAMPLES_MIN, Channel
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
-from analysis.results.fitted_quantities import add_systematic_uncertainty, msk64_degree
+from analysis.results.fitted_quantities import msk64_degree
+from analysis.results.joint_fit import add_systematic_uncertainty
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
 from messages.message import message
 

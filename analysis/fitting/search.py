@@ -171,8 +171,11 @@ class Search:
     def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
 
-        In the end none may lie above a law that it holds as a special case.
+        In the end none may lie above a law that it holds as a special case. A single law that is not in
+        closed form is fitted from the fit of the widest that is.
         """
+        if not laws[-1].solver.is_closed_form:
+            return [self.fit_fallback(laws[-1], self.fit(WIDEST_LAW, starts))]
         fits: dict[FrictionLaw, Fit] = {}
         for model in reversed(laws):
             best = min(fits.values(), key=lambda fit: fit.chi_square, default=None)

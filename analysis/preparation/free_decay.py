@@ -1,6 +1,7 @@
-"""From a record to one oriented free decay: release, slip end, stick tail, noise, signs of the gauges."""
+"""Finds the free decay in a record: release, end of slip, stick tail, noise, and the signs of the gauges."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -25,18 +26,21 @@ from analysis.record import Record
 from messages.message import message
 
 TAIL_PERIODS_MIN = 2.0
+"""A shorter tail does not tell damping from a drift of the zero."""
 _RELEASE_MARGIN_S = 0.004
-"""Uncertainty of the release as `segments` finds it."""
+"""Uncertainty of the release as `find_releases` gives it: the half window of its slopes, rounded down."""
 _NEVER_SLIPS = 2.0
-"""Residual of a damped cosine over noise, from which on there must have been slip."""
+"""Residual of a damped cosine over noise above which there must have been slip."""
 _KEPT_MIN = 0.5
-"""A gauge 2 with a smaller share of sound readings is left out."""
+"""Gauge 2 is left out where a smaller share of its readings is valid."""
 _LONG_S = 1.5
-"""A decay this long after a hold is worth more than any that begins in motion."""
+"""A decay this long after a hold is preferred to any that begins in motion."""
 _EARLY_PERIODS = 2.0
 """Slip comes in the first swings."""
 _CHANCE = 5.0
-"""Standard deviations by which two mean squares of the same noise differ at most."""
+"""Two mean squares of the same noise differ by this many standard deviations at most."""
+_NOISE_SHARE = 0.2
+"""Last part of the record in which gauge 2 against the base is taken for at rest relative to the table."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,28 +52,28 @@ class FreeDecay:
     channels : Channels
         As read.
     table : Channel
-        From the hold to the end of free motion, times `sign`.
+        From the hold to the end of free motion, times `sign`, without drift.
     relative : Channel or None
-        Gauge 2 likewise, turned so that it is positive where the plate lies ahead of the table;
-        against the base where `absolute`.
-    absolute : bool
+        Gauge 2 likewise, positive where the plate lies ahead of the table; against the base where
+        `gauge_2_absolute`.
+    gauge_2_absolute : bool
     sign, relative_sign : int
         What the readings of gauge 1 and 2 were multiplied by.
     release : Release
     slip_end_s : float or None
-        None where slip lasts to the end or nothing tells.
+        None where slip lasts to the end or the readings do not tell.
     slips : bool
-        Does gauge 2 show any slip?
+        Whether the plate slips at all.
     period_s : float
         Of the stick tail, or of the spectrum where the tail is too short.
-    tail : Decay or None
-        None where the tail is shorter than two periods.
+    tail : DampedCosine or None
+        None where the tail is shorter than `TAIL_PERIODS_MIN`.
     noise_m : (float, float)
-    noise_readings : (int, int)
-        Number of readings that the noise was measured from.
-    warnings : list of ResultWarning
+    noise_reading_counts : (int, int)
+        Numbers of readings that the noise was measured from.
+    warnings : tuple of ResultWarning
     drift_m_per_s, table_drift_m_per_s : float
-        Steady drift of gauge 2 and 1 as turned; taken off `relative` and `table`, zero at the release.
+        Steady drift of gauge 2 and 1 as turned, already subtracted; zero at the release.
     """
 
     channels: Channels
@@ -85,14 +89,14 @@ class FreeDecay:
     tail: DampedCosine | None
     noise_m: tuple[float, float]
     noise_reading_counts: tuple[int, int]
-    warnings: list[ResultWarning]
+    warnings: tuple[ResultWarning, ...]
     drift_m_per_s: float = 0.0
     table_drift_m_per_s: float = 0.0
 
     @property
     def hold_end_s(self) -> float:
         """A time shortly before the release."""
-        return self.release.time_s - max(_RELEASE_MARGIN_S, 2.0 * self.channels.interval_s)
+        return _hold_end(self.release, self.channels)
 
     @property
     def dense_until_s(self) -> float:
@@ -102,8 +106,41 @@ class FreeDecay:
     @property
     def plateau(self) -> tuple[float, float] | None:
         """First and last time of the hold, where the record has it."""
-        start = self.release.plateau_start_s
-        return None if start is None or start >= self.hold_end_s else (start, self.hold_end_s)
+        return _plateau(self.release, self.channels)
+
+    def with_tail_from(self, start_s: float | None) -> Self:
+        """The same with the stick tail fitted from `start_s` on, or none."""
+        tail = fit_tail(self.table, start_s, self.period_s)
+        return replace(self, tail=tail, period_s=self.period_s if tail is None else tail.period_s)
+
+
+class _Slip(NamedTuple):
+    """End of slip, whether there was any, and the stick tail after it."""
+
+    end_s: float | None
+    occurs: bool
+    tail: DampedCosine | None
+    period_s: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Stretch:
+    """Both gauges from the hold to the end of free motion, turned; attributes as in `FreeDecay`."""
+
+    channels: Channels
+    table: Channel
+    relative: Channel | None
+    gauge_2_absolute: bool
+    sign: int
+    relative_sign: int
+    release: Release
+
+    @property
+    def plateau(self) -> tuple[float, float] | None:
+        return _plateau(self.release, self.channels)
+
+    def plateau_of(self, channel: Channel) -> Channel | None:
+        return None if self.plateau is None else channel.between(*self.plateau)
 
 
 def prepare(record: Record) -> FreeDecay:
@@ -112,37 +149,62 @@ def prepare(record: Record) -> FreeDecay:
     Raises
     ------
     RecordError
-        When there is none.
+        There is none.
     """
-    channels, warnings = _readable(record)
-    release = _choose(find_releases(channels.table), warnings)
-    begin = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
-    table = channels.table.between(begin, release.end_s + 1e-9)
-    relative = None if channels.relative is None else channels.relative.between(begin, release.end_s + 1e-9)
-    period = estimate_period(table, release)
-    rough = FreeDecay(
+    warnings: list[ResultWarning] = []
+    channels = _valid_channels(record, warnings)
+    release = _choose_release(find_releases(channels.table), warnings)
+    stretch, period_s = _oriented_stretch(channels, release, record.gauge_2_measures_plate, warnings)
+    if stretch.relative is None:
+        slip, drift, table_drift = _slip_by_table_alone(stretch, period_s), 0.0, 0.0
+    else:
+        stretch, slip, drift, table_drift = _slip_by_gauge_2(stretch, stretch.relative, period_s, warnings)
+    if stretch.relative is not None and not slip.occurs and _is_dead(stretch, slip, warnings):
+        stretch = replace(stretch, relative=None)
+        slip = _slip_by_table_alone(stretch, slip.period_s)
+    (noise, table), (relative_noise, relative) = _table_noise(stretch, slip), _relative_noise(stretch, slip)
+    return FreeDecay(
         channels=channels,
         table=table,
         relative=relative,
-        gauge_2_absolute=record.gauge_2_measures_plate,
-        sign=1,
-        relative_sign=1,
-        release=release,
-        slip_end_s=None,
-        slips=True,
-        period_s=period,
-        tail=None,
-        noise_m=(NOISE_FLOOR_M, NOISE_FLOOR_M),
-        noise_reading_counts=(0, 0),
-        warnings=warnings,
+        gauge_2_absolute=stretch.gauge_2_absolute,
+        sign=stretch.sign,
+        relative_sign=stretch.relative_sign,
+        release=stretch.release,
+        slip_end_s=slip.end_s,
+        slips=slip.occurs,
+        period_s=slip.period_s,
+        tail=slip.tail,
+        noise_m=(noise[0], relative_noise[0]),
+        noise_reading_counts=(noise[1], relative_noise[1]),
+        warnings=tuple(warnings),
+        drift_m_per_s=drift,
+        table_drift_m_per_s=table_drift,
     )
-    oriented = _oriented(rough)
-    return _with_noise(_without_dead_gauge(_with_tail(oriented)))
 
 
-def _readable(record: Record) -> tuple[Channels, list[ResultWarning]]:
-    """Readings that gauges can have seen, with what is said of the others."""
-    channels, warnings = read_channels(record)
+def fit_tail(table: Channel, start_s: float | None, period_s: float) -> DampedCosine | None:
+    """Fit the stick tail from `start_s` to the end; None where it is too short or does not begin."""
+    if start_s is None:
+        return None
+    tail = table.between(start_s, np.inf)
+    length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
+    return fit_damped_cosine(tail, period_s) if length_s >= TAIL_PERIODS_MIN * period_s else None
+
+
+def _hold_end(release: Release, channels: Channels) -> float:
+    return release.time_s - max(_RELEASE_MARGIN_S, 2.0 * channels.interval_s)
+
+
+def _plateau(release: Release, channels: Channels) -> tuple[float, float] | None:
+    start_s, end_s = release.plateau_start_s, _hold_end(release, channels)
+    return None if start_s is None or start_s >= end_s else (start_s, end_s)
+
+
+def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
+    """Readings that the gauges can have seen."""
+    channels, found = read_channels(record)
+    warnings += found
     if record.relative_displacement_m is None:
         text = message("the record has no gauge 2. The friction comes from the table channel alone.")
         warnings.append(ResultWarning("gauge-2-absent", text))
@@ -150,29 +212,30 @@ def _readable(record: Record) -> tuple[Channels, list[ResultWarning]]:
     check_rate(channels.table)
     table, relative = remove_invalid_readings(channels.table, "gauge 1", warnings), channels.relative
     if relative is not None:
-        relative = _most(relative, remove_invalid_readings(relative, "gauge 2", warnings), warnings)
+        relative = _if_mostly_valid(
+            relative, remove_invalid_readings(relative, "gauge 2", warnings), warnings
+        )
     for gauge, channel in (("gauge 1", table), ("gauge 2", relative)):
         hum = None if channel is None else detect_hum(channel)
         if hum is not None:
             warnings.append(hum_warning(gauge, hum))
-    return replace(channels, table=table, relative=relative), warnings
+    return replace(channels, table=table, relative=relative)
 
 
-def _most(readings: Channel, kept: Channel, warnings: list[ResultWarning]) -> Channel | None:
-    """What was kept of gauge 2, if that is most of it."""
-    if len(kept) >= _KEPT_MIN * len(readings):
-        return kept
+def _if_mostly_valid(readings: Channel, valid: Channel, warnings: list[ResultWarning]) -> Channel | None:
+    if len(valid) >= _KEPT_MIN * len(readings):
+        return valid
     text = message(
         "only {count} of {count_2} readings of gauge 2 are sound: it is left out, and the friction"
         " comes from the table channel alone. Re-centre gauge 2.",
-        count=len(kept),
+        count=len(valid),
         count_2=len(readings),
     )
     warnings.append(ResultWarning("gauge-2-absent", text))
     return None
 
 
-def _choose(releases: list[Release], warnings: list[ResultWarning]) -> Release:
+def _choose_release(releases: list[Release], warnings: list[ResultWarning]) -> Release:
     """The release with the longest decay after it; one with a hold before it where there is one."""
     if len(releases) > 1:
         times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
@@ -183,188 +246,168 @@ def _choose(releases: list[Release], warnings: list[ResultWarning]) -> Release:
             times=times,
         )
         warnings.append(ResultWarning("released-twice", text))
-    chosen = max(releases, key=_worth)
+    chosen = max(releases, key=_release_preference)
     if chosen.plateau_start_s is None:
         text = message("the record begins after the release: pullback and release time are extrapolated.")
         warnings.append(ResultWarning("release-not-recorded", text))
     return chosen
 
 
-def _worth(release: Release) -> tuple[bool, float]:
+def _release_preference(release: Release) -> tuple[bool, float]:
     length_s = release.end_s - release.time_s
     return release.plateau_start_s is not None and length_s > _LONG_S, length_s
 
 
-def _oriented(decay: FreeDecay) -> FreeDecay:
-    """Turn the channels so that pullback is positive and slip runs against the table."""
-    first = decay.table.between(decay.release.time_s, decay.release.time_s + 0.5 * decay.period_s)
-    sign = -1 if decay.plateau is not None and first.value_m[0] < first.value_m[-1] else 1
+def _oriented_stretch(
+    channels: Channels, release: Release, measures_plate: bool, warnings: list[ResultWarning]
+) -> tuple[_Stretch, float]:
+    """Cut both gauges and turn them so that the pullback is positive; the period (s) comes with them."""
+    begin_s = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
+    end_s = release.end_s + 1e-9
+    table = channels.table.between(begin_s, end_s)
+    period_s = estimate_period(table, release)
+    first = table.between(release.time_s, release.time_s + 0.5 * period_s).value_m
+    sign = -1 if _plateau(release, channels) is not None and first[0] < first[-1] else 1
     if sign < 0:
         text = message(
             "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
         )
-        decay.warnings.append(ResultWarning("pullback-negative", text))
-    table = decay.table.scaled(sign)
-    release = replace(decay.release, level_m=sign * decay.release.level_m)
-    turned = replace(decay, table=table, sign=sign, relative_sign=sign, release=release)
-    return turned if decay.relative is None else _with_gauge_2(turned, decay.relative.scaled(sign))
+        warnings.append(ResultWarning("pullback-negative", text))
+    table, turned = table.scaled(sign), replace(release, level_m=sign * release.level_m)
+    if channels.relative is None:
+        return _Stretch(channels, table, None, measures_plate, sign, sign, turned), period_s
+    relative = channels.relative.between(begin_s, end_s).scaled(sign)
+    mounting = detect_mounting(table, relative, release.time_s, period_s, measures_plate)
+    warnings += mounting.warnings
+    relative, relative_sign = relative.scaled(mounting.sign), sign * mounting.sign
+    stretch = _Stretch(channels, table, relative, mounting.measures_plate, sign, relative_sign, turned)
+    return stretch, period_s
 
 
-def _with_gauge_2(decay: FreeDecay, relative: Channel) -> FreeDecay:
-    """Turn gauge 2, mounted as its readings show."""
-    table, release_s = decay.table, decay.release.time_s
-    mounting = detect_mounting(table, relative, release_s, decay.period_s, decay.gauge_2_absolute)
-    decay.warnings.extend(mounting.warnings)
-    return replace(
-        decay,
-        relative=relative.scaled(mounting.sign),
-        relative_sign=decay.sign * mounting.sign,
-        gauge_2_absolute=mounting.measures_plate,
-    )
-
-
-def _with_tail(decay: FreeDecay) -> FreeDecay:
-    """Find the slip end, then fit the stick tail and repeat with its period."""
-    if decay.relative is None:
-        return _tail_of_table_alone(decay)
-    slip = relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute)
-    noise = (
-        detrended_noise(_last(slip, 0.2), decay.period_s)
-        if decay.gauge_2_absolute
-        else third_difference_noise(slip)
-    )
+def _slip_by_gauge_2(
+    stretch: _Stretch, relative: Channel, period_s: float, warnings: list[ResultWarning]
+) -> tuple[_Stretch, _Slip, float, float]:
+    """End of slip by gauge 2, and both gauges without their drift, which is returned (gauge 2, gauge 1)."""
+    release_s = stretch.release.time_s
+    slip = relative_to_table(stretch.table, relative, stretch.gauge_2_absolute)
+    if stretch.gauge_2_absolute:
+        noise = detrended_noise(_last_part(slip, _NOISE_SHARE), period_s)
+    else:
+        noise = third_difference_noise(slip)
     noise = max(noise, NOISE_FLOOR_M)
-    for _ in range(2):
-        end = find_last_slip(slip, decay.release.time_s, decay.period_s, noise)
-        decay = replace(decay, slip_end_s=end, slips=end is None or end > decay.release.time_s)
-        decay = fit_tail(decay, end)
-    decay = _without_table_drift(decay)
-    if decay.tail is None:
-        return decay
-    return _without_drift(decay, slip.between(decay.tail.start_s, np.inf), noise)
-
-
-def _without_drift(decay: FreeDecay, rest: Channel, noise_m: float) -> FreeDecay:
-    """Take off what gauge 2 drifts while the plate sticks."""
-    relative = decay.relative
-    if relative is None:
-        return decay
-    drift = find_drift(None if decay.plateau is None else relative.between(*decay.plateau), rest, noise_m)
-    if drift != 0.0:
-        decay.warnings.append(drift_warning(2, relative, drift))
-    if not drift:
-        return decay
-    return replace(decay, relative=remove_drift(relative, drift, decay.release.time_s), drift_m_per_s=drift)
-
-
-def _without_table_drift(decay: FreeDecay) -> FreeDecay:
-    """Take off what gauge 1 drifts, as the tail leaves it over, and fit the tail again."""
-    tail = decay.tail
+    end_s, tail = None, None
+    for _ in range(2):  # the second time with the period of the tail
+        end_s = find_last_slip(slip, release_s, period_s, noise)
+        tail = fit_tail(stretch.table, end_s, period_s)
+        period_s = period_s if tail is None else tail.period_s
+    occurs = end_s is None or end_s > release_s
     if tail is None:
-        return decay
-    left = Channel(decay.table.between(tail.start_s, np.inf).time_s, tail.residual_m)
-    held = None if decay.plateau is None else decay.table.between(*decay.plateau)
-    drift = find_drift(held, left, NOISE_FLOOR_M)
+        return stretch, _Slip(end_s, occurs, None, period_s), 0.0, 0.0
+    at_rest = slip.between(tail.start_s, np.inf)
+    table, table_drift = _without_table_drift(stretch, tail, warnings)
+    if table_drift:
+        refitted = fit_tail(table, tail.start_s, period_s)
+        tail, period_s = refitted, period_s if refitted is None else refitted.period_s
+    drift = 0.0
+    if tail is not None:
+        drift = _drift(2, relative, stretch.plateau_of(relative), at_rest, noise, warnings)
+    if drift:
+        relative = remove_drift(relative, drift, release_s)
+    level = replace(stretch, table=table, relative=relative)
+    return level, _Slip(end_s, occurs, tail, period_s), drift, table_drift
+
+
+def _without_table_drift(
+    stretch: _Stretch, tail: DampedCosine, warnings: list[ResultWarning]
+) -> tuple[Channel, float]:
+    """Gauge 1 without the drift that the tail leaves as residual, and that drift (m/s)."""
+    table = stretch.table
+    residual = Channel(table.between(tail.start_s, np.inf).time_s, tail.residual_m)
+    drift = _drift(1, table, stretch.plateau_of(table), residual, NOISE_FLOOR_M, warnings)
+    return (remove_drift(table, drift, stretch.release.time_s) if drift else table), drift
+
+
+def _drift(
+    gauge: int,
+    channel: Channel,
+    held: Channel | None,
+    at_rest: Channel,
+    noise_m: float,
+    warnings: list[ResultWarning],
+) -> float:
+    """Steady drift (m/s); 0 where there is none, or none that is steady."""
+    drift = find_drift(held, at_rest, noise_m)
     if drift != 0.0:
-        decay.warnings.append(drift_warning(1, decay.table, drift))
-    if not drift:
-        return decay
-    table = remove_drift(decay.table, drift, decay.release.time_s)
-    return fit_tail(replace(decay, table=table, table_drift_m_per_s=drift), tail.start_s)
+        warnings.append(drift_warning(gauge, channel, drift))
+    return drift or 0.0
 
 
-def fit_tail(decay: FreeDecay, start_s: float | None) -> FreeDecay:
-    """Fit the stick tail from `start_s` to the end, where it is long enough."""
-    if start_s is None:
-        return replace(decay, tail=None)
-    tail = decay.table.between(start_s, np.inf)
-    length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
-    if length_s < TAIL_PERIODS_MIN * decay.period_s:
-        return replace(decay, tail=None)
-    fitted = fit_damped_cosine(tail, decay.period_s)
-    return replace(decay, tail=fitted, period_s=fitted.period_s)
-
-
-def _tail_of_table_alone(decay: FreeDecay) -> FreeDecay:
+def _slip_by_table_alone(stretch: _Stretch, period_s: float) -> _Slip:
     """Without gauge 2 the last half of the motion is taken as tail until the joint fit knows better.
 
-    Unless the whole motion is that of one mass: then nothing slipped that the table could tell of.
+    Unless the whole motion is that of one mass: then nothing slipped that the table could show.
     """
-    middle = 0.5 * (decay.release.time_s + float(decay.table.time_s[-1]))
-    late = replace(fit_tail(decay, middle), slip_end_s=None, slips=True)
-    whole = fit_tail(decay, decay.release.time_s + _RELEASE_MARGIN_S)
-    return replace(whole, slip_end_s=None, slips=False) if _explained(whole, late) else late
+    table, release_s = stretch.table, stretch.release.time_s
+    late = fit_tail(table, 0.5 * (release_s + float(table.time_s[-1])), period_s)
+    whole = fit_tail(table, release_s + _RELEASE_MARGIN_S, period_s)
+    if whole is not None and _explains_first_swings(whole, late, stretch):
+        return _Slip(None, False, whole, whole.period_s)
+    return _Slip(None, True, late, period_s if late is None else late.period_s)
 
 
-def _explained(whole: FreeDecay, late: FreeDecay) -> bool:
-    """Whether one decay leaves no more of the first swings than the late one of its own stretch: noise."""
-    if whole.tail is None:
-        return False
-    early = whole.tail.residual_m[: int(_EARLY_PERIODS / whole.tail.periods * len(whole.tail.residual_m))]
-    noise, count = (
-        _tail_noise(late) if late.tail is not None else (third_difference_noise(whole.table), len(early))
-    )
+def _explains_first_swings(whole: DampedCosine, late: DampedCosine | None, stretch: _Stretch) -> bool:
+    """Whether one decay leaves no more of the first swings than the late one of its own part: noise."""
+    early = whole.residual_m[: int(_EARLY_PERIODS / whole.periods * len(whole.residual_m))]
+    noise, count = third_difference_noise(stretch.table), len(early)
+    if late is not None:
+        noise, count = late.rms_m, len(late.residual_m)
     chance = float(np.exp(_CHANCE * np.sqrt(2.0 / len(early) + 2.0 / count)))
-    floor = noise_with_floor(0.0, whole.channels.quantisation_m[0]) ** 2
+    floor = noise_with_floor(0.0, stretch.channels.quantisation_m[0]) ** 2
     return float(np.mean(early**2)) <= chance * noise**2 + floor
 
 
-def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
-    """Leave gauge 2 out where it shows no slip and the table does not swing like a mass that never slips."""
-    if decay.slips or decay.relative is None or decay.tail is None:
-        return decay
-    if decay.tail.rms_m <= _NEVER_SLIPS * third_difference_noise(decay.table) + NOISE_FLOOR_M:
-        return decay
+def _is_dead(stretch: _Stretch, slip: _Slip, warnings: list[ResultWarning]) -> bool:
+    """Whether gauge 2 shows no slip though the table does not swing like a mass that never slips."""
+    limit = _NEVER_SLIPS * third_difference_noise(stretch.table) + NOISE_FLOOR_M
+    if slip.tail is None or slip.tail.rms_m <= limit:
+        return False
     text = message(
         "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as"
         " dead. The friction comes from the table channel alone."
     )
-    decay.warnings.append(ResultWarning("gauge-2-dead", text))
-    return _tail_of_table_alone(replace(decay, relative=None))
+    warnings.append(ResultWarning("gauge-2-dead", text))
+    return True
 
 
-def _last(channel: Channel, share: float) -> Channel:
-    start = channel.time_s[-1] - share * (channel.time_s[-1] - channel.time_s[0])
-    return channel.between(start, np.inf)
+def _last_part(channel: Channel, share: float) -> Channel:
+    start_s = channel.time_s[-1] - share * (channel.time_s[-1] - channel.time_s[0])
+    return channel.between(start_s, np.inf)
 
 
-def _with_noise(decay: FreeDecay) -> FreeDecay:
-    """Noise of both gauges: in the hold, and about the tail or after slip."""
-    steps = decay.channels.quantisation_m
-    table = pool_noise(
-        [_hold_noise(decay, decay.table), _tail_noise(decay)], third_difference_noise(decay.table)
+def _table_noise(stretch: _Stretch, slip: _Slip) -> tuple[tuple[float, int], Channel]:
+    """Noise of gauge 1 in the hold and about the tail, the number of readings, and the readings to fit."""
+    table, tail = stretch.table, slip.tail
+    of_tail = (0.0, 0) if tail is None else (tail.rms_m, len(tail.residual_m))
+    noise, count = pool_noise([_hold_noise(stretch, table, slip), of_tail], third_difference_noise(table))
+    step_m = stretch.channels.quantisation_m[0]
+    return (noise_with_floor(noise, step_m), count), merge_repeated_readings(table, noise, step_m)
+
+
+def _relative_noise(stretch: _Stretch, slip: _Slip) -> tuple[tuple[float, int], Channel | None]:
+    """The same of gauge 2, in the hold and after slip."""
+    relative, step_m = stretch.relative, stretch.channels.quantisation_m[1]
+    if relative is None:
+        return (noise_with_floor(0.0, step_m), 0), None
+    at_rest = (0.0, 0)
+    if slip.end_s is not None and not stretch.gauge_2_absolute:
+        rest = relative.between(slip.end_s, np.inf)
+        at_rest = detrended_noise(rest, 0.5 * slip.period_s), len(rest)
+    noise, count = pool_noise(
+        [_hold_noise(stretch, relative, slip), at_rest], third_difference_noise(relative)
     )
-    relative = (0.0, 0)
-    if decay.relative is not None:
-        found = [_hold_noise(decay, decay.relative), _rest_noise(decay, decay.relative)]
-        relative = pool_noise(found, third_difference_noise(decay.relative))
-    noise = noise_with_floor(table[0], steps[0]), noise_with_floor(relative[0], steps[1])
-    return replace(
-        decay,
-        table=merge_repeated_readings(decay.table, table[0], steps[0]),
-        relative=None
-        if decay.relative is None
-        else merge_repeated_readings(decay.relative, relative[0], steps[1]),
-        noise_m=noise,
-        noise_reading_counts=(table[1], relative[1]),
-    )
+    return (noise_with_floor(noise, step_m), count), merge_repeated_readings(relative, noise, step_m)
 
 
-def _hold_noise(decay: FreeDecay, channel: Channel) -> tuple[float, int]:
-    if decay.plateau is None:
-        return 0.0, 0
-    hold = channel.between(*decay.plateau)
-    return detrended_noise(hold, 0.5 * decay.period_s), len(hold)
-
-
-def _tail_noise(decay: FreeDecay) -> tuple[float, int]:
-    """Residual of gauge 1 about the damped cosine."""
-    return (0.0, 0) if decay.tail is None else (decay.tail.rms_m, len(decay.tail.residual_m))
-
-
-def _rest_noise(decay: FreeDecay, relative: Channel) -> tuple[float, int]:
-    """Noise of gauge 2 after slip, where it reads the plate against the table."""
-    if decay.slip_end_s is None or decay.gauge_2_absolute:
-        return 0.0, 0
-    rest = relative.between(decay.slip_end_s, np.inf)
-    return detrended_noise(rest, 0.5 * decay.period_s), len(rest)
+def _hold_noise(stretch: _Stretch, channel: Channel, slip: _Slip) -> tuple[float, int]:
+    hold = stretch.plateau_of(channel)
+    return (0.0, 0) if hold is None else (detrended_noise(hold, 0.5 * slip.period_s), len(hold))

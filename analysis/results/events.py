@@ -6,13 +6,14 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.problem import FitProblem, motion_phases, project_to_bounds
+from analysis.fitting.problem import motion_phases, project_to_bounds
 from analysis.fitting.search import Fit
 from analysis.identification import Events
 from analysis.laws.catalogue import compared_law
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
+from analysis.results.joint_fit import JointFit
 from analysis.results.static_bounds import largest_static_friction
 
 _DRAWS = 40
@@ -34,9 +35,7 @@ class SlipEnd:
         return self.time_s + 2.0 * self.uncertainty_s
 
 
-def find_slip_end(
-    problem: FitProblem, decay: FreeDecay, chosen: Fit, candidates: list[Fit], *, adequate: bool
-) -> SlipEnd | None:
+def find_slip_end(joint: JointFit) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
     The last slips are often smaller than the noise, so that gauge 2 alone tells the end to a quarter period
@@ -47,12 +46,13 @@ def find_slip_end(
     SlipEnd or None
         None where slip lasts to the end of the record, or comes again after it.
     """
-    end_s, largest = float(decay.table.time_s[-1]), np.inf
+    decay, chosen, adequate = joint.decay, joint.chosen, joint.selection.adequate
+    end_s, largest = joint.end_s, np.inf
     if adequate and _slips_on(chosen, end_s, decay.period_s):
         return None
     if not chosen.law.has_static_friction:
-        _, largest = largest_static_friction(problem, decay, chosen, candidates)
-    fitted = fitted_slip_end(chosen, candidates, end_s, largest)
+        _, largest = largest_static_friction(joint)
+    fitted = _fitted_slip_end(chosen, joint.candidates, end_s, largest)
     if fitted is not None and not chosen.law.has_static_friction:
         fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
@@ -63,7 +63,7 @@ def find_slip_end(
     return SlipEnd(max(fitted.time_s, decay.slip_end_s), uncertainty_s)
 
 
-def fitted_slip_end(chosen: Fit, candidates: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
+def _fitted_slip_end(chosen: Fit, candidates: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
     """End of the fitted slip, and how far it scatters when the parameters do, over every plausible law.
 
     A last small slip comes or goes with small changes of f_s, so that its end has no useful derivative:
@@ -78,8 +78,9 @@ def fitted_slip_end(chosen: Fit, candidates: list[Fit], end_s: float, largest: f
     return SlipEnd(end, max(scatters))
 
 
-def build_events(decay: FreeDecay, chosen: Fit, slip_end: SlipEnd | None) -> Events:
+def build_events(joint: JointFit, slip_end: SlipEnd | None) -> Events:
     """Events in the record's time."""
+    decay, chosen = joint.decay, joint.chosen
     to_record, scale = decay.channels.to_record_time, decay.channels.clock_scale
     index = int(np.flatnonzero(chosen.free == Parameter.RELEASE)[0])
     release_uncertainty_s = float(np.sqrt(covariance(chosen.normal_matrix)[0][index, index]))

@@ -1,113 +1,53 @@
 """Quantities of INTERFACE ("results") from fitted parameters, each with its uncertainty by source."""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import nonlinearity_slope_error, range_m
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import Profile
 from analysis.fitting.search import Fit
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
-from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
-from analysis.record import AnalysisError, Record
+from analysis.record import AnalysisError
+from analysis.results.curves import SIGNED_PARAMETERS
+from analysis.results.joint_fit import JointFit
 from analysis.uncertainty import (
     COVERAGE_FACTOR_95,
-    ParameterUncertainty,
     UncertaintyBudget,
-    levelling_shift,
     numerical_gradient,
-    propagate_with_model_choice,
     white_noise_variance,
 )
 
-_TIME_POWERS = {
-    Parameter.FRICTION_DYNAMIC: -2.0,
-    Parameter.FRICTION_STATIC: -2.0,
-    Parameter.TILT: -2.0,
-    Parameter.STIFFNESS: -2.0,
-    Parameter.DAMPING: -1.0,
-}
-"""How a parameter scales when all times are stretched."""
-_GRAVITY_POWERS = {Parameter.FRICTION_DYNAMIC: -1.0, Parameter.FRICTION_STATIC: -1.0, Parameter.TILT: -1.0}
-
-
-def joint_fit_uncertainty(
-    record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, candidates: list[Fit]
-) -> ParameterUncertainty:
-    """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
-    return add_systematic_uncertainty(
-        record, problem, fit, propagate_with_model_choice(problem, fit, candidates, decay.period_s / 4.0)
-    )
-
-
-def add_systematic_uncertainty(
-    record: Record, problem: FitProblem, fit: Fit, own: ParameterUncertainty
-) -> ParameterUncertainty:
-    """The fit's `own` distribution with what the fit does not know of: time base, gravity, levelling."""
-    columns = dict(own.shifts)
-    _split(
-        columns,
-        BudgetSource.GAUGE_1_GAIN,
-        BudgetSource.GAUGE_1_NONLINEARITY,
-        nonlinearity_slope_error(record.table_gauge, range_m(problem.table.value_m)),
-        record.table_gauge.gain_relative or 0.0,
-    )
-    if problem.relative is not None:
-        _split(
-            columns,
-            BudgetSource.GAUGE_2_GAIN,
-            BudgetSource.GAUGE_2_NONLINEARITY,
-            nonlinearity_slope_error(record.relative_gauge, range_m(problem.relative.value_m)),
-            record.relative_gauge.gain_relative or 0.0,
-        )
-    columns[BudgetSource.TIME_BASE] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
-    gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
-    columns[BudgetSource.GRAVITY] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
-    tilt = levelling_shift(problem, fit)
-    if tilt is not None:
-        columns[BudgetSource.LEVELLING] = tilt
-    return ParameterUncertainty(columns, own.noise_covariance)
-
 
 def add_fitted_quantities(
-    record: Record,
-    decay: FreeDecay,
-    problem: FitProblem,
-    fit: Fit,
-    fitted: ParameterUncertainty,
-    budget: UncertaintyBudget,
-    *,
-    ended: bool,
-    profiled: bool,
+    joint: JointFit, budget: UncertaintyBudget, *, slip_ended: bool
 ) -> dict[str, str | bool]:
-    """Note friction, tilt, pullback, u_s if slip `ended` and largest rates; returns the MSK-64 degree.
+    """Add friction, tilt, pullback, u_s if slip has ended, and peak rates; return the MSK-64 degree.
 
-    Intervals of f_d and f_s follow chi-square itself where `profiled`.
+    Intervals of f_d and f_s follow chi-square itself, except where that takes seconds for a law that does
+    not explain the record.
     """
+    fit, fitted = joint.chosen, joint.uncertainty
+    profiled = joint.selection.adequate or fit.law.solver.is_closed_form
     own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
     of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
     for place, name, unit in (*_FRICTION, *of_law, *_STAND):
         if fit.determines(place):
-            sign = decay.sign if place in (Parameter.TILT, Parameter.PULLBACK) else 1
+            sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
             weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
             shares, reach = fitted.contributions(weights), None
             if profiled and fit.law.has_static_friction and place in _PROFILED:
-                shares, reach = _by_profile(problem, fit, place, shares)
+                shares, reach = _by_profile(joint.problem, fit, place, shares)
             budget.add(name, sign * fit.value(place), unit, shares, reach)
-    if ended:
-        _add_residual_displacement(record, decay, fit, fitted, budget)
-    duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
-    _add_functions(
-        budget, fit, fitted, _RATES, lambda p: fit.law.solver.peak_rates(fit.law.vector(p), duration)
-    )
+    if slip_ended:
+        _add_residual_displacement(joint, budget)
+    _add_peak_rates(joint, budget)
     velocity = budget.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
 
@@ -131,35 +71,29 @@ def _by_profile(
     return {**shares, BudgetSource.NOISE: float(noise)}, reach
 
 
-def _add_functions(
-    budget: UncertaintyBudget,
-    fit: Fit,
-    fitted: ParameterUncertainty,
-    names: tuple[tuple[str, str], ...],
-    functions: Callable[[Floats], Floats],
-) -> None:
-    """Note several functions of the parameters at once; those that are not finite are left out."""
+def _add_peak_rates(joint: JointFit, budget: UncertaintyBudget) -> None:
+    law, duration_s = joint.chosen.law, joint.duration_s
 
-    def within(parameters: Floats) -> Floats:
-        return functions(project_to_bounds(parameters, fit.law))
+    def rates(parameters: Floats) -> Floats:
+        return law.solver.peak_rates(law.vector(project_to_bounds(parameters, law)), duration_s)
 
-    values, slopes = within(fit.parameters), numerical_gradient(within, fit.parameters)
-    for (name, unit), value, weights in zip(names, values, slopes, strict=True):
+    point = joint.chosen.parameters
+    for (name, unit), value, weights in zip(
+        _RATES, rates(point), numerical_gradient(rates, point), strict=True
+    ):
         if np.isfinite(value):
-            budget.add(name, float(value), unit, fitted.contributions(np.nan_to_num(weights)))
+            budget.add(name, float(value), unit, joint.uncertainty.contributions(np.nan_to_num(weights)))
 
 
-def _add_residual_displacement(
-    record: Record, decay: FreeDecay, fit: Fit, fitted: ParameterUncertainty, budget: UncertaintyBudget
-) -> None:
-    """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
-    duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
+def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> None:
+    """Add u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
+    law, decay, duration_s = joint.chosen.law, joint.decay, joint.duration_s
 
     def end(parameters: Floats) -> float:
-        vector = fit.law.vector(project_to_bounds(parameters, fit.law))
-        return fit.law.solver.final_relative(vector, duration)
+        return law.solver.final_relative(law.vector(project_to_bounds(parameters, law)), duration_s)
 
-    value, shares = end(fit.parameters), fitted.contributions(numerical_gradient(end, fit.parameters))
+    point = joint.chosen.parameters
+    value, shares = end(point), joint.uncertainty.contributions(numerical_gradient(end, point))
     if (
         decay.relative is not None
         and decay.plateau is not None
@@ -168,35 +102,13 @@ def _add_residual_displacement(
     ):
         held = decay.relative.between(*decay.plateau).value_m
         rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
-        value, gauge = float(rest.mean() - held.mean()), record.relative_gauge
+        value, gauge = float(rest.mean() - held.mean()), joint.record.relative_gauge
         shares = {
             BudgetSource.NOISE: decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
             BudgetSource.GAUGE_2_GAIN: value * (gauge.gain_relative or 0.0),
             BudgetSource.GAUGE_2_NONLINEARITY: gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
         }
     budget.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
-
-
-def _split(
-    columns: dict[Source, Floats],
-    gain_source: BudgetSource,
-    nonlinearity_source: BudgetSource,
-    nonlinearity: float,
-    gain: float,
-) -> None:
-    """Divide the column of a gauge's slope between its gain and its non-linearity."""
-    column = columns.pop(gain_source, None)
-    total = float(np.hypot(nonlinearity, gain))
-    if column is not None and total > 0.0:
-        columns[gain_source] = column * gain / total
-        columns[nonlinearity_source] = column * nonlinearity / total
-
-
-def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
-    column = np.zeros(PARAMETER_COUNT)
-    for place, power in powers.items():
-        column[place] = power * parameters[place]
-    return column
 
 
 _FRICTION = (

@@ -20,6 +20,7 @@ from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
+from analysis.results.joint_fit import JointFit
 from messages.message import message
 
 _LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
@@ -39,8 +40,9 @@ _BETTER = 0.1
 """What chi-square has too much must shrink to this share."""
 
 
-def mass_warnings(record: Record, decay: FreeDecay, inadequate: Fit) -> list[ResultWarning]:
+def mass_warnings(joint: JointFit) -> list[ResultWarning]:
     """Say so where another table mass would explain most of what the best law leaves unexplained."""
+    record, decay = joint.record, joint.decay
     if decay.plateau is None or decay.relative is None:
         return []
     given = record.masses.table_mass_kg
@@ -51,7 +53,7 @@ def mass_warnings(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Res
         return []
     best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
     deviation = _deviation(best)
-    excess = [fit.chi_square - search.problem.sample_count for fit in (inadequate, best)]
+    excess = [fit.chi_square - search.problem.sample_count for fit in (joint.chosen, best)]
     found = best.value(Parameter.TABLE_MASS)
     if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
         return []

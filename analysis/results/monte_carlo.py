@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.damped_cosine import DampedCosine, refit_damped_cosine
+from analysis.damped_cosine import refit_damped_cosine
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
-from analysis.fitting.search import Fit
 from analysis.identification import MonteCarlo
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 from analysis.quantities import Quantity
-from analysis.record import Record, StandMasses
+from analysis.record import StandMasses
 from analysis.results.decay_constants import DecayConstants, period_and_damping
+from analysis.results.joint_fit import JointFit
 from analysis.uncertainty import ParameterUncertainty
 
 LINEAR_DRAWS = 100_000
@@ -40,26 +40,19 @@ _CONSTANTS = ("period_s", "damping_n1_per_s")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MonteCarloModel:
-    """What is drawn from: what is known of the record, the problem, its fit, and their distributions.
+    """What is drawn from: the joint fit, and period and damping, which have draws of their own."""
 
-    `tail` is None where period and damping come from the joint fit.
-    """
-
-    record: Record
-    problem: FitProblem
-    fit: Fit
-    fitted: ParameterUncertainty
-    tail: DampedCosine | None
+    joint: JointFit
     constants: DecayConstants
 
     @property
     def values(self) -> Floats:
         """The fitted parameters (16,), then T and n1."""
-        return np.concatenate((self.fit.parameters, self.constants.point[:2]))
+        return np.concatenate((self.joint.chosen.parameters, self.constants.point[:2]))
 
     def linear(self, rng: np.random.Generator, draws: int) -> Floats:
         """Drawn values (draws, 18), those of T and n1 independent of the others."""
-        parameters = _drawn(self.fit.parameters, self.fitted, rng, draws)
+        parameters = _drawn(self.joint.chosen.parameters, self.joint.uncertainty, rng, draws)
         constants = _drawn(self.constants.point, self.constants.uncertainty, rng, draws)
         return np.hstack((parameters, constants[:, :2]))
 
@@ -67,29 +60,33 @@ class MonteCarloModel:
         """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
         rng = np.random.default_rng(seed)
         made, truth = self._made(rng)
-        found = made.minimise(self.fit.parameters, self.fit.law, _STEPS).parameters
+        found = made.minimise(self.joint.chosen.parameters, self.joint.chosen.law, _STEPS).parameters
         constants = period_and_damping(found)
-        if self.tail is not None:
-            tail = refit_damped_cosine(made.table.between(self.tail.start_s, np.inf), self.tail)
+        if self.joint.decay.tail is not None:
+            tail = refit_damped_cosine(
+                made.table.between(self.joint.decay.tail.start_s, np.inf), self.joint.decay.tail
+            )
             constants = tail.period_s, tail.damping_per_s
         away = np.subtract(constants, period_and_damping(truth))
-        return np.asarray(self.values - np.concatenate((found - self.fit.parameters, away)))
+        return np.asarray(self.values - np.concatenate((found - self.joint.chosen.parameters, away)))
 
     def _made(self, rng: np.random.Generator) -> tuple[FitProblem, Floats]:
         """The problem with readings of a test that differs in all that is not known exactly; its truth."""
-        truth, problem = self.fit.parameters.copy(), self.problem
+        truth, problem = self.joint.chosen.parameters.copy(), self.joint.problem
         deviation = problem.prior_deviation
         known = np.flatnonzero((deviation > 0.0) & np.isfinite(deviation))
         truth[known] = problem.prior_mean[known] + deviation[known] * rng.standard_normal(len(known))
-        masses: StandMasses = self.record.masses
+        masses: StandMasses = self.joint.record.masses
         truth[Parameter.GRAVITY] += masses.gravity_uncertainty_m_per_s2 * rng.standard_normal()
-        stretch = 1.0 + self.record.clock_scale_uncertainty * rng.standard_normal()
-        table = predict_gauge_1(truth, problem.table.time_s * stretch, self.fit.law)
-        table = table + _rms(self.fit.table_residual_m) * rng.standard_normal(len(table))
+        stretch = 1.0 + self.joint.record.clock_scale_uncertainty * rng.standard_normal()
+        table = predict_gauge_1(truth, problem.table.time_s * stretch, self.joint.chosen.law)
+        table = table + _rms(self.joint.chosen.table_residual_m) * rng.standard_normal(len(table))
         relative = problem.relative
         if relative is not None:
-            second = predict_gauge_2(truth, relative.time_s * stretch, self.fit.law, problem.gauge_2_absolute)
-            second = second + _rms(self.fit.relative_residual_m) * rng.standard_normal(len(second))
+            second = predict_gauge_2(
+                truth, relative.time_s * stretch, self.joint.chosen.law, problem.gauge_2_absolute
+            )
+            second = second + _rms(self.joint.chosen.relative_residual_m) * rng.standard_normal(len(second))
             relative = Channel(relative.time_s, second)
         return replace(problem, table=Channel(problem.table.time_s, table), relative=relative), truth
 
@@ -116,13 +113,13 @@ def run_monte_carlo(
     linear = drawing.linear(np.random.default_rng(seed), LINEAR_DRAWS)
     full = _refits(drawing, refits, seed, progress)
 
-    def candidates(draws: Floats) -> dict[str, Quantity]:
+    def summarise(draws: Floats) -> dict[str, Quantity]:
         return {
             name: _quantity(_sign(results[name], drawing.values[at]) * draws[:, at], units[name])
             for name, at in columns.items()
         }
 
-    drawn, refitted = candidates(linear), candidates(full) if len(full) > 1 else {}
+    drawn, refitted = summarise(linear), summarise(full) if len(full) > 1 else {}
     compared, count = (refitted, len(full)) if refitted else (drawn, LINEAR_DRAWS)
     tolerances = {name: _tolerance(results[name], quantity, count) for name, quantity in compared.items()}
     agrees = {name: _distance(results[name], compared[name]) <= tolerances[name] for name in compared}

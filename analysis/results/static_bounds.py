@@ -3,9 +3,8 @@
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.problem import FitProblem, motion_phases, project_to_bounds
+from analysis.fitting.problem import motion_phases, project_to_bounds
 from analysis.fitting.profile import CHI_SQUARE_RISE_95
-from analysis.fitting.search import Fit
 from analysis.laws.catalogue import PARAMETER_COUNT, compared_law
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
@@ -13,10 +12,10 @@ from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource
 from analysis.record import Record
 from analysis.results.decay_constants import DecayConstants
+from analysis.results.joint_fit import JointFit
 from analysis.uncertainty import (
     COVERAGE_FACTOR_95,
     LEVELLING_UNCERTAINTY_RAD,
-    ParameterUncertainty,
     UncertaintyBudget,
     numerical_gradient,
 )
@@ -32,23 +31,16 @@ _SLIP_DOUBT = 2.0
 """Later slips take back part of the first one: what gauge 2 shows in the end is as much smaller."""
 
 
-def add_static_friction_bounds(
-    problem: FitProblem,
-    decay: FreeDecay,
-    chosen: Fit,
-    candidates: list[Fit],
-    fitted: ParameterUncertainty,
-    budget: UncertaintyBudget,
-) -> None:
+def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> None:
     """Note both bounds of f_s as the chosen law and the record set them.
 
     Where a law with f_s explains the record, they are those of its motion: the largest demand that the
     joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
     f_s may still be somewhat larger: up to where chi-square of the law that frees it has risen.
     """
-    duration_s = float(decay.table.time_s[-1]) - chosen.value(Parameter.RELEASE)
+    chosen, duration_s = joint.chosen, joint.duration_s
     if not chosen.law.has_static_friction:
-        _add_tied(problem, decay, chosen, candidates, fitted, budget)
+        _add_tied(joint, budget)
         return
 
     def bounds(parameters: Floats) -> Floats:
@@ -57,7 +49,7 @@ def add_static_friction_bounds(
     values, slopes = bounds(chosen.parameters), numerical_gradient(bounds, chosen.parameters)
     for name, value, weights in zip((LOWER, UPPER), values, slopes, strict=True):
         if np.isfinite(value):
-            budget.add(name, float(value), "1", fitted.contributions(np.nan_to_num(weights)))
+            budget.add(name, float(value), "1", joint.uncertainty.contributions(np.nan_to_num(weights)))
 
 
 def add_no_slip_bound(
@@ -87,16 +79,15 @@ def add_no_slip_bound(
     budget.add(LOWER, value, "1", shares)
 
 
-def largest_static_friction(
-    problem: FitProblem, decay: FreeDecay, chosen: Fit, candidates: list[Fit]
-) -> tuple[float, float]:
+def largest_static_friction(joint: JointFit) -> tuple[float, float]:
     """Likeliest f_s, and the one above it at which chi-square is higher by 3.84, all else refined.
 
-    `chosen` ties f_s to f_d; one of `candidates` may have found a lower minimum with a free f_s.
+    The chosen law ties f_s to f_d; one of the candidates may have found a lower minimum with a free f_s.
     """
+    chosen = joint.chosen
     law = compared_law(static_friction=True, tilt=chosen.law.has_tilt)
-    some = problem.decimated(_READINGS, decay.dense_until_s)
-    starts = [chosen.parameters, *(fit.parameters for fit in candidates if fit.law is law)]
+    some = joint.problem.decimated(_READINGS, joint.decay.dense_until_s)
+    starts = [chosen.parameters, *(fit.parameters for fit in joint.candidates if fit.law is law)]
     best = min((some.minimise(start, law, 2 * _STEPS) for start in starts), key=lambda found: found.cost)
     likeliest = float(best.parameters[Parameter.FRICTION_STATIC])
     limit = CHI_SQUARE_RISE_95 * max(1.0, best.cost / some.sample_count)
@@ -116,22 +107,16 @@ def largest_static_friction(
     return likeliest, far
 
 
-def _add_tied(
-    problem: FitProblem,
-    decay: FreeDecay,
-    chosen: Fit,
-    candidates: list[Fit],
-    fitted: ParameterUncertainty,
-    budget: UncertaintyBudget,
-) -> None:
+def _add_tied(joint: JointFit, budget: UncertaintyBudget) -> None:
+    chosen = joint.chosen
     friction = chosen.value(Parameter.FRICTION_DYNAMIC)
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         return
     weights = np.zeros(PARAMETER_COUNT)
     weights[Parameter.FRICTION_DYNAMIC] = 1.0
-    shares = fitted.contributions(weights)
+    shares = joint.uncertainty.contributions(weights)
     budget.add(LOWER, friction, "1", shares)
-    likeliest, end = largest_static_friction(problem, decay, chosen, candidates)
+    likeliest, end = largest_static_friction(joint)
     likeliest, end = max(likeliest, friction), max(end, friction)
     noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares[BudgetSource.NOISE]))
     budget.add(UPPER, likeliest, "1", {**shares, BudgetSource.NOISE: noise})

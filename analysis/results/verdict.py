@@ -80,11 +80,11 @@ def inadequate_warning(judged: ModelSelection) -> ResultWarning:
 
 
 def identifiability_warnings(
-    chosen: Fit, fitted: ParameterUncertainty, *, ended: bool
+    chosen: Fit, uncertainty: ParameterUncertainty, *, slip_ended: bool
 ) -> list[ResultWarning]:
-    """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
+    """Warn of what the record does not determine about the chosen law and its motion."""
     warnings = []
-    if not ended:
+    if not slip_ended:
         text = message(
             "by the fitted motion the plate slips at the end of the record or again after it: u_s"
             " and the end of slip are not known. Record until the plate sticks."
@@ -93,7 +93,7 @@ def identifiability_warnings(
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         text = message("f_d does not change the fitted motion, so that it has no value: no slip was fitted.")
         warnings.append(ResultWarning("friction-not-identified", text))
-    if BudgetSource.LEVELLING in fitted.shifts:
+    if BudgetSource.LEVELLING in uncertainty.shifts:
         text = message(
             "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
             " mrad, which its uncertainty includes."
