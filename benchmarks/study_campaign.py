@@ -18,9 +18,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from analysis.campaign.campaign import summarize
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.effects import find_effects
 from analysis.campaign.series import RunResult
+from analysis.catalogue import table_columns
 from analysis.identify import identify
 from app.runs.analysis_input import build_record
 from app.runs.campaign.run_result import run_result
@@ -108,7 +108,7 @@ def effects(seed: int, per_kg: float) -> Outcome:
 
 
 def report_coverage(cases: list[Outcome]) -> str:
-    names = [(column.symbol, column.name) for column in COLUMNS] + [("**all**", "")]
+    names = [(column.symbol.text, column.name) for column, _ in table_columns()] + [("**all**", "")]
     header = ("", "intervals", "hold the truth", "no scatter", "1 % in f_d", "mean / u", "spread / u")
     inadequate, runs = sum(case.inadequate for case in cases), len(cases) * SERIES * REPEATS
     lines = [

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.audit import KILOGRAM_FORCE_N, PublishedRow
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.contacts import ContactRatio, friction_ratios
 from analysis.campaign.effects import Effects, find_effects
 from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow, pool_rows
 from analysis.campaign.series import RunResult, campaign_warnings, group_into_series, run_names
+from analysis.catalogue import table_columns
 from analysis.quantities import ResultWarning
 from messages.message import Message, message
 
@@ -122,9 +122,11 @@ class PublishedComparison:
 def compare_with_published(row: SeriesRow, printed: PublishedRow) -> tuple[PublishedComparison, ...]:
     """Hold a row against its print, in the order of the columns; what was not found is left out."""
     return tuple(
-        _compare(row, column.name, getattr(printed, column.published) * _UNITS_PRINTED.get(column.name, 1.0))
-        for column in COLUMNS
-        if column.name in row.quantities
+        _compare(
+            row, quantity.name, getattr(printed, column.published) * _UNITS_PRINTED.get(quantity.name, 1.0)
+        )
+        for quantity, column in table_columns()
+        if column.published and quantity.name in row.quantities
     )
 
 

@@ -1,21 +1,20 @@
 """Rows of the table: the quantities of each series, pooled over its runs."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
 from scipy.special import chdtrc
 
-from analysis.campaign.columns import COLUMNS, Column
 from analysis.campaign.pooling import PooledQuantity, RunValue, is_fully_stated, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
+from analysis.catalogue import QuantityDefinition, TableColumn, definition, table_columns
 from analysis.quantities import Quantity, ResultWarning
 from analysis.results.fitted_quantities import msk64_degree
 from messages.message import message
 
 STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
-_POOLED = (*COLUMNS[1:], Column(STATIC_LOWER, "f_s >=", "1", ""), Column(STATIC_UPPER, "f_s <=", "1", ""))
 TABLE_VELOCITY = "table_velocity_max_m_per_s"
 _MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
 _CHANCE = 0.01
@@ -32,7 +31,7 @@ class SeriesRow:
         The code of the series, with what tells its rows apart where it has several; unique in a campaign.
     series : SeriesKey
     quantities : dict of Pooled
-        By the names of `COLUMNS`, and both bounds of f_s; what no run determined is absent.
+        By name, for every column of the table and both bounds of f_s; absent where no run determined it.
     msk64_degree : str
         Of the pooled v_max, with a slash between two where its interval reaches over a bound; "" without.
     runs : tuple of str
@@ -53,16 +52,27 @@ def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     Series of one contact tell together how far runs differ, all series where the stand alone decides.
     """
     quantities: dict[str, dict[str, PooledQuantity]] = {each.label: {} for each in series}
-    for column in _POOLED:
-        for label, pooled in _pooled(series, column).items():
-            quantities[label][column.name] = pooled
+    for row, column in _pooled_columns():
+        for label, pooled in _pooled(series, row, column).items():
+            quantities[label][row.name] = pooled
     return tuple(_row(each, quantities[each.label]) for each in series)
 
 
-def _pooled(series: Sequence[Series], column: Column) -> dict[str, PooledQuantity]:
-    found = [(each, some) for each in series if (some := _run_values(each, column.name))]
-    kinds = ["" if column.of_stand else each.key.contact for each, _ in found]
-    pooled = pool([some for _, some in found], proportional=column.proportional, kinds=kinds)
+def _pooled_columns() -> Iterator[tuple[QuantityDefinition, TableColumn]]:
+    """Quantities that runs determine, with the rules of their columns; bounds of f_s pool as f_s does."""
+    for row, column in table_columns():
+        if row.name != _MASS:
+            yield row, column
+    for name in (STATIC_LOWER, STATIC_UPPER):
+        yield definition(name), TableColumn(position=0)
+
+
+def _pooled(
+    series: Sequence[Series], row: QuantityDefinition, column: TableColumn
+) -> dict[str, PooledQuantity]:
+    found = [(each, some) for each in series if (some := _run_values(each, row.name))]
+    kinds = ["" if column.is_of_stand else each.key.contact for each, _ in found]
+    pooled = pool([some for _, some in found], proportional=column.is_proportional, kinds=kinds)
     return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
 
 
@@ -125,9 +135,9 @@ def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> list[Res
 
 def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
     by_run: dict[str, list[str]] = {}
-    for column in COLUMNS:
-        for run in quantities[column.name].outliers if column.name in quantities else ():
-            by_run.setdefault(run, []).append(column.symbol)
+    for row, _ in table_columns():
+        for run in quantities[row.name].outliers if row.name in quantities else ():
+            by_run.setdefault(run, []).append(row.symbol.text)
     if not by_run:
         return None
     said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
@@ -145,10 +155,10 @@ def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWa
 def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
     """Say in which quantities runs differ by more than their own uncertainties explain."""
     found = [
-        f"{column.symbol} (Birge ratio {pooled.birge_ratio:.1f})"
-        for column in COLUMNS
-        if (pooled := quantities.get(column.name)) is not None and pooled.birge_ratio is not None
-        if chdtrc(pooled.runs - 1, pooled.birge_ratio**2 * (pooled.runs - 1)) < _CHANCE / len(COLUMNS)
+        f"{row.symbol.text} (Birge ratio {pooled.birge_ratio:.1f})"
+        for row, _ in table_columns()
+        if (pooled := quantities.get(row.name)) is not None and pooled.birge_ratio is not None
+        if chdtrc(pooled.runs - 1, pooled.birge_ratio**2 * (pooled.runs - 1)) < _CHANCE / len(table_columns())
     ]
     if not found:
         return None

@@ -2,30 +2,19 @@
 
 from typing import Any
 
+from analysis.catalogue import CATALOGUE, Place, QuantityDefinition, definition
+from analysis.formatting import FormattedValue, format_value
 from app.cli import output as out
+from app.runs.analysis_json import read_quantity
 
-_LINES = (
-    ("friction_dynamic", "f_d", 1.0, ""),
-    ("friction_static", "f_s", 1.0, ""),
-    ("stribeck_velocity_m_per_s", "v_s", 1e3, "mm/s"),
-    ("tilt_rad", "tilt", 1e3, "mrad"),
-    ("period_s", "T", 1e3, "ms"),
-    ("log_decrement", "log decrement", 1.0, ""),
-    ("damping_n1_per_s", "n1", 1.0, "1/s"),
-    ("damping_n2_per_s", "n2", 1.0, "1/s"),
-    ("damping_n_per_s", "n", 1.0, "1/s"),
-    ("stiffness_n_per_m", "c", 1.0, "N/m"),
-    ("damping_coefficient_kg_per_s", "mu", 1.0, "kg/s"),
-    ("pullback_m", "u0", 1e3, "mm"),
-    ("residual_displacement_m", "u_s", 1e3, "mm"),
+_SINGLE = tuple(
+    row
+    for row in CATALOGUE
+    if not row.is_minor and not row.symbol.relation and "_max_" not in row.name and row.symbol.index != "k"
 )
-_SYMBOLS = {key: (symbol, scale, unit) for key, symbol, scale, unit in _LINES}
-
+"""Quantities with a line of their own; bounds, x_k and largest rates stand together in theirs."""
 _BODIES = ("table", "plate")
-_LARGEST = (
-    ("v_max", "velocity_max_m_per_s", 1e3, "mm/s"),
-    ("a_max", "acceleration_max_m_per_s2", 1.0, "m/s2"),
-)
+_LARGEST = ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
 _SHOWN = 0.01
 """Sources of a smaller share of the largest one are left to the JSON."""
 
@@ -38,9 +27,9 @@ def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
         f"  {quality['samples']} samples, {quality['missing']} missing, "
         f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"
     )
-    for key, symbol, scale, unit in _LINES:
-        if result := document["results"].get(key):
-            out.print_line(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
+    for row in _SINGLE:
+        if result := document["results"].get(row.name):
+            out.print_line(f"  {row.symbol.text:14}{_value(row, result)}")
     _show_bounds(document["results"])
     _show_coulomb(document["results"])
     _show_largest(document["results"])
@@ -57,34 +46,35 @@ def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
         out.print_line(f"  warning {warning['code']}: {warning['message']}")
 
 
-def _value(result: dict[str, Any], scale: float = 1.0) -> str:
-    return out.format_uncertain(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale)
+def _value(row: QuantityDefinition, result: dict[str, Any]) -> FormattedValue:
+    return row.format(read_quantity(result), Place.TERMINAL)
 
 
 def _show_bounds(results: dict[str, Any]) -> None:
     """Between which values the record holds f_s."""
-    lower, upper = results.get("friction_static_lower"), results.get("friction_static_upper")
-    if lower:
-        out.print_line(f"  {'f_s at least':14}{_value(lower)}")
-    if upper:
-        out.print_line(f"  {'f_s at most':14}{_value(upper)}")
+    for name, label in (("friction_static_lower", "at least"), ("friction_static_upper", "at most")):
+        if result := results.get(name):
+            row = definition(name)
+            out.print_line(f"  {f'{row.symbol.text} {label}':14}{_value(row, result)}")
 
 
 def _show_coulomb(results: dict[str, Any]) -> None:
     if coulomb := results.get("coulomb_displacement_m"):
         claimed = "significant" if results["coulomb_significant"] else "not significant"
-        scale, unit = (1e3, "mm") if coulomb["unit"] == "m" else (1.0, coulomb["unit"])
-        out.print_line(f"  {'x_k':14}{_value(coulomb, scale)} {unit} (Coulomb friction is {claimed})")
+        row = definition("coulomb_displacement_m")
+        out.print_line(f"  {row.symbol.text:14}{_value(row, coulomb)} (Coulomb friction is {claimed})")
 
 
 def _show_largest(results: dict[str, Any]) -> None:
     """The largest rates of the fitted motion, and the MSK-64 degree of the table's."""
-    for symbol, key, scale, unit in _LARGEST:
+    for key in _LARGEST:
         both = [
-            f"{body} {_value(found, scale)}" for body in _BODIES if (found := results.get(f"{body}_{key}"))
+            f"{body} {_value(definition(name), found)}"
+            for body in _BODIES
+            if (found := results.get(name := f"{body}_{key}"))
         ]
         if both:
-            out.print_line(f"  {symbol:14}{', '.join(both)} {unit}")
+            out.print_line(f"  {definition(f'table_{key}').symbol.text:14}{', '.join(both)}")
     if degree := results.get("msk64_degree"):
         out.print_line(f"  {'MSK-64':14}degree {degree}")
 
@@ -92,9 +82,7 @@ def _show_largest(results: dict[str, Any]) -> None:
 def _show_slip_end(events: dict[str, Any]) -> None:
     if events["slip_end_s"] is not None:
         since_s, uncertainty_s = events["slip_end_s"] - events["release_s"], events["slip_end_uncertainty_s"]
-        out.print_line(
-            f"  slip ended    {out.format_uncertain(since_s, uncertainty_s or 0.0)} s after the release"
-        )
+        out.print_line(f"  slip ended    {format_value(since_s, uncertainty_s)} s after the release")
 
 
 def _show_model(model: dict[str, Any] | None, scale: float, unit: str) -> None:
@@ -136,7 +124,7 @@ def _show_classical(classical: dict[str, Any]) -> None:
         parts.append(f"T {period_s * 1e3:.2f} ms")
     if decrement := classical["log_decrement"]:
         cycles = f" over {classical['cycles']} cycles" if "cycles" in classical else ""
-        parts.append(f"log decrement {_value(decrement)}{cycles}")
+        parts.append(f"log decrement {_value(definition('log_decrement'), decrement)}{cycles}")
     if (friction := classical.get("friction_of_paper")) is not None:
         parts.append(f"f_d {friction:.3f} by the paper's procedure")
     if parts:
@@ -156,7 +144,7 @@ def _show_monte_carlo(drawn: dict[str, Any]) -> None:
     refits = f" and {drawn['refits']} refits" if drawn["refits"] else ""
     out.print_line(f"  Monte Carlo   {drawn['draws']} draws{refits}")
     for name, both in drawn["results"].items():
-        symbol, scale, unit = _SYMBOLS[name]
+        row = definition(name)
         verdict = "agrees with" if both["agrees"] else "DISAGREES with"
         found = both["refitted"] or both["drawn"]
-        out.print_line(f"  {symbol:14}{_value(found, scale)} {unit}".rstrip() + f", {verdict} the budget")
+        out.print_line(f"  {row.symbol.text:14}{_value(row, found)}, {verdict} the budget")

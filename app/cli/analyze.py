@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from analysis.formatting import format_value
 from app.cli import output as out
 from app.cli.errors import CommandError
 from app.cli.options import (
@@ -231,9 +232,7 @@ def compute_table_mass(
         _quantity(loaded, "damping_n_per_s"),
     )
     if not as_json:
-        out.print_line(
-            f"table mass {out.format_uncertain(mass.value, mass.standard_uncertainty)} kg, from both runs"
-        )
+        out.print_line(f"table mass {format_value(mass.value, mass.standard_uncertainty)} kg, from both runs")
     return {
         "kind": "table-mass",
         "runs": [document["run"] for document in documents],

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from analysis.formatting import format_value
 from app.cli import output as out
 from app.cli.calibration_check import check
 from app.cli.errors import CommandError
@@ -318,7 +319,7 @@ def _say_result(found: "Calibration") -> None:
     gain, zero = found.gain_m_per_count, found.zero_count
     relative = found.gain_relative_standard_uncertainty
     out.print_line(f"gain           {gain.value:.7g} m/count, standard uncertainty {relative:.2g} of it")
-    out.print_line(f"zero           {out.format_uncertain(zero.value, zero.standard_uncertainty)} counts")
+    out.print_line(f"zero           {format_value(zero.value, zero.standard_uncertainty)} counts")
     if found.polynomial:
         terms = ", ".join(f"{term:.5g}" for term in found.polynomial)
         out.print_line(f"polynomial     {terms} (1/m, 1/m²)")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from analysis.catalogue import Place, definition
+from analysis.formatting import format_value
 from app.cli.errors import CommandError
 from app.cli.options import Dask, Directory, Jobs, Json, executor_options, positive
 
@@ -130,13 +132,8 @@ def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
 
 
 _COMPARED = (
-    ("friction_dynamic", "f_d", 1.0, ""),
-    ("tilt_rad", "tilt", 1e3, "mrad"),
-    ("period_s", "T", 1e3, "ms"),
-    ("damping_n1_per_s", "n1", 1.0, "1/s"),
-    ("stiffness_n_per_m", "c", 1.0, "N/m"),
-    ("pullback_m", "u0", 1e3, "mm"),
-)
+    "friction_dynamic", "tilt_rad", "period_s", "damping_n1_per_s", "stiffness_n_per_m", "pullback_m",
+)  # fmt: skip
 
 
 def _compare(document: dict[str, Any]) -> None:
@@ -144,17 +141,16 @@ def _compare(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
     rows = []
-    for key, symbol, scale, unit in _COMPARED:
-        found, true = document["results"].get(key), document["truth"][key]
+    for row in map(definition, _COMPARED):
+        found, true = document["results"].get(row.name), document["truth"][row.name]
         if found is None:
             continue
         uncertainty = found["standard_uncertainty"] or 0.0
-        off = found["value"] - true
+        off, scale = found["value"] - true, row.unit_at(Place.TERMINAL).scale
         per_cent = f"{100 * off / true:+.3f} %" if true else ""
         spread = f"{off / uncertainty:+.1f} u" if uncertainty else ""
-        name = f"{symbol} {unit}".rstrip()
-        shown = out.format_uncertain(found["value"] * scale, uncertainty * scale)
-        rows.append((name, shown, f"{true * scale:.6g}", per_cent, spread))
+        shown = str(format_value(found["value"] * scale, uncertainty * scale))
+        rows.append((row.heading(Place.TERMINAL), shown, f"{true * scale:.6g}", per_cent, spread))
     out.print_table(("", "found", "true", "off by", ""), rows)
 
 
@@ -254,15 +250,13 @@ def _document(
 
 def _show(compared: "Sequence[Comparison]") -> None:
     """Found, true, and the difference in standard uncertainties; `!` where the 95 % interval misses."""
-    from analysis.campaign.columns import COLUMNS
     from app.cli import output as out
 
-    symbols = {column.name: f"{column.symbol} {column.unit}".removesuffix(" 1") for column in COLUMNS}
     rows = [
         (
             one.series,
-            symbols[one.name],
-            out.format_uncertain(one.value, one.standard_uncertainty),
+            f"{definition(one.name).symbol.text} {definition(one.name).unit}".removesuffix(" 1"),
+            str(format_value(one.value, one.standard_uncertainty)),
             f"{one.truth:.6g}",
             f"{one.normalized_error:+.1f} u" if one.standard_uncertainty else "",
             "" if one.is_covered else "!",

@@ -1,7 +1,6 @@
 """What a command writes: JSON alone on stdout, everything for people on stderr or as text."""
 
 import json
-import math
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
@@ -90,11 +89,3 @@ def progress_bar(description: str, total: float | None = None) -> Iterator[Any]:
             bar.update(task, completed=completed, description=text)
 
         yield update
-
-
-def format_uncertain(value: float, uncertainty: float) -> str:
-    """Write value ± uncertainty to the same digit, two digits of uncertainty: `0.10030 ± 0.00064`."""
-    if not math.isfinite(uncertainty) or uncertainty <= 1e-9 * abs(value):
-        return f"{value:.9g}"
-    decimals = max(0, 1 - math.floor(math.log10(uncertainty)))
-    return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"

@@ -5,6 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
+from analysis.catalogue import definition
+from analysis.formatting import format_value
 from app.cli.motion_options import (
     N1,
     Damping,
@@ -76,12 +78,12 @@ def _print_plan(document: dict[str, Any]) -> None:
 
     _print_motion(document)
     _print_gauges(document)
-    for name, symbol in (("friction_dynamic", "f_d"), ("friction_static", "f_s")):
-        if found := document["results"].get(name):
-            shown = out.format_uncertain(found["value"], found["standard_uncertainty"])
-            out.print_line(
-                f"{symbol} to expect          {shown} (standard uncertainty, law {document['law']})"
-            )
+    for name, found in document["results"].items():
+        symbol, shown = (
+            definition(name).symbol.text,
+            format_value(found["value"], found["standard_uncertainty"]),
+        )
+        out.print_line(f"{symbol} to expect          {shown} (standard uncertainty, law {document['law']})")
     _print_budget(document)
     for way in document["halved_by"]:
         out.print_line(f"  {way['means']:21}{way['message']}")

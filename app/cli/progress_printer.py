@@ -5,6 +5,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from analysis.catalogue import Place, definition
+from analysis.formatting import format_value
 from app.cli import output as out
 
 if TYPE_CHECKING:
@@ -179,16 +181,18 @@ class StatusLine:
 def result_text(result: "LiveResult") -> str:
     """Period, damping and friction so far; empty before anything is known."""
     parts = [
-        _part("T", result.period, 1e3, "ms"),
-        _part("n1", result.damping_n1, 1.0, "1/s"),
-        _part("f_d", result.friction_dynamic, 1.0, ""),
+        _part("period_s", result.period),
+        _part("damping_n1_per_s", result.damping_n1),
+        _part("friction_dynamic", result.friction_dynamic),
     ]
     text = "  ".join(part for part in parts if part)
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
 
 
-def _part(symbol: str, value: "LiveValue | None", scale: float, unit: str) -> str:
+def _part(name: str, value: "LiveValue | None") -> str:
     if value is None or not value.is_known:
         return ""
-    shown = out.format_uncertain(value.value * scale, value.standard_uncertainty * scale)
-    return f"{symbol} = {shown} {unit}".rstrip()
+    row = definition(name)
+    unit = row.unit_at(Place.TERMINAL, value.unit)
+    shown = format_value(value.value * unit.scale, value.standard_uncertainty * unit.scale, unit.symbol)
+    return f"{row.symbol.text} = {shown}"

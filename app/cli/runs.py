@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from analysis.formatting import format_value
 from app.cli.errors import CommandError
 from app.cli.options import Json, SeriesCode
 
@@ -79,14 +80,12 @@ def _row(run: "RunSummary") -> tuple[str, ...]:
 
 def _friction_text(run: "RunSummary") -> str:
     """Newest f_d, with what is to be known of it in a word."""
-    from app.cli import output as out
-
     if run.friction_dynamic is None:
         return ""
     marks = ["stale"] if run.stale else []
     marks += ["model does not fit"] if run.adequate is False else []
     marks += ["left out"] if run.excluded else []
-    shown = out.format_uncertain(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
+    shown = str(format_value(run.friction_dynamic, run.friction_dynamic_uncertainty))
     return f"{shown} ({', '.join(marks)})" if marks else shown
 
 

@@ -127,14 +127,14 @@ def _channels(found: "Identification", record: "Record") -> tuple[Channel, Chann
 
 
 def _objective(found: "Identification") -> Objective | None:
-    friction = found.results.get(FRICTION.key)
+    friction = found.results.get(FRICTION.name)
     if found.objective is None or found.model is None or friction is None:
         return None
     reach = max(_SCAN_DEVIATIONS * friction.standard_uncertainty, _SCAN_SHARE * friction.value)
     scanned = np.linspace(max(friction.value - reach, 1e-4), friction.value + reach, _SCANNED)
     scanned = np.sort(np.append(scanned, friction.value))
     costs = found.objective(scanned)
-    best = found.objective(np.array([found.parameters[FRICTION.key]]))[0]
+    best = found.objective(np.array([found.parameters[FRICTION.name]]))[0]
     residual_m = found.model.residual_rms_m * np.sqrt(costs / best)
     return Objective(scanned, residual_m, friction.value, friction.interval_95)
 
@@ -143,7 +143,7 @@ def _motion(found: "Identification", record: "Record") -> "Motion | None":
     """The fitted motion of both masses; None for one mass, without slip, or with a running-in velocity."""
     from analysis.motion.two_mass import TwoMassParameters
 
-    if FRICTION.key not in found.parameters or "stribeck_velocity_m_per_s" in found.results:
+    if FRICTION.name not in found.parameters or "stribeck_velocity_m_per_s" in found.results:
         return None
     of_motion = {name: value for name, value in found.parameters.items() if name != "release_s"}
     return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])

@@ -5,9 +5,10 @@ from typing import Final
 
 import numpy as np
 
+from analysis.formatting import MINUS, with_unit
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, Symptom, diagnose, worst_grade
 from app.presenters.gauges.state import LabelledValue
-from app.presenters.number_text import MINUS, format_fixed, with_unit
+from app.presenters.number_text import format_fixed
 from messages.i18n import gettext, translate
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")

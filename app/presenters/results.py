@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass, replace
 
+from analysis.catalogue import CATALOGUE, Place, QuantityDefinition, definition
+from analysis.formatting import typeset, with_unit
 from analysis.identification import ModelSelection
 from analysis.quantities import Quantity, ResultWarning
 from app.presenters import number_text
@@ -25,7 +27,7 @@ class ResultRow:
     @property
     def uncertainty_text(self) -> str:
         """What stands behind the value, smaller: `± 0.048 ms`."""
-        return number_text.with_unit(f"± {self.uncertainty}" if self.uncertainty else "", self.unit).strip()
+        return with_unit(f"± {self.uncertainty}" if self.uncertainty else "", self.unit).strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,45 +47,10 @@ class Result:
     path: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ShownQuantity:
-    """How one of INTERFACE's results is shown."""
-
-    key: str
-    symbol: str
-    name: str
-    scale: float = 1.0
-    unit: str = ""
-
-
-FRICTION = ShownQuantity("friction_dynamic", "f<sub>d</sub>", N_("dynamic friction"))
-STATIC = ShownQuantity("friction_static", "f<sub>s</sub>", N_("static friction"))
-STATIC_LOWER = ShownQuantity("friction_static_lower", "f<sub>s</sub> ≥", N_("static friction, at least"))
-MAIN = (
-    ShownQuantity("period_s", "T", N_("period"), 1e3, "ms"),
-    ShownQuantity("damping_n1_per_s", "n<sub>1</sub>", N_("damping"), 1.0, "1/s"),
-)
-FURTHER = (
-    STATIC,
-    STATIC_LOWER,
-    ShownQuantity("friction_static_upper", "f<sub>s</sub> ≤", N_("static friction, at most")),
-    ShownQuantity("tilt_rad", "α", N_("tilt"), 1e3, "mrad"),
-    ShownQuantity("stribeck_velocity_m_per_s", "v<sub>s</sub>", N_("Stribeck velocity"), 1e3, "mm/s"),
-    ShownQuantity("log_decrement", "δ", N_("log decrement")),
-    ShownQuantity("damping_n2_per_s", "n<sub>2</sub>", N_("damping, table alone"), 1.0, "1/s"),
-    ShownQuantity("damping_n_per_s", "n", N_("damping"), 1.0, "1/s"),
-    ShownQuantity("stiffness_n_per_m", "c", N_("stiffness"), 1e-3, "kN/m"),
-    ShownQuantity("damping_coefficient_kg_per_s", "μ", N_("damping coefficient"), 1.0, "kg/s"),
-    ShownQuantity("pullback_m", "u<sub>0</sub>", N_("pullback"), 1e3, "mm"),
-    ShownQuantity("residual_displacement_m", "u<sub>s</sub>", N_("residual displacement"), 1e3, "mm"),
-    ShownQuantity("coulomb_displacement_m", "x<sub>k</sub>", N_("Coulomb displacement"), 1e3, "mm"),
-    ShownQuantity("table_velocity_max_m_per_s", "v<sub>max</sub>", N_("table velocity"), 1e3, "mm/s"),
-    ShownQuantity(
-        "table_acceleration_max_m_per_s2", "a<sub>max</sub>", N_("table acceleration"), 1.0, "m/s²"
-    ),
-)
-
-SHOWN = {shown.key: shown for shown in (FRICTION, *MAIN, *FURTHER)}
+FRICTION = definition("friction_dynamic")
+STATIC_LOWER = definition("friction_static_lower")
+MAIN = (definition("period_s"), definition("damping_n1_per_s"))
+_ALL = (FRICTION, *MAIN, *(row for row in CATALOGUE if not row.is_minor and row not in (FRICTION, *MAIN)))
 
 _REMEDIES = {
     "clipped": N_("Check the gauge's range and zero."),
@@ -152,15 +119,17 @@ def failed_result(message: str, path: str, ended: str) -> Result:
 
 def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
     """Every quantity that was found, f_d first, in the order of the paper."""
-    rows = _rows(run, (FRICTION, *MAIN, *FURTHER))
+    rows = _rows(run, _ALL)
     degree = run.labels.get("msk64_degree")
     return (*rows, ResultRow("", gettext("MSK-64 degree"), str(degree))) if degree else rows
 
 
-def make_row(shown: ShownQuantity, quantity: Quantity) -> ResultRow:
-    """One quantity as it is shown."""
-    value, uncertainty = number_text.format_uncertain(quantity, shown.scale)
-    return ResultRow(shown.symbol, gettext(shown.name), value, uncertainty, shown.unit)
+def make_row(row: QuantityDefinition, quantity: Quantity) -> ResultRow:
+    """One quantity with symbol, description, value and unit."""
+    shown = row.format(quantity, Place.WINDOW)
+    return ResultRow(
+        row.symbol.html, gettext(row.description), typeset(shown.value), shown.uncertainty, shown.unit
+    )
 
 
 def model_status(model: ModelSelection | None) -> Chip:
@@ -204,12 +173,12 @@ def in_words(message: Message | str) -> str:
 def format_micrometres(length_m: float) -> str:
     """Write a small length (m) as `21 µm`."""
     size_um = length_m * 1e6
-    return number_text.with_unit(number_text.format_fixed(size_um, 0 if size_um >= 10.0 else 1), "µm")
+    return with_unit(number_text.format_fixed(size_um, 0 if size_um >= 10.0 else 1), "µm")
 
 
 def headline_key(run: AnalysedRun) -> str:
     """Name of the result that a run was made for, as far as it has one."""
-    wanted = ("period_s",) if run.kind == "one-mass" else (FRICTION.key, STATIC_LOWER.key)
+    wanted = ("period_s",) if run.kind == "one-mass" else (FRICTION.name, STATIC_LOWER.name)
     return next((key for key in wanted if key in run.results), wanted[0])
 
 
@@ -219,10 +188,10 @@ def _capital(part: str) -> str:
 
 
 def _headline(run: AnalysedRun) -> ResultRow:
-    shown = SHOWN[headline_key(run)]
-    found = run.results.get(shown.key)
+    shown = definition(headline_key(run))
+    found = run.results.get(shown.name)
     return (
-        ResultRow(shown.symbol, gettext(shown.name), gettext("not determined"))
+        ResultRow(shown.symbol.html, gettext(shown.description), gettext("not determined"))
         if found is None
         else make_row(shown, found)
     )
@@ -234,8 +203,8 @@ def _caution(caution: ResultWarning) -> str:
     return f"{words} {remedy}" if remedy else words
 
 
-def _rows(run: AnalysedRun, shown: tuple[ShownQuantity, ...]) -> tuple[ResultRow, ...]:
-    return tuple(make_row(item, run.results[item.key]) for item in shown if item.key in run.results)
+def _rows(run: AnalysedRun, shown: tuple[QuantityDefinition, ...]) -> tuple[ResultRow, ...]:
+    return tuple(make_row(item, run.results[item.name]) for item in shown if item.name in run.results)
 
 
 def _fit(model: ModelSelection | None) -> str:
@@ -250,11 +219,11 @@ def _fit(model: ModelSelection | None) -> str:
 
 
 def _comparison(run: AnalysedRun, true_friction: float | None) -> str:
-    found = run.results.get(FRICTION.key)
+    found = run.results.get(FRICTION.name)
     if not true_friction or found is None:
         return ""
     off_percent = round(100.0 * (found.value / true_friction - 1.0), 2) + 0.0
-    off = number_text.with_unit(number_text.with_minus_sign(f"{off_percent:+.2f}"), "%")
+    off = with_unit(typeset(f"{off_percent:+.2f}"), "%")
     return gettext(
         "True value {truth}: found {off}", truth=number_text.format_fixed(true_friction, 5), off=off
     )

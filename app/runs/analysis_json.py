@@ -119,6 +119,14 @@ def read_budget_line(document: dict[str, Any]) -> BudgetLine:
     )
 
 
+def read_quantity(document: dict[str, Any]) -> Quantity:
+    """Quantity of a document; NaN in place of null."""
+    low, high = document["interval_95"] or (math.nan, math.nan)
+    deviation = document["standard_uncertainty"]
+    deviation = math.nan if deviation is None else float(deviation)
+    return Quantity(document["value"], deviation, (low, high), document["unit"])
+
+
 def quantity_document(quantity: Quantity) -> dict[str, Any]:
     """A quantity as in `results`."""
     document: dict[str, Any] = msgspec.to_builtins(quantity)

@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.rows import SeriesRow
+from analysis.catalogue import table_columns
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.batch.tasks import error_text
@@ -264,7 +264,7 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
     """Every quantity of the table that was found, beside its truth."""
     for row in rows:
         truth = truths[row.series.code]
-        for column in COLUMNS:
+        for column, _ in table_columns():
             if column.name in row.quantities:
                 found = row.quantities[column.name].quantity
                 low, high = found.interval_95

@@ -4,7 +4,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.campaign.columns import COLUMNS
+from analysis.catalogue import Place, QuantityDefinition, TableColumn, table_columns
+from analysis.formatting import typeset, with_unit
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest
@@ -29,24 +30,6 @@ if TYPE_CHECKING:
 
 _FRICTION, _STATIC = "friction_dynamic", "friction_static"
 _LOWER, _UPPER = "friction_static_lower", "friction_static_upper"
-_SHOWN = {
-    "plate_mass_kg": ("m₂", "kg", 1.0),
-    "stiffness_n_per_m": ("c", "kN/m", 1e-3),
-    "period_s": ("T", "ms", 1e3),
-    "residual_displacement_m": ("u_s", "mm", 1e3),
-    "damping_n1_per_s": ("n₁", "1/s", 1.0),
-    "damping_n2_per_s": ("n₂", "1/s", 1.0),
-    "friction_static": ("f_s", "", 1.0),
-    "friction_dynamic": ("f_d", "", 1.0),
-    "table_velocity_max_m_per_s": ("v_max", "mm/s", 1e3),
-    "table_acceleration_max_m_per_s2": ("a_max", "m/s²", 1.0),
-}
-"""Symbol, unit and scale of each column on the screen, where lengths are in mm."""
-_MISSING = {
-    "friction_static": N_("No stick ended in a slip: f_s has no value."),
-    "residual_displacement_m": N_("Slip had not ended when the record did: u_s is not known."),
-    "friction_dynamic": N_("Nothing slipped, or no law could be fitted: f_d is not known."),
-}
 _MARKS = (
     ("not-adequate", Tone.BAD, N_("law does not fit")),
     ("outlying-run", Tone.WARN, N_("outlier")),
@@ -65,7 +48,7 @@ _VERDICTS = {
 
 def column_titles() -> tuple[tuple[str, str], ...]:
     """Symbol and unit of each column, in the paper's order."""
-    return tuple(_SHOWN[column.name][:2] for column in COLUMNS)
+    return tuple((row.symbol.plain, row.unit_at(Place.WINDOW).symbol) for row, _ in table_columns())
 
 
 def table_rows(found: CampaignData | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
@@ -107,7 +90,7 @@ def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
         EffectRow(
             sentence(effect.cause.value),
             gettext(_VERDICTS[effect.found]),
-            number_text.with_minus_sign(translate(effect.sentence)),
+            typeset(translate(effect.sentence)),
             is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects
@@ -186,24 +169,25 @@ def _row(row: "SeriesRow") -> TableRow:
         row.label,
         row.series.code,
         len(row.runs),
-        tuple(_cell(row, column.name) for column in COLUMNS),
+        tuple(_cell(row, *column) for column in table_columns()),
         _mark(row),
     )
 
 
 def _without_runs(code: str) -> TableRow:
     empty = Cell(hint=gettext("No run of {series} yet.", series=code))
-    return TableRow(code, code, 0, (empty,) * len(COLUMNS))
+    return TableRow(code, code, 0, (empty,) * len(table_columns()))
 
 
-def _cell(row: "SeriesRow", name: str) -> Cell:
-    pooled, scale = row.quantities.get(name), _SHOWN[name][2]
+def _cell(row: "SeriesRow", quantity: QuantityDefinition, column: TableColumn) -> Cell:
+    pooled = row.quantities.get(quantity.name)
     if pooled is not None:
-        value, uncertainty = number_text.format_uncertain(pooled.quantity, scale)
-        return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
-    if name == _STATIC and any(_bounds(row)):
-        return Cell(*_bounds(row), gettext(_MISSING[name]))
-    return Cell("–", "", gettext(_MISSING.get(name, N_("No run of this series determined it."))))
+        shown = quantity.format(pooled.quantity, Place.WINDOW)
+        uncertainty = f"± {shown.uncertainty}" if shown.uncertainty else ""
+        return Cell(typeset(shown.value), uncertainty, _of_runs(row, pooled))
+    if quantity.name == _STATIC and any(_bounds(row)):
+        return Cell(*_bounds(row), gettext(column.missing))
+    return Cell("–", "", gettext(column.missing or N_("No run of this series determined it.")))
 
 
 def _bounds(row: "SeriesRow") -> tuple[str, str]:
@@ -246,7 +230,7 @@ def _with_spread(quantity: "Quantity") -> str:
 def _scatter(pooled: "PooledQuantity") -> str:
     if pooled.scatter is None or not pooled.quantity.value:
         return "–"
-    return number_text.with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
+    return with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
 
 
 def _birge(pooled: "PooledQuantity") -> str:
@@ -271,9 +255,7 @@ def _expectations(expected: PlannedTest) -> tuple[str, ...]:
     if expected.friction is not None:
         said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
-        length = number_text.with_unit(
-            number_text.format_millimetres(abs(expected.residual_displacement_m)), "mm"
-        )
+        length = with_unit(number_text.format_millimetres(abs(expected.residual_displacement_m)), "mm")
         said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
     return (*said, *expected.warnings)
 

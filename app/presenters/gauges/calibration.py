@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
+from analysis.formatting import typeset, with_unit
 from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples, average_counts
@@ -18,7 +19,7 @@ from app.presenters.gauges.state import (
     CalibrationState,
 )
 from app.presenters.gauges.tasks import FitCalibration, SaveCalibration, SavedCalibration
-from app.presenters.number_text import format_fixed, parse_number, with_minus_sign, with_unit
+from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.results import sentence
 from config.schema import Gauges
 from messages.i18n import gettext
@@ -196,7 +197,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
                 gettext(
                     "{words}, though still creeping by {creep}",
                     words=text,
-                    creep=with_minus_sign(f"{average.creep_counts:.3g}"),
+                    creep=typeset(f"{average.creep_counts:.3g}"),
                 ),
                 Tone.WARN,
             )

@@ -4,9 +4,10 @@ import datetime
 from collections.abc import Iterator
 from typing import Final
 
+from analysis.formatting import typeset, with_unit
 from app.presenters.base import Chip, Tone
 from app.presenters.gauges.state import NAMES, GaugeCard, LabelledValue
-from app.presenters.number_text import format_fixed, format_millimetres, with_minus_sign, with_unit
+from app.presenters.number_text import format_fixed, format_millimetres
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext
 
@@ -78,17 +79,17 @@ def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.dat
 
 
 def _values(gauge: Gauge) -> Iterator[LabelledValue]:
-    gain = with_unit(with_minus_sign(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
+    gain = with_unit(typeset(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
     relative = gauge.gain_relative_standard_uncertainty
     yield LabelledValue(gettext("gain"), gain)
     yield LabelledValue(
         gettext("gain uncertainty"),
         gettext(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
     )
-    yield LabelledValue(gettext("zero"), with_unit(with_minus_sign(f"{gauge.zero_count:.9g}"), "counts"))
+    yield LabelledValue(gettext("zero"), with_unit(typeset(f"{gauge.zero_count:.9g}"), "counts"))
     if gauge.polynomial:
         yield LabelledValue(
-            gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in gauge.polynomial)
+            gettext("polynomial"), ", ".join(typeset(f"{term:.3g}") for term in gauge.polynomial)
         )
     yield LabelledValue(gettext("range"), _range(gauge.range_m))
     if gauge.nonlinearity_m is not None:

@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from analysis.formatting import typeset, with_unit
 from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples
 from app.presenters.gauges.state import CONNECTION_LOST, NO_DEVICE, CheckForm, CheckKind, CheckState
 from app.presenters.gauges.tasks import CheckGauge, CheckOutcome
-from app.presenters.number_text import parse_number, with_minus_sign, with_unit
+from app.presenters.number_text import parse_number
 from app.presenters.results import sentence
 from config.schema import Gauges
 from messages.i18n import gettext
@@ -150,6 +151,6 @@ def _rest_instruction(form: CheckForm) -> str:
 
 def _step_instruction(form: CheckForm) -> str:
     if form.kind is CheckKind.DISPLACEMENT:
-        known = with_unit(with_minus_sign(f"{float(form.known):+g}"), "mm")
+        known = with_unit(typeset(f"{float(form.known):+g}"), "mm")
         return gettext("Move the gauge by {known} and hold it. Then take the reading", known=known)
     return gettext("Switch the shunt on, and move nothing. Then take the reading")

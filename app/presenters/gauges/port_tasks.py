@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
+from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.state import PortCard
-from app.presenters.number_text import with_unit
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import ReportProgress
 from drivers.port import PortInfo, list_ports

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.formatting import typeset
 from app.acquisition.gauge_samples import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
-from app.presenters.number_text import with_minus_sign
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 from messages.i18n import gettext
@@ -186,5 +186,5 @@ class ReadingAverager:
             self.stop()
             return average
         self._windows, self._since_s = self._windows + 1, self._recent.end_s
-        creep = with_minus_sign(f"{average.creep_counts:.3g}")
+        creep = typeset(f"{average.creep_counts:.3g}")
         return StillMoving(gettext("Still moving by {creep} counts, waiting", creep=creep))

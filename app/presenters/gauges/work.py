@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 from analysis.calibration.calibrate import Calibration, DialGauge, calibrate
 from analysis.calibration.known_displacement import DisplacementCheck
 from analysis.calibration.points import CalibrationPoints
+from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
 from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
 from app.acquisition.gauge_samples import samples_from_ring
@@ -24,7 +25,7 @@ from app.presenters.gauges.tasks import (
     SaveCalibration,
     SavedCalibration,
 )
-from app.presenters.number_text import format_fixed, with_minus_sign, with_unit
+from app.presenters.number_text import format_fixed
 from app.presenters.worker import ReportProgress
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, write_points
 from config.files import (
@@ -95,17 +96,17 @@ def _write_points(name: str, counts: list[float], dial_m: list[float]) -> None:
 def _calibration_fit(found: Calibration) -> CalibrationFit:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.characteristics
     values = [
-        LabelledValue(gettext("gain"), with_unit(with_minus_sign(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        LabelledValue(gettext("gain"), with_unit(typeset(f"{gain.value * 1e6:.7g}"), "µm/count")),
         LabelledValue(
             gettext("gain uncertainty"),
             with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%"),
         ),
-        LabelledValue(gettext("zero"), with_unit(with_minus_sign(f"{zero.value:.9g}"), "counts")),
+        LabelledValue(gettext("zero"), with_unit(typeset(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:
         values.append(
             LabelledValue(
-                gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in found.polynomial)
+                gettext("polynomial"), ", ".join(typeset(f"{term:.3g}") for term in found.polynomial)
             )
         )
     values += [

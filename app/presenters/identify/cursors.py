@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.formatting import MINUS, with_unit
 from app.presenters import number_text
 from messages.i18n import ngettext
 
@@ -79,7 +80,7 @@ class PlottedQuantity:
         """A value of it with its unit; a dash where there is none."""
         if not np.isfinite(value):
             return "–"
-        return number_text.with_unit(number_text.format_fixed(value, _DECIMALS[self.unit]), self.unit)
+        return with_unit(number_text.format_fixed(value, _DECIMALS[self.unit]), self.unit)
 
 
 def first_cursors(start_s: float, end_s: float) -> Cursors:
@@ -127,7 +128,7 @@ def read_cursors(
     rows = (
         (Cursor.A.value, a_s, first),
         (Cursor.B.value, b_s, second),
-        (f"B {number_text.MINUS} A", b_s - a_s, difference),
+        (f"B {MINUS} A", b_s - a_s, difference),
     )
     return replace(
         cursors,
@@ -148,7 +149,7 @@ def nearest_index(time_s: Floats, at_s: float) -> int:
 
 
 def _seconds(at_s: float) -> str:
-    return number_text.with_unit(number_text.format_fixed(at_s, 4), "s")
+    return with_unit(number_text.format_fixed(at_s, 4), "s")
 
 
 def _written(drawn: Sequence[PlottedQuantity], values: Sequence[float]) -> Iterator[str]:
@@ -161,7 +162,7 @@ def _period(distance_s: float, period_s: float | None) -> str:
         return ""
     count = 0 if period_s is None else round(distance_s / period_s)
     if period_s is not None and count and abs(distance_s / period_s - count) < _SURELY:
-        each = number_text.with_unit(number_text.format_fixed(distance_s / count * 1e3, 2), "ms")
+        each = with_unit(number_text.format_fixed(distance_s / count * 1e3, 2), "ms")
         return ngettext("{count} period of {each}", "{count} periods of {each} each", count, each=each)
-    frequency = number_text.with_unit(number_text.format_fixed(1.0 / distance_s, 3), "Hz")
-    return f"1/(B {number_text.MINUS} A) = {frequency}"
+    frequency = with_unit(number_text.format_fixed(1.0 / distance_s, 3), "Hz")
+    return f"1/(B {MINUS} A) = {frequency}"

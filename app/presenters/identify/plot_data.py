@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.formatting import typeset, with_unit
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
 from app.presenters.identify.state import ChannelCurves, Curves, ManualFit, Motion, PlotLine, Scan
@@ -72,7 +73,7 @@ def manual_fit(found: ManualSimulation, origin_s: float, objective: Objective) -
     words = gettext(
         "By hand: {friction}, {off} from the fit; residual {residual}",
         friction=number_text.format_fixed(found.friction, 5),
-        off=number_text.with_unit(number_text.with_minus_sign(f"{off_percent:+.2f}"), "%"),
+        off=with_unit(typeset(f"{off_percent:+.2f}"), "%"),
         residual=results.format_micrometres(objective.residual_at(found.friction)),
     )
     return ManualFit(
@@ -100,7 +101,7 @@ def _channel(channel: Channel) -> ChannelCurves:
 
 def _slips(run: AnalysedRun) -> tuple[tuple[float, float], ...]:
     """By the fitted motion, else from release to slip end; none where nothing slips."""
-    if run.slips or run.events.release_s is None or results.FRICTION.key not in run.results:
+    if run.slips or run.events.release_s is None or results.FRICTION.name not in run.results:
         return run.slips
     end_s = float(run.time_s[-1]) if run.events.slip_end_s is None else run.events.slip_end_s
     return ((run.events.release_s, end_s),)

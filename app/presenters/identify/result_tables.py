@@ -2,6 +2,8 @@
 
 import math
 
+from analysis.catalogue import Place, QuantityDefinition, definition
+from analysis.formatting import uncertainty_decimals, with_unit
 from analysis.identification import FittedModel, ModelSelection
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
@@ -60,8 +62,8 @@ def classical_rows(run: AnalysedRun, found: ClassicalFigures) -> tuple[Classical
 
 def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     """Sources of the uncertainty of what the run was made for, largest first; then those not stated."""
-    shown = results.SHOWN[results.headline_key(run)]
-    lines = [line for line in run.budget if line.contribution_to == shown.key]
+    shown = definition(results.headline_key(run))
+    lines = [line for line in run.budget if line.contribution_to == shown.name]
     stated = [line for line in lines if math.isfinite(line.standard_uncertainty)]
     stated.sort(key=lambda line: -line.standard_uncertainty)
     largest = max((line.standard_uncertainty for line in stated), default=0.0)
@@ -84,15 +86,16 @@ def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     )
 
 
-def _contribution(standard_uncertainty: float, largest: float, shown: results.ShownQuantity) -> str:
+def _contribution(standard_uncertainty: float, largest: float, row: QuantityDefinition) -> str:
     """Write a contribution in the unit of its quantity, to the last digit of the largest one."""
-    decimals = number_text.uncertainty_decimals(largest * shown.scale)
+    unit = row.unit_at(Place.WINDOW)
+    decimals = uncertainty_decimals(largest * unit.scale)
     last_digit = 10.0**-decimals
-    size = standard_uncertainty * shown.scale
+    size = standard_uncertainty * unit.scale
     text = number_text.format_fixed(size, decimals)
     if size < 0.5 * last_digit:
         text = f"< {number_text.format_fixed(last_digit, decimals)}"
-    return number_text.with_unit(text, shown.unit)
+    return with_unit(text, unit.symbol)
 
 
 def missing_data(run: AnalysedRun) -> Chip:
@@ -100,7 +103,7 @@ def missing_data(run: AnalysedRun) -> Chip:
     share = missing_share(run)
     if share == 0.0:
         return EMPTY_CHIP
-    absent = number_text.with_unit(number_text.format_fixed(100.0 * share, 1 if share > 1e-3 else 3), "%")
+    absent = with_unit(number_text.format_fixed(100.0 * share, 1 if share > 1e-3 else 3), "%")
     return Chip(
         gettext("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
     )
@@ -112,7 +115,7 @@ def no_scan_reason(run: AnalysedRun) -> str:
         return ""
     if run.kind == "one-mass":
         return gettext("One mass swings freely: there is no sliding, and so no f<sub>d</sub> to vary.")
-    if results.FRICTION.key not in run.results:
+    if results.FRICTION.name not in run.results:
         return gettext(
             "Nothing slipped, so that there is no f<sub>d</sub> to vary."
             " Found are T, n<sub>1</sub> and what f<sub>s</sub> is at least."
@@ -154,35 +157,35 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> Classi
     fitted = run.results.get(key)
     if value is None or fitted is None:
         return None
-    shown = results.SHOWN[key]
+    shown = definition(key)
     row = results.make_row(shown, fitted)
     decimals = len(row.value.partition(".")[2])
-    classical = number_text.format_fixed(value * shown.scale, decimals)
+    classical = number_text.format_fixed(value * shown.unit_at(Place.WINDOW).scale, decimals)
     return ClassicalRow(
         row.symbol,
         row.name,
-        number_text.with_unit(classical, row.unit),
-        number_text.with_unit(row.value, row.unit),
+        with_unit(classical, row.unit),
+        with_unit(row.value, row.unit),
         hint,
     )
 
 
 def _of_paper(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
     """f_d by the paper's own procedure, no finer than its steps."""
-    fitted = run.results.get(results.FRICTION.key)
+    fitted = run.results.get(results.FRICTION.name)
     if found.friction_of_paper is None or fitted is None:
         return None
     by_paper = number_text.format_fixed(found.friction_of_paper, _PAPER_DECIMALS)
     shown = number_text.format_fixed(fitted.value, _PAPER_DECIMALS)
     hint = gettext("f_d lowered step by step until the paper's simulation coincides best")
-    return ClassicalRow(results.FRICTION.symbol, gettext("by the paper's method"), by_paper, shown, hint)
+    return ClassicalRow(results.FRICTION.symbol.html, gettext("by the paper's method"), by_paper, shown, hint)
 
 
 def _of_residual(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
     """Which f_d the residual displacement alone allows."""
-    if "residual_displacement_m" not in run.results or results.FRICTION.key not in run.results:
+    if "residual_displacement_m" not in run.results or results.FRICTION.name not in run.results:
         return None
-    fitted = run.results[results.FRICTION.key].value
+    fitted = run.results[results.FRICTION.name].value
     near = sorted(found.frictions_of_residual, key=lambda value: abs(value - fitted))[:_RESIDUALS_SHOWN]
     values = ", ".join(number_text.format_fixed(value, 4) for value in sorted(near))
     count = len(found.frictions_of_residual)
@@ -191,5 +194,9 @@ def _of_residual(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | No
     hint = gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
     words = gettext("from u<sub>s</sub> alone")
     return ClassicalRow(
-        results.FRICTION.symbol, words, values or gettext("none"), number_text.format_fixed(fitted, 4), hint
+        results.FRICTION.symbol.html,
+        words,
+        values or gettext("none"),
+        number_text.format_fixed(fitted, 4),
+        hint,
     )

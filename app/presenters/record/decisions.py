@@ -237,7 +237,7 @@ class RunDecisions:
 
 def _results_text(run: AnalysedRun) -> str:
     """`f_d = 0.1003 ± 0.0006.`; empty without f_d."""
-    quantity = run.results.get(FRICTION.key)
+    quantity = run.results.get(FRICTION.name)
     if quantity is None:
         return ""
     shown = make_row(FRICTION, quantity)

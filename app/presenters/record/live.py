@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.formatting import THIN_SPACE, with_unit
 from analysis.quantities import Quantity
 from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
@@ -314,7 +315,7 @@ def tare_chip(live: LiveTraces | None) -> Chip:
     if live is None:
         return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
     by = gettext(" and ").join(
-        number_text.with_unit(number_text.format_millimetres(m, 2), "mm") for m in live.tare_m.tolist()
+        with_unit(number_text.format_millimetres(m, 2), "mm") for m in live.tare_m.tolist()
     )
     hint = gettext("The calibration and what is stored stay as they are")
     return Chip(gettext("Tared by {by}", by=by), Tone.OK, hint)
@@ -337,7 +338,7 @@ def live_estimate(result: LiveResult) -> LiveEstimate:
 
 
 def _stop_note(result: LiveResult) -> str:
-    symbols = {shown.key: shown.symbol for shown in (*MAIN, FRICTION)}
+    symbols = {shown.name: shown.symbol.html for shown in (*MAIN, FRICTION)}
     narrower = gettext(" and ").join(symbols[name] for name in result.narrowing if name in symbols)
     may_stop = gettext("Waiting no longer narrows f<sub>d</sub>: you may stop")
     if not narrower:
@@ -350,7 +351,7 @@ def _stop_note(result: LiveResult) -> str:
 
 def rate_text(rate_hz: float) -> str:
     """Write `1000.02 Hz`."""
-    return number_text.with_unit(number_text.format_fixed(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
+    return with_unit(number_text.format_fixed(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
 
 
 def lost_samples_chip(health: Health) -> Chip:
@@ -384,7 +385,7 @@ def device_chip(name: str, loss_reason: str = "", silent_s: float = 0.0) -> Chip
     if loss_reason:
         return Chip(gettext("{name} lost", name=name), Tone.BAD, loss_reason)
     if silent_s > _SILENT_S:
-        time = number_text.with_unit(number_text.format_fixed(silent_s, 0), "s")
+        time = with_unit(number_text.format_fixed(silent_s, 0), "s")
         hint = gettext("The process that records has said nothing; it may be busy or hang.")
         return Chip(gettext("engine silent for {time}", time=time), Tone.WARN, hint)
     return Chip(name)
@@ -425,7 +426,7 @@ class GaugeMonitor:
         value_m = (rows.table_m, rows.relative_m)[self.channel][-1]
         range_m, until = self.gauge.range_m, self.gauge.valid_until
         if range_m is not None and abs(value_m) > _NEAR_LIMIT * range_m:
-            at = number_text.with_unit(number_text.format_millimetres(value_m), "mm")
+            at = with_unit(number_text.format_millimetres(value_m), "mm")
             hint = gettext("It stands at {at}.", at=at)
             return Chip(gettext("{name} at its limit", name=self.name), Tone.WARN, hint)
         if until is not None and until < today:
@@ -442,6 +443,6 @@ class GaugeMonitor:
 
 def _duration_text(time_s: float) -> str:
     if time_s < 3600.0:
-        return number_text.with_unit(number_text.format_fixed(time_s / 60.0, 0), "min")
-    hours = f"{time_s / 3600.0:,.0f}".replace(",", number_text.THIN_SPACE)
-    return number_text.with_unit(hours, "h")
+        return with_unit(number_text.format_fixed(time_s / 60.0, 0), "min")
+    hours = f"{time_s / 3600.0:,.0f}".replace(",", THIN_SPACE)
+    return with_unit(hours, "h")

@@ -8,8 +8,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from analysis.formatting import with_unit
 from app.acquisition.messages import RunSettings
-from app.presenters import number_text
 from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from app.presenters.record.decisions import LoadedPlan, SavePlan
@@ -315,7 +315,7 @@ def form_summary(form: RunForm) -> str:
 
 
 def _labelled(name: str, text: str, unit: str = "") -> str:
-    return name + number_text.with_unit(text.strip(), unit) if text.strip() else ""
+    return name + with_unit(text.strip(), unit) if text.strip() else ""
 
 
 def _form_error(form: RunForm) -> str:

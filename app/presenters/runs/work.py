@@ -8,11 +8,12 @@ from typing import Any
 
 from msgspec import convert
 
+from analysis.formatting import with_unit
 from analysis.record import AnalysisError
 from app.presenters.base import Progress
 from app.presenters.batch_text import batch_progress
 from app.presenters.conditions import parse_conditions
-from app.presenters.number_text import format_fixed, parse_number, with_unit
+from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.runs.import_form import GAIN, NUMBER_FIELDS, ImportForm, TextFormat, parse_pairs
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.runs.tasks import (

@@ -7,15 +7,10 @@ from typing import Final, Protocol
 
 import msgspec
 
+from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.state import LabelledValue
-from app.presenters.number_text import (
-    format_fixed,
-    format_millimetres,
-    parse_number,
-    with_minus_sign,
-    with_unit,
-)
+from app.presenters.number_text import format_fixed, format_millimetres, parse_number
 from app.presenters.results import sentence
 from app.presenters.stand.state import StandForm, StandState
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
@@ -145,7 +140,7 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
         LabelledValue(gettext("series"), stand.series),
         LabelledValue("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
         LabelledValue("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
-        LabelledValue(gettext("tilt"), with_unit(with_minus_sign(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        LabelledValue(gettext("tilt"), with_unit(typeset(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
         LabelledValue(gettext("pullback"), with_unit(format_millimetres(stand.pullback_m, 2), "mm")),
         LabelledValue("T", with_unit(format_fixed(stand.period_s * 1e3, 2), "ms")),
         LabelledValue("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
@@ -165,11 +160,7 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
 def _happened(truth: Truth) -> tuple[str, ...]:
     lines = []
     for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
-        length = (
-            gettext("for ever")
-            if one.seconds is None
-            else with_unit(with_minus_sign(f"{one.seconds:g}"), "s")
-        )
+        length = gettext("for ever") if one.seconds is None else with_unit(typeset(f"{one.seconds:g}"), "s")
         at = with_unit(f"{one.at_s or 0.0:.1f}", "s")
         lines.append(gettext("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
     return tuple(lines)

@@ -2,8 +2,8 @@
 
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
+from analysis.formatting import THIN_SPACE
 from app.presenters.campaign.state import CampaignEvents, RunRow
-from app.presenters.number_text import THIN_SPACE
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from analysis.formatting import typeset
 from app.presenters import number_text
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.state import (
@@ -254,10 +255,8 @@ class _ReadingsTable(QTableWidget):
         self.setRowCount(len(readings))
         for row, reading in enumerate(readings):
             residual = "" if left is None else number_text.format_fixed(float(np.asarray(left)[row]), 1)
-            counts = number_text.with_minus_sign(f"{reading.counts:.7g}")
-            for column, text in enumerate(
-                (number_text.with_minus_sign(f"{reading.dial_mm:g}"), counts, residual)
-            ):
+            counts = typeset(f"{reading.counts:.7g}")
+            for column, text in enumerate((typeset(f"{reading.dial_mm:g}"), counts, residual)):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(row, column, item)

@@ -9,6 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
+from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine
 from app.qt.identify.cursor_lines import CursorLines
@@ -164,8 +165,8 @@ class CurvePlots(QWidget):
         ]
         if not shown:
             return ""
-        at = number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
-        return f"{at}   {number_text.with_unit(' | '.join(shown), _UNITS[row])}"
+        at = with_unit(number_text.format_fixed(at_s, 3), "s")
+        return f"{at}   {with_unit(' | '.join(shown), _UNITS[row])}"
 
     def _lines(self, curves: Curves, row: int) -> list[Floats]:
         if row == 2:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.identify.state import Floats, Motion
 from app.qt.identify.cursor_lines import CursorLines
@@ -88,8 +89,8 @@ class TimePlots(QWidget):
         for row, (lines, unit) in enumerate(zip(self._lines, self._units, strict=True)):
             values = [value_at(self._time_s, values, at_s) for values in lines]
             shown = " | ".join(number_text.format_fixed(value, 3) for value in values if math.isfinite(value))
-            at = "" if math.isnan(at_s) else number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
-            self._stack.set_readout(row, f"{at}   {number_text.with_unit(shown, unit)}" if shown else "")
+            at = "" if math.isnan(at_s) else with_unit(number_text.format_fixed(at_s, 3), "s")
+            self._stack.set_readout(row, f"{at}   {with_unit(shown, unit)}" if shown else "")
 
 
 class MotionTabs:

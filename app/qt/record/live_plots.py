@@ -8,6 +8,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Span, TraceMarks, Traces
@@ -187,5 +188,5 @@ def _place_lines(items: list[Any], span: Span | None) -> None:
 
 
 def _readout(at_s: float, value_mm: float) -> str:
-    at = number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
-    return f"{at}   {number_text.with_unit(number_text.format_fixed(value_mm, 3), 'mm')}"
+    at = with_unit(number_text.format_fixed(at_s, 3), "s")
+    return f"{at}   {with_unit(number_text.format_fixed(value_mm, 3), 'mm')}"

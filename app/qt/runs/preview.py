@@ -6,6 +6,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
@@ -128,6 +129,6 @@ def _lines(trace: Trace | None) -> tuple[np.ndarray | None, np.ndarray | None]:
 
 
 def _readout(at_s: float, values_mm: list[float]) -> str:
-    at = number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
+    at = with_unit(number_text.format_fixed(at_s, 3), "s")
     shown = [number_text.format_fixed(value, 3) for value in values_mm if math.isfinite(value)]
-    return f"{at}   {number_text.with_unit(' | '.join(shown), 'mm')}" if shown and len(shown) <= 3 else at
+    return f"{at}   {with_unit(' | '.join(shown), 'mm')}" if shown and len(shown) <= 3 else at

@@ -11,7 +11,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QBrush, QPainter, QPixmapCache, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
-from app.presenters.number_text import with_minus_sign
+from analysis.formatting import typeset
 from app.qt.theme import TextRole, Theme, Tokens, colour, font
 
 Floats = NDArray[np.float64]
@@ -191,7 +191,7 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     """An axis whose numbers carry a true minus."""
 
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
-        return [with_minus_sign(text) for text in super().tickStrings(values, scale, spacing)]
+        return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
 
 
 def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:

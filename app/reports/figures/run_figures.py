@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from analysis.catalogue import Place, definition
 from analysis.identification import Identification
 from analysis.laws.catalogue import law_with_own_parameters
 from analysis.motion.motion import Motion, MotionSamples
@@ -16,7 +17,6 @@ from analysis.motion.two_mass import TwoMassParameters
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.reports.figures.style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure
-from app.reports.numbers import with_uncertainty
 
 Floats = NDArray[np.float64]
 _BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0
@@ -234,8 +234,8 @@ def _rates(
 ) -> None:
     """Both bodies with their largest values; `words` are symbol, name and unit."""
     symbol, name, unit = words
-    table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}', unit)}"
-    plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}', unit)}"
+    table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}')}"
+    plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}')}"
     _bodies(axes, _motion(run).time_s, both, (table, plate))
     axes.set_ylabel(f"{name} ({unit})")
 
@@ -292,13 +292,9 @@ def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: t
     axes.plot(time_s, values[1], color=PLATE, linewidth=1.1, linestyle=DASHED, label=labels[1])
 
 
-def _largest(run: RunFigureData, name: str, unit: str) -> str:
+def _largest(run: RunFigureData, name: str) -> str:
     found = run.results.get(name)
-    return (
-        "what is not known"
-        if found is None
-        else with_uncertainty(found.value, found.standard_uncertainty, unit)
-    )
+    return "what is not known" if found is None else definition(name).format(found, Place.REPORT).in_print
 
 
 def _legend(axes: Axes, columns: int) -> None:

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
 
 from analysis.campaign.campaign import Campaign, PublishedComparison
-from analysis.campaign.columns import COLUMNS, Column
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
+from analysis.catalogue import Place, QuantityDefinition, table_columns
+from analysis.formatting import format_concise, format_fixed, format_signed, uncertainty_decimals
 from analysis.quantities import Quantity, ResultWarning
 
 
@@ -52,58 +52,44 @@ def has_inadequate_run(row: SeriesRow) -> bool:
 
 
 OUTLIER, INADEQUATE = "*", "!"
-_SCALES: Final = {"residual_displacement_m": (1e3, "mm")}
-_FINEST = 1e-9
-"""Relative uncertainty that is not worth digits."""
 
 
-def header(column: Column) -> str:
-    """Symbol and unit, as `u_s mm`."""
-    unit = _SCALES.get(column.name, (1.0, column.unit))[1]
-    return column.symbol if unit == "1" else f"{column.symbol} {unit}"
+def table_quantities() -> tuple[QuantityDefinition, ...]:
+    """Quantities of the table, in the paper's order."""
+    return tuple(row for row, _ in table_columns())
 
 
-HEADERS: Final = ("series", "n", *map(header, COLUMNS))
+def table_headers() -> tuple[str, ...]:
+    """Heads of the columns: symbols with units."""
+    return ("series", "n", *(row.heading(Place.TABLE) for row in table_quantities()))
 
 
 def row_cells(row: SeriesRow) -> tuple[str, ...]:
     """A row of the table; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
     doubt = INADEQUATE if has_inadequate_run(row) else ""
-    values = (row_cell(row, column) for column in COLUMNS)
+    values = (row_cell(row, column) for column in table_quantities())
     return (row.label + doubt, str(len(row.runs)), *values)
 
 
-def row_cell(row: SeriesRow, column: Column) -> str:
+def row_cell(row: SeriesRow, column: QuantityDefinition) -> str:
     """One quantity; f_s without a value of its own by its bounds; "" for what no run determined."""
     pooled = row.quantities.get(column.name)
     if pooled is None:
         return _bounds(row) if column.name == "friction_static" else ""
-    shown = of_column(pooled.quantity, column.name)
+    shown = format_in_column(pooled.quantity, column)
     return shown + (OUTLIER if pooled.outliers else "")
 
 
-def of_column(quantity: Quantity, name: str) -> str:
-    """A quantity in the unit of its column."""
-    scale = _SCALES.get(name, (1.0, ""))[0]
+def format_in_column(quantity: Quantity, column: QuantityDefinition) -> str:
+    """A quantity in the unit of its column: `0.10030(64)`."""
+    scale = column.unit_at(Place.TABLE).scale
     return format_concise(scale * quantity.value, scale * quantity.standard_uncertainty)
 
 
-def difference(found: Quantity, less: float, name: str) -> str:
-    """By how much a quantity differs from a number, to its own digits, in the unit of its column."""
-    scale = _SCALES.get(name, (1.0, ""))[0]
-    decimals = _decimals(scale * found.standard_uncertainty)
-    return f"{round(scale * (found.value - less), decimals):+.{max(0, decimals)}f}"
-
-
-def format_concise(value: float, uncertainty: float) -> str:
-    """Write `0.10030(64)`: the standard uncertainty in units of the last digits (JCGM 100, 7.2.2)."""
-    if not math.isfinite(uncertainty) or uncertainty <= _FINEST * abs(value):
-        return f"{value:.6g}"
-    decimals = _decimals(uncertainty)
-    digits = round(uncertainty * 10.0**decimals)
-    if decimals < 1:
-        return f"{round(value, decimals):.0f}({digits * 10**-decimals})"
-    return f"{value:.{decimals}f}({digits if decimals > 1 else digits / 10.0})"
+def format_difference(found: Quantity, reference: float, column: QuantityDefinition) -> str:
+    """Difference of a quantity from a number, to the digits of its uncertainty: `+0.0012`."""
+    scale = column.unit_at(Place.TABLE).scale
+    return format_signed(scale * (found.value - reference), _decimals(scale * found.standard_uncertainty))
 
 
 def repeats(pooled: PooledQuantity) -> str:
@@ -113,15 +99,11 @@ def repeats(pooled: PooledQuantity) -> str:
         return ""
     share = 100.0 * pooled.scatter / value
     mark = OUTLIER if pooled.outliers else ""
-    return f"{share:.{max(0, _decimals(share))}f} % {pooled.birge_ratio:.1f}{mark}"
+    return f"{format_fixed(share, max(0, _decimals(share)))} % {pooled.birge_ratio:.1f}{mark}"
 
 
 def _decimals(uncertainty: float) -> int:
-    """Decimals that show two digits of an uncertainty; negative ones are tens."""
-    if not 0.0 < uncertainty < math.inf:
-        return 6
-    decimals = 1 - math.floor(math.log10(uncertainty))
-    return decimals - (round(uncertainty * 10.0**decimals) >= 100)
+    return uncertainty_decimals(uncertainty) if 0.0 < uncertainty < math.inf else 6
 
 
 def _bounds(row: SeriesRow) -> str:

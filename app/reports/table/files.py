@@ -9,11 +9,17 @@ from typing import Any, Final
 
 import msgspec
 
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
+from analysis.catalogue import Place
 from analysis.quantities import Quantity
-from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, row_cells
+from app.reports.table.content import (
+    PublishedRowComparison,
+    TableContent,
+    row_cells,
+    table_headers,
+    table_quantities,
+)
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
 from app.runs.analysis_json import warning_documents
 from app.runs.disk import atomic_write
@@ -24,10 +30,6 @@ from app.runs.exchange.xlsx_files import Sheet, write_sheets
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
-_LATEX_HEADERS: Final = (
-    "Series", "$n$", "$m_2$, kg", "$c$, N/m", "$T$, s", "$u_s$, mm", "$n_1$, s$^{-1}$", "$n_2$, s$^{-1}$",
-    "$f_s$", "$f_d$", "$v_{\\mathrm{max}}$, m/s", "$a_{\\mathrm{max}}$, m/s$^2$",
-)  # fmt: skip
 
 
 def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:
@@ -59,7 +61,7 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
     """
     said = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {
-        "Table 1": (HEADERS, [row_cells(row) for row in content.campaign.rows]),
+        "Table 1": (table_headers(), [row_cells(row) for row in content.campaign.rows]),
         "Numbers": flat_table(content),
         "Repeats": repeats_grid(content),
         "Said": (("about", "sentence"), said),
@@ -78,7 +80,7 @@ def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def _markdown(content: TableContent, with_repeats: bool) -> str:
-    lines = [*_markdown_table(HEADERS, [row_cells(row) for row in content.campaign.rows]), "", LEGEND]
+    lines = [*_markdown_table(table_headers(), [row_cells(row) for row in content.campaign.rows]), "", LEGEND]
     if with_repeats:
         lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
     if content.published is not None:
@@ -104,9 +106,10 @@ def _latex(content: TableContent) -> str:
         "% by slipstand, for \\usepackage{booktabs}; in parentheses: standard uncertainty of the last digits",
         "% as wide as a page of A4 is high: for \\usepackage{rotating} and \\begin{sidewaystable}",
         r"\begingroup\footnotesize\setlength{\tabcolsep}{4pt}",
-        rf"\begin{{tabular}}{{l{'r' * (len(COLUMNS) + 1)}}}",
+        rf"\begin{{tabular}}{{l{'r' * (len(table_quantities()) + 1)}}}",
         r"\toprule",
-        " & ".join(_LATEX_HEADERS) + r" \\",
+        " & ".join(("Series", "$n$", *(one.latex_heading(Place.TABLE) for one in table_quantities())))
+        + r" \\",
         r"\midrule",
         *(" & ".join(_latex_cell(one) for one in row_cells(row)) + r" \\" for row in content.campaign.rows),
         r"\bottomrule",
@@ -129,7 +132,6 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-_QUANTITIES: Final = (*(column.name for column in COLUMNS), STATIC_LOWER, STATIC_UPPER)
 _SUFFIXES: Final = (
     "",
     "_standard_uncertainty",
@@ -147,17 +149,21 @@ _LEADING: Final = ("series", "contact", "pullback_m", "table_mass_kg", "runs")
 
 def flat_table(content: TableContent) -> tuple[list[str], list[list[Any]]]:
     """Header and rows; None where there is nothing."""
-    names = [f"{name}{fact}" for name in _QUANTITIES for fact in _SUFFIXES]
+    names = [f"{name}{fact}" for name in _names() for fact in _SUFFIXES]
     header = [*_LEADING, *names, "msk64_degree", "warnings"]
     if content.published is not None:
-        header += [f"{column.name}{fact}" for column in COLUMNS for fact in _PUBLISHED] + ["flags"]
+        header += [f"{column.name}{fact}" for column in table_quantities() for fact in _PUBLISHED] + ["flags"]
     return header, [list(_flat_row(row, content)) for row in content.campaign.rows]
+
+
+def _names() -> tuple[str, ...]:
+    return (*(row.name for row in table_quantities()), STATIC_LOWER, STATIC_UPPER)
 
 
 def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
     key = row.series
     yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
-    for name in _QUANTITIES:
+    for name in _names():
         yield from _flat_quantity(row.quantities.get(name))
     yield from (row.msk64_degree, " | ".join(str(warning.message) for warning in row.warnings))
     if content.published is not None:
@@ -175,7 +181,7 @@ def _flat_quantity(pooled: PooledQuantity | None) -> Iterator[Any]:
 
 def _flat_comparison(printed: PublishedRowComparison | None) -> Iterator[Any]:
     figures = {one.name: one for one in printed.figures} if printed else {}
-    for column in COLUMNS:
+    for column in table_quantities():
         one = figures.get(column.name)
         yield from (None, None) if one is None else (one.published, one.difference)
     yield ", ".join(printed.flags) if printed else None

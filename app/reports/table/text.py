@@ -5,18 +5,18 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from analysis.campaign.campaign import Campaign
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.contacts import ContactRatio
 from analysis.campaign.effects import Effects
 from analysis.campaign.rows import SeriesRow
+from analysis.formatting import format_concise
 from app.reports.table.content import (
-    HEADERS,
     PublishedRowComparison,
     TableContent,
-    difference,
-    format_concise,
+    format_difference,
     repeats,
     row_cells,
+    table_headers,
+    table_quantities,
 )
 
 _GAP: Final = "  "
@@ -37,7 +37,7 @@ _PUBLISHED_LEGEND: Final = "Found less printed, the printed c read as kgf/m:"
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
     """Lines of the table and of what is said of it; `width` characters at most where words allow it."""
     rows = [row_cells(row) for row in content.campaign.rows]
-    yield from blocks(HEADERS, rows, width)
+    yield from blocks(table_headers(), rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
         yield from ("", *_wrapped(REPEATS_LEGEND, width), "")
@@ -134,7 +134,7 @@ def _spread(between_series: float | None) -> str:
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """How the runs of each series differ: header and rows."""
-    columns = COLUMNS[1:]
+    columns = table_quantities()[1:]
     rows = [
         (
             row.label,
@@ -142,7 +142,7 @@ def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str
         )
         for row in content.campaign.rows
     ]
-    return ("series", *(column.symbol for column in columns)), rows
+    return ("series", *(column.symbol.text for column in columns)), rows
 
 
 def published_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -152,15 +152,15 @@ def published_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[s
         for row in content.campaign.rows
         if content.published and row.label in content.published
     ]
-    return ("series", *HEADERS[3:]), rows
+    return ("series", *table_headers()[3:]), rows
 
 
 def _differences(row: SeriesRow, printed: PublishedRowComparison) -> Iterator[str]:
     by_name = {one.name: one.published for one in printed.figures}
-    for column in COLUMNS[1:]:
+    for column in table_quantities()[1:]:
         known = column.name in by_name
         found = row.quantities.get(column.name)
-        yield difference(found.quantity, by_name[column.name], column.name) if known and found else ""
+        yield format_difference(found.quantity, by_name[column.name], column) if known and found else ""
 
 
 def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> Iterator[str]:

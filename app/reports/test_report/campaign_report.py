@@ -11,11 +11,12 @@ import msgspec
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.series import RunResult
+from analysis.catalogue import Place, QuantityDefinition
+from analysis.formatting import format_uncertainty, format_value, typeset, typeset_sentence
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
-from app.reports.numbers import signed_numbers, two_digits, with_uncertainty
-from app.reports.table.content import HEADERS, TableContent, row_cells
+from app.reports.table.content import TableContent, row_cells, table_quantities
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
 from app.reports.test_report.blocks import (
     Block,
@@ -44,7 +45,6 @@ from app.runs.campaign.run_result import RunDetails
 from app.runs.reader import Fingerprint
 
 _FRICTION = "friction_dynamic"
-_SUBSCRIPTED: Final = {"m2": "m_2", "n1": "n_1", "n2": "n_2"}
 _DRAWN: Final = ("3a", "3b", "4a", "4b", "5a")
 _VERDICTS: Final = {True: "fits", False: "does NOT fit", None: "no law fitted"}
 _ALWAYS_SAID: Final = ("Runs that do not count", "Runs without a result")
@@ -76,14 +76,15 @@ class CampaignReportInput:
 def campaign_sections(material: CampaignReportInput) -> list[Section]:
     """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
-    table: list[list[Cell]] = [[signed_numbers(text) for text in row_cells(row)] for row in rows]
+    table: list[list[Cell]] = [[typeset_sentence(text) for text in row_cells(row)] for row in rows]
     header, scatter = repeats_grid(material.content)
+    heads: list[Cell] = ["series", "n", *_heads(table_quantities())]
     return [
         Section("Campaign", [_summary(material)]),
         *_said(material),
         Section(
             "Table of results",
-            [Grid(_HEADS, table, numbers=len(_HEADS) - 1, small=True, note=LEGEND)],
+            [Grid(heads, table, numbers=len(heads) - 1, small=True, note=LEGEND)],
             wide=True,
         ),
         Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
@@ -91,7 +92,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
             "Repeatability",
             [
                 Grid(
-                    [_head(symbol) for symbol in header],
+                    ["series", *_heads(table_quantities()[1:], with_units=False)],
                     [list(row) for row in scatter],
                     len(header) - 1,
                     small=True,
@@ -110,14 +111,10 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     ]
 
 
-def _head(text: str) -> Cell:
-    """Head of a column: `u_s mm` with its subscript."""
-    symbol, _, unit = text.replace("s2", "s²").partition(" ")
-    return Symbol(_SUBSCRIPTED.get(symbol, symbol), unit) if symbol not in _WORDS else text
-
-
-_WORDS: Final = ("series", "n", "MSK-64")
-_HEADS: Final = [_head(text) for text in HEADERS]
+def _heads(quantities: Sequence[QuantityDefinition], *, with_units: bool = True) -> list[Cell]:
+    return [
+        Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol if with_units else "") for row in quantities
+    ]
 
 
 def _summary(material: CampaignReportInput) -> Facts:
@@ -151,7 +148,7 @@ def _said(material: CampaignReportInput) -> Iterator[Section]:
     """What the campaign says in sentences; that nothing was left out is said too."""
     said = dict(note_sections(material.content))
     for title in dict.fromkeys((*said, *_ALWAYS_SAID)):
-        texts = [signed_numbers(_local(text, material)) for text in said.get(title, ())]
+        texts = [typeset_sentence(_local(text, material)) for text in said.get(title, ())]
         yield Section(title, [Points(texts) if texts else Text("None.")])
 
 
@@ -172,9 +169,12 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
     rows: list[list[Cell]] = [
         [
             label,
-            with_uncertainty(one.quantity.value, one.quantity.standard_uncertainty),
-            two_digits(one.repeatable),
-            *(two_digits(shared[label][source]) if source in shared[label] else "" for source in sources),
+            format_value(one.quantity.value, one.quantity.standard_uncertainty).in_print,
+            typeset(format_uncertainty(one.repeatable)),
+            *(
+                typeset(format_uncertainty(shared[label][source])) if source in shared[label] else ""
+                for source in sources
+            ),
         ]
         for label, one in pooled.items()
     ]
@@ -238,7 +238,7 @@ def _run(run: RunResult, facts: RunDetails, material: CampaignReportInput) -> li
         facts.conditions.as_text(),
         facts.note,
         "left out" if run.excluded else _VERDICTS[run.adequate],
-        "–" if friction is None else with_uncertainty(friction.value, friction.standard_uncertainty),
+        "–" if friction is None else format_value(friction.value, friction.standard_uncertainty).in_print,
     ]
 
 

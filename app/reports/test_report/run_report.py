@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from analysis.catalogue import CATALOGUE, Place, QuantityDefinition, definition
+from analysis.formatting import format_fixed, format_interval, format_uncertainty, typeset
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
-from app.reports.numbers import fixed, signed, two_digits, value_and_uncertainty, with_uncertainty
 from app.reports.test_report.blocks import (
     Block,
     Cell,
@@ -39,30 +40,6 @@ from app.runs.metadata import Conditions, RunMetadata
 from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
-_RESULTS: Final = (
-    ("friction_dynamic", "f_d", "dynamic friction", 1.0, "1"),
-    ("friction_static", "f_s", "static friction", 1.0, "1"),
-    ("friction_static_lower", "f_s", "static friction, at least", 1.0, "1"),
-    ("friction_static_upper", "f_s", "static friction, at most", 1.0, "1"),
-    ("stribeck_velocity_m_per_s", "v_s", "Stribeck velocity", 1e3, "mm/s"),
-    ("tilt_rad", "α", "tilt of the sliding plane", 1e3, "mrad"),
-    ("period_s", "T", "period", 1e3, "ms"),
-    ("log_decrement", "δ", "logarithmic decrement", 1.0, "1"),
-    ("damping_n1_per_s", "n_1", "damping, joint motion", 1.0, "1/s"),
-    ("damping_n2_per_s", "n_2", "damping, table alone", 1.0, "1/s"),
-    ("damping_n_per_s", "n", "damping", 1.0, "1/s"),
-    ("damping_coefficient_kg_per_s", "μ", "damping coefficient", 1.0, "kg/s"),
-    ("frequency_k1_rad_per_s", "k_1", "circular frequency, joint motion", 1.0, "rad/s"),
-    ("frequency_k2_rad_per_s", "k_2", "circular frequency, table alone", 1.0, "rad/s"),
-    ("stiffness_n_per_m", "c", "stiffness", 1.0, "N/m"),
-    ("pullback_m", "u_0", "pullback", 1e3, "mm"),
-    ("residual_displacement_m", "u_s", "residual displacement", 1e3, "mm"),
-    ("coulomb_displacement_m", "x_k", "Coulomb displacement", 1e3, "mm"),
-    ("table_velocity_max_m_per_s", "v_1", "largest velocity of the table", 1.0, "m/s"),
-    ("plate_velocity_max_m_per_s", "v_2", "largest velocity of the plate", 1.0, "m/s"),
-    ("table_acceleration_max_m_per_s2", "a_1", "largest acceleration of the table", 1.0, "m/s²"),
-    ("plate_acceleration_max_m_per_s2", "a_2", "largest acceleration of the plate", 1.0, "m/s²"),
-)
 _BUDGETED: Final = (
     "friction_dynamic",
     "friction_static",
@@ -115,24 +92,24 @@ def _expired(found: Identification) -> list[Block]:
 
 def _result(found: Identification) -> Iterator[Block]:
     """The first of the headlines that was found, and what is to be thought of it."""
-    rows = {key: (symbol, scale, unit) for key, symbol, _, scale, unit in _RESULTS}
     key = next((key for key in _HEADLINES if key in found.results), None)
     if key is None:
         yield Text("The record gave no result; the warnings say why.")
         return
-    symbol, scale, unit = rows[key]
-    quantity = found.results[key]
-    value = _with_unit(quantity, scale, unit)
+    row, quantity = definition(key), found.results[key]
+    symbol, value = Symbol(row.symbol.markup), row.format(quantity, Place.REPORT).in_print
     if found.model is None:
-        bound = key == "friction_static_lower"
-        text = "The plate did not slip: f_s is at least so large." if bound else "No friction law was fitted."
-        yield Conclusion(Symbol(symbol), value, text, "warn", "≥" if bound else "=")
+        relation = row.symbol.relation
+        text = (
+            "The plate did not slip: f_s is at least so large." if relation else "No friction law was fitted."
+        )
+        yield Conclusion(symbol, value, text, "warn", relation or "=")
         return
     residual, noise = found.model.residual_rms_m * 1e6, found.model.noise_rms_m * 1e6
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
     text = f"The law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
-    yield Conclusion(Symbol(symbol), value, text, "ok" if found.model.adequate else "bad")
-    yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(quantity, scale)}.")
+    yield Conclusion(symbol, value, text, "ok" if found.model.adequate else "bad")
+    yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(row, quantity)}.")
 
 
 def _test(analysis: Analysis) -> Facts:
@@ -171,7 +148,9 @@ def _samples(losses: Losses) -> str:
 
 
 def _slip(release_s: float | None, slip_end_s: float | None) -> str:
-    return "" if release_s is None or slip_end_s is None else f"{fixed(slip_end_s - release_s, 3)}\u00a0s"
+    return (
+        "" if release_s is None or slip_end_s is None else f"{format_fixed(slip_end_s - release_s, 3)}\u00a0s"
+    )
 
 
 def _conditions(metadata: RunMetadata) -> Facts:
@@ -194,15 +173,20 @@ def _conditions(metadata: RunMetadata) -> Facts:
 
 def _results(found: Identification) -> Iterator[Block]:
     rows: list[list[Cell]] = []
-    for key, symbol, word, scale, unit in _RESULTS:
-        quantity = found.results.get(key)
+    for row in CATALOGUE:
+        quantity = found.results.get(row.name)
         if quantity is not None and math.isfinite(quantity.value):
-            value, uncertainty = value_and_uncertainty(
-                quantity.value * scale, quantity.standard_uncertainty * scale
+            shown = row.format(quantity, Place.REPORT)
+            rows.append(
+                [
+                    row.description,
+                    Symbol(row.symbol.markup),
+                    typeset(shown.value),
+                    shown.uncertainty or "–",
+                    _interval(row, quantity),
+                    shown.unit or "1",
+                ]
             )
-            interval = _interval(quantity, scale)
-            shown = unit if not key.startswith("coulomb") or quantity.unit == "m" else quantity.unit
-            rows.append([word, Symbol(symbol), value, uncertainty or "–", interval, shown])
     if degree := found.labels.get("msk64_degree"):
         rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
     header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
@@ -214,7 +198,7 @@ def _results(found: Identification) -> Iterator[Block]:
                 [
                     law.name,
                     f"{law.friction_dynamic:.6f}",
-                    signed(f"{law.bic:.1f}"),
+                    typeset(f"{law.bic:.1f}"),
                     f"{law.residual_rms_m * 1e6:.2f}",
                 ]
                 for law in found.model.tried
@@ -224,41 +208,32 @@ def _results(found: Identification) -> Iterator[Block]:
         )
 
 
-def _interval(quantity: Quantity, scale: float) -> str:
+def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
+    scale = row.unit_at(Place.REPORT, quantity.unit).scale
     low, high = quantity.interval_95
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return "–"
-    spread = max((high - low) * scale / 4.0, 1e-12)
-    ends = (value_and_uncertainty(end * scale, spread)[0] for end in (low, high))
-    return " to ".join(ends)
-
-
-def _with_unit(quantity: Quantity, scale: float, unit: str) -> str:
-    return with_uncertainty(
-        quantity.value * scale, quantity.standard_uncertainty * scale, "" if unit == "1" else unit
-    )
+    return typeset(format_interval(low * scale, high * scale))
 
 
 def _budget(found: Identification) -> Iterator[Block]:
     """A row a source, a column a result; the largest source of the first result first."""
-    rows = {key: (symbol, scale, unit) for key, symbol, _, scale, unit in _RESULTS}
-    shown = [key for key in _BUDGETED if key in found.results and key in rows]
+    rows = [definition(name) for name in _BUDGETED if name in found.results]
+    shown = [row.name for row in rows]
     shares = {(str(line.source), line.contribution_to): line.standard_uncertainty for line in found.budget}
     sources = _by_size(found.budget, shown)
     if not sources:
         yield Text("There is no result whose uncertainty could be broken down.")
         return
-    heads = [Symbol(rows[key][0], "" if rows[key][2] == "1" else rows[key][2]) for key in shown]
+    heads = [Symbol(row.symbol.markup, row.unit_at(Place.REPORT).symbol) for row in rows]
     body: list[list[Cell]] = [
         [
             source,
             "A" if source == str(BudgetSource.NOISE) else "B",
-            *(_share(shares.get((source, key)), rows[key][1]) for key in shown),
+            *(_share(shares.get((source, row.name)), row) for row in rows),
         ]
         for source in sources
     ]
     total: list[Cell] = ["together", ""]
-    total += [_share(found.results[key].standard_uncertainty, rows[key][1]) for key in shown]
+    total += [_share(found.results[row.name].standard_uncertainty, row) for row in rows]
     note = "Standard uncertainty that each source adds; A: by statistics, B: by what is stated. Empty: none."
     yield Grid(["source", "type", *heads], [*body, total], numbers=len(shown), note=note)
 
@@ -275,10 +250,12 @@ def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
     return list(found)
 
 
-def _share(deviation: float | None, scale: float) -> str:
+def _share(deviation: float | None, row: QuantityDefinition) -> str:
     if deviation is None:
         return ""
-    return "not stated" if math.isnan(deviation) else two_digits(deviation * scale)
+    if math.isnan(deviation):
+        return "not stated"
+    return typeset(format_uncertainty(deviation * row.unit_at(Place.REPORT).scale))
 
 
 def _figures(analysis: Analysis) -> list[Block]:

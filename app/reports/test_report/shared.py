@@ -6,8 +6,15 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
+from analysis.formatting import (
+    NO_BREAK_SPACE,
+    format_compact,
+    format_fixed,
+    format_value,
+    format_with_prefix,
+    typeset,
+)
 from app.reports.figures.style import figure_svg
-from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.reader import Fingerprint
 from config.schema import Gauge, Gauges, Stand
@@ -82,7 +89,7 @@ def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:
 
 def scaled(value: float | None, scale: float, decimals: int, unit: str) -> str:
     """A plain value in its unit, "" where there is none."""
-    return "" if value is None else f"{fixed(value * scale, decimals)}\u00a0{unit}"
+    return "" if value is None else f"{typeset(format_fixed(value * scale, decimals))}{NO_BREAK_SPACE}{unit}"
 
 
 def _stand(stand: Stand) -> Facts:
@@ -94,16 +101,18 @@ def _stand(stand: Stand) -> Facts:
             ("name", stand.name),
             (
                 "table mass m1",
-                with_uncertainty(stand.table_mass_kg, stand.table_mass_standard_uncertainty_kg, "kg"),
+                format_value(stand.table_mass_kg, stand.table_mass_standard_uncertainty_kg, "kg").in_print,
             ),
             (
                 "plate mass m2",
-                with_uncertainty(stand.plate_mass_kg, stand.plate_mass_standard_uncertainty_kg, "kg")
+                format_value(stand.plate_mass_kg, stand.plate_mass_standard_uncertainty_kg, "kg").in_print
                 + " without added mass",
             ),
             (
                 "gravity",
-                with_uncertainty(stand.gravity_m_per_s2, stand.gravity_standard_uncertainty_m_per_s2, "m/s²"),
+                format_value(
+                    stand.gravity_m_per_s2, stand.gravity_standard_uncertainty_m_per_s2, "m/s²"
+                ).in_print,
             ),
             ("geometry", geometry),
         ]
@@ -125,19 +134,19 @@ def _gain_uncertainty(gauge: Gauge) -> str:
 
 
 def _micrometres(length_m: float | None) -> str:
-    return "" if length_m is None else signed(f"{length_m * 1e6:.3g} µm")
+    return "" if length_m is None else typeset(f"{length_m * 1e6:.3g} µm")
 
 
 def _delay(gauge: Gauge) -> str:
-    return f"{signed(f'{gauge.delay_s * 1e6:.3g}')} ± {gauge.delay_standard_uncertainty_s * 1e6:.3g} µs"
+    return f"{typeset(f'{gauge.delay_s * 1e6:.3g}')} ± {gauge.delay_standard_uncertainty_s * 1e6:.3g} µs"
 
 
 _OF_GAUGE: Final = (
     ("serial number", lambda gauge: gauge.serial_number),
-    ("gain", lambda gauge: f"{with_prefix(gauge.gain_m_per_count, 'm', 7)} per count"),
+    ("gain", lambda gauge: f"{typeset(format_with_prefix(gauge.gain_m_per_count, 'm', 7))} per count"),
     ("its relative standard uncertainty", _gain_uncertainty),
-    ("zero", lambda gauge: signed(f"{gauge.zero_count:.9g} counts")),
-    ("polynomial", lambda gauge: ", ".join(compact(term, 5) for term in gauge.polynomial)),
+    ("zero", lambda gauge: typeset(f"{gauge.zero_count:.9g} counts")),
+    ("polynomial", lambda gauge: ", ".join(typeset(format_compact(term, 5)) for term in gauge.polynomial)),
     ("non-linearity", lambda gauge: _micrometres(gauge.nonlinearity_m)),
     ("hysteresis", lambda gauge: _micrometres(gauge.hysteresis_m)),
     ("repeatability", lambda gauge: _micrometres(gauge.repeatability_m)),

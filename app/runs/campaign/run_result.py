@@ -3,7 +3,6 @@
 import contextlib
 import datetime
 import hashlib
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import msgspec
 
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetSource, Quantity
-from app.runs.analysis_json import read_budget_line, read_warning
+from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import AnalysisRequest, Progress, analyze_run
 from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
 from app.runs.metadata import Conditions, RunMetadata
@@ -140,7 +139,7 @@ def stand_identity(metadata: RunMetadata) -> str:
 def result_quantities(document: Document) -> dict[str, Quantity]:
     """Results of an analysis; what was not finite is NaN."""
     results = document["results"].items()
-    return {name: _quantity(value) for name, value in results if isinstance(value, dict)}
+    return {name: read_quantity(value) for name, value in results if isinstance(value, dict)}
 
 
 def _read(file: h5py.File) -> _Read:
@@ -218,16 +217,6 @@ def _line(source: str, contribution_to: str, standard_uncertainty: float) -> dic
         "contribution_to": contribution_to,
         "standard_uncertainty": standard_uncertainty,
     }
-
-
-def _number(line: dict[str, Any]) -> float:
-    value = line["standard_uncertainty"]
-    return math.nan if value is None else float(value)
-
-
-def _quantity(value: dict[str, Any]) -> Quantity:
-    low, high = value["interval_95"] or (math.nan, math.nan)
-    return Quantity(value["value"], _number(value), (low, high), value["unit"])
 
 
 def _hash(facts: list[Any]) -> str:

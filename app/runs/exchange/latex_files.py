@@ -1,22 +1,21 @@
 """LaTeX: the coefficients of one or more runs as a table to paste into a paper (needs booktabs)."""
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
+from analysis.catalogue import Place, QuantityDefinition, definition
+from analysis.formatting import format_value
 from app.runs.disk import atomic_write
 from app.runs.exchange.content import ExportedRun
 
-_COLUMNS = (
-    ("period_s", r"$T$, ms", 1e3),
-    ("log_decrement", r"$\delta$", 1.0),
-    ("damping_n1_per_s", r"$n_1$, s$^{-1}$", 1.0),
-    ("damping_n2_per_s", r"$n_2$, s$^{-1}$", 1.0),
-    ("stiffness_n_per_m", r"$c$, N/m", 1.0),
-    ("residual_displacement_m", r"$u_s$, mm", 1e3),
-    ("friction_static", r"$f_s$", 1.0),
-    ("friction_dynamic", r"$f_d$", 1.0),
-)
+_COLUMNS = tuple(
+    definition(name)
+    for name in (
+        "period_s", "log_decrement", "damping_n1_per_s", "damping_n2_per_s", "stiffness_n_per_m",
+        "residual_displacement_m", "friction_static", "friction_dynamic",
+    )
+)  # fmt: skip
 _ESCAPES = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%",
     "_": r"\_", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": " ", "\r": " ",
@@ -32,7 +31,7 @@ def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool
     ------
     RunExistsError, DiskFullError, WriteError
     """
-    header = " & ".join(("Run", "Series", *(symbol for _, symbol, _ in _COLUMNS)))
+    header = " & ".join(("Run", "Series", *(column.latex_heading(Place.TERMINAL) for column in _COLUMNS)))
     lines = [
         "% by slipstand, for \\usepackage{booktabs}; standard uncertainties; dagger: the model does not fit",
         rf"\begin{{tabular}}{{ll{'r' * len(_COLUMNS)}}}",
@@ -65,12 +64,7 @@ def escape(text: str) -> str:
 def _row(exported: ExportedRun) -> str:
     analysis = exported.analysis or {}
     results, model = analysis.get("results", {}), analysis.get("model") or {}
-    cells = [
-        _number(results[key]["value"] * scale, (results[key]["standard_uncertainty"] or 0.0) * scale)
-        if key in results
-        else "--"
-        for key, _, scale in _COLUMNS
-    ]
+    cells = [_cell(column, results.get(column.name)) for column in _COLUMNS]
     doubt = "" if model.get("adequate", True) else r"$^\dagger$"
     return (
         " & ".join((escape(exported.name) + doubt, escape(exported.run.metadata.series or "--"), *cells))
@@ -78,8 +72,8 @@ def _row(exported: ExportedRun) -> str:
     )
 
 
-def _number(value: float, uncertainty: float) -> str:
-    if not 0.0 < uncertainty < math.inf:
-        return f"${value:.6g}$"
-    decimals = max(0, 1 - math.floor(math.log10(uncertainty)))
-    return rf"${value:.{decimals}f} \pm {uncertainty:.{decimals}f}$"
+def _cell(column: QuantityDefinition, result: dict[str, Any] | None) -> str:
+    if result is None:
+        return "--"
+    scale = column.unit_at(Place.TERMINAL).scale
+    return format_value(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale).latex

@@ -66,5 +66,5 @@ def sections(monkeypatch):
     from app.reports.test_report import render
 
     written, typeset = [], render.render_pdf
-    monkeypatch.setattr(render, "pdf_of", lambda report: written.append(report) or typeset(report))
+    monkeypatch.setattr(render, "render_pdf", lambda report: written.append(report) or typeset(report))
     return lambda: {section.title: section.blocks for section in written[-1].sections}

@@ -10,7 +10,7 @@ import pytest
 from reports_kit import write_run
 
 from analysis.campaign.campaign import summarize
-from app.reports.numbers import signed_numbers
+from analysis.formatting import typeset_sentence
 from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import (
     Conclusion,
@@ -157,7 +157,7 @@ def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campa
 
 
 def test_numbers_in_sentences_have_true_minus_signs_and_names_their_hyphens():
-    said = signed_numbers("-0.1 % (95 %: -0.3 % to +0.1 %) in run-1.h5, 2026-11-21, p < 1e-3")
+    said = typeset_sentence("-0.1 % (95 %: -0.3 % to +0.1 %) in run-1.h5, 2026-11-21, p < 1e-3")
 
     assert said == "−0.1 % (95 %: −0.3 % to +0.1 %) in run-1.h5, 2026-11-21, p < 1e-3"
 

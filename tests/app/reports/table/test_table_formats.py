@@ -10,9 +10,9 @@ import openpyxl
 import pytest
 
 from analysis.campaign.campaign import Excluded, compare_all_with_published, summarize
-from analysis.campaign.columns import COLUMNS
 from analysis.campaign.series import SeriesKey
-from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, format_concise, row_cells
+from analysis.formatting import format_concise
+from app.reports.table.content import PublishedRowComparison, TableContent, row_cells, table_headers
 from app.reports.table.files import as_text, write_text, write_workbook
 from app.reports.table.text import ratio_sentence
 from app.runs.errors import RunExistsError
@@ -110,7 +110,7 @@ def test_what_is_said_of_many_series_is_said_once():
 def test_wide_text_is_one_block(content):
     header = as_text(content, "text", 1000).splitlines()[0]
 
-    assert re.split(r" {2,}", header) == list(HEADERS)
+    assert re.split(r" {2,}", header) == list(table_headers())
 
 
 def test_csv_holds_all_digits_and_no_formula(content):
@@ -163,7 +163,7 @@ def test_markdown_is_a_table_whose_texts_stay_texts(content):
     lines = as_text(content, "markdown", 80, with_repeats=True).splitlines()
     table = [line for line in lines if line.startswith("|")][: 2 + len(content.campaign.rows)]
 
-    assert {len(re.findall(r"(?<!\\)\|", line)) for line in table} == {len(HEADERS) + 1}
+    assert {len(re.findall(r"(?<!\\)\|", line)) for line in table} == {len(table_headers()) + 1}
     assert "f\\_d" in table[0]
     assert "## Repeats" in lines
 
@@ -173,7 +173,7 @@ def test_latex_escapes_what_is_no_number(content):
     body = text.split("\\midrule\n")[1].split("\\bottomrule")[0].splitlines()
 
     assert len(body) == len(content.campaign.rows)
-    assert {line.count(" & ") for line in body} == {len(HEADERS) - 1}
+    assert {line.count(" & ") for line in body} == {len(table_headers()) - 1}
     assert r"a\_b\%\&\$\textbackslash{}" in text
     assert "$-$10.265(30)" in body[0]
     assert "0.10001--0.11001" in body[1]
@@ -204,7 +204,7 @@ def test_workbook_has_the_numbers_and_no_formula(content, tmp_path):
         == content.campaign.rows[0].quantities[FRICTION].quantity.value
     )
     assert not [cell for sheet in book for row in sheet for cell in row if cell.data_type == "f"]
-    assert book["Table 1"].max_column == len(COLUMNS) + 2
+    assert book["Table 1"].max_column == len(table_headers())
 
 
 def test_files_are_not_overwritten_unasked(tmp_path):

@@ -1,0 +1,314 @@
+"""The catalogue of quantities: name, symbol, units and description of every result, one row each.
+
+The window, the command line, the campaign's table, reports, exports and LaTeX read it. A new result is one
+row; with `column` it is also a column of the campaign's table.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
+
+from analysis.formatting import FormattedValue, format_value
+from analysis.quantities import Quantity
+from messages.i18n import N_
+
+
+class Place(Enum):
+    """Where a quantity is shown, as far as its unit depends on it."""
+
+    WINDOW = "window"
+    TERMINAL = "terminal"
+    """Lines of the command line, and the LaTeX export of single runs."""
+    TABLE = "table"
+    """The campaign's table, in all formats."""
+    REPORT = "report"
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """Symbol of the paper: a letter, and an index as subscript.
+
+    Attributes
+    ----------
+    letter, index : str
+    ascii : str
+        What a terminal shows in place of letter and index where those are not ASCII.
+    relation : str
+        ≥ or ≤ where the quantity is a bound, else "".
+    """
+
+    letter: str
+    index: str = ""
+    ascii: str = ""
+    relation: str = ""
+
+    @property
+    def text(self) -> str:
+        """`f_d`, `n1`: an index that is a number joins the letter."""
+        joint = "" if self.index.isdigit() else "_"
+        return self.ascii or (f"{self.letter}{joint}{self.index}" if self.index else self.letter)
+
+    @property
+    def markup(self) -> str:
+        """`f_d`, `n_1`: letter and index as the report's template reads them."""
+        return f"{self.letter}_{self.index}" if self.index else self.letter
+
+    @property
+    def plain(self) -> str:
+        """`f_d`, `n₁`: for places without markup but with all of Unicode."""
+        return f"{self.letter}{self.index.translate(_SUBSCRIPTS)}" if self.index.isdigit() else self.markup
+
+    @property
+    def html(self) -> str:
+        """`f<sub>d</sub>`, with the relation of a bound."""
+        symbol = f"{self.letter}<sub>{self.index}</sub>" if self.index else self.letter
+        return f"{symbol} {self.relation}".rstrip()
+
+    @property
+    def latex(self) -> str:
+        """`$f_d$`."""
+        letter = _LATEX_LETTERS.get(self.letter, self.letter)
+        if not self.index:
+            return f"${letter}$"
+        index = self.index if len(self.index) == 1 else rf"{{\mathrm{{{self.index}}}}}"
+        return f"${letter}_{index}$"
+
+
+_SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_LATEX_LETTERS: Final = {"δ": r"\delta", "μ": r"\mu", "α": r"\alpha", "ζ": r"\zeta"}
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Unit in which a quantity is shown.
+
+    Attributes
+    ----------
+    symbol : str
+        "" for pure numbers.
+    scale : float
+        How many of it make one SI unit.
+    latex : str
+        The same for LaTeX, where it differs.
+    """
+
+    symbol: str
+    scale: float = 1.0
+    latex: str = ""
+
+    @property
+    def in_latex(self) -> str:
+        """Unit in LaTeX."""
+        return self.latex or self.symbol
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """What the campaign's table needs to know of a quantity.
+
+    Attributes
+    ----------
+    position : int
+        In the paper's Table 1, from 1; columns of our own follow.
+    published : str
+        Attribute of a published row; "" where the paper does not print the quantity.
+    is_proportional : bool
+        Runs differ by a share of the value rather than by an amount.
+    is_of_stand : bool
+        A property of the stand: its scatter is the same whatever rubs on it.
+    missing : str
+        Why no run may have determined it.
+    """
+
+    position: int
+    published: str = ""
+    is_proportional: bool = True
+    is_of_stand: bool = False
+    missing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class QuantityDefinition:
+    """One row of the catalogue.
+
+    Attributes
+    ----------
+    name : str
+        Key in JSON, with the SI unit.
+    symbol : Symbol
+    unit : str
+        SI, as in JSON; "1" for pure numbers.
+    description : str
+        A few words for people; English, marked for translation.
+    display : Unit
+        In which it is shown.
+    display_at : dict of Place to Unit
+        Where another unit is shown.
+    column : TableColumn or None
+        None for quantities that the campaign's table does not hold.
+    is_minor : bool
+        Listed in reports only.
+    """
+
+    name: str
+    symbol: Symbol
+    unit: str
+    description: str
+    display: Unit
+    display_at: dict[Place, Unit] = field(default_factory=dict)
+    column: TableColumn | None = None
+    is_minor: bool = False
+
+    def unit_at(self, place: Place, unit: str = "") -> Unit:
+        """Unit shown at a place; a `unit` other than that of the catalogue is shown as it is.
+
+        Readings of one mass may be in rad or V.
+        """
+        if unit and unit != self.unit:
+            return Unit(unit)
+        return self.display_at.get(place, self.display)
+
+    def format(self, quantity: Quantity, place: Place) -> FormattedValue:
+        """Value and uncertainty to the same digit, in the unit of the place."""
+        unit = self.unit_at(place, quantity.unit)
+        return format_value(
+            quantity.value * unit.scale, quantity.standard_uncertainty * unit.scale, unit.symbol
+        )
+
+    def latex_heading(self, place: Place) -> str:
+        """Symbol and unit of a column in LaTeX: `$u_s$, mm`."""
+        return ", ".join(filter(None, (self.symbol.latex, self.unit_at(place).in_latex)))
+
+    def heading(self, place: Place) -> str:
+        """Symbol and unit of a column: `u_s mm`."""
+        return f"{self.symbol.text} {self.unit_at(place).symbol}".rstrip()
+
+
+_NUMBER = Unit("")
+_MILLIMETRE = Unit("mm", 1e3)
+_MILLISECOND = Unit("ms", 1e3)
+_MILLIRADIAN = Unit("mrad", 1e3)
+_PER_SECOND = Unit("1/s", latex="s$^{-1}$")
+_RADIANS_PER_SECOND = Unit("rad/s", latex="s$^{-1}$")
+_MILLIMETRES_PER_SECOND = Unit("mm/s", 1e3)
+_METRES_PER_SECOND = Unit("m/s")
+_ACCELERATION = Unit("m/s²", latex="m/s$^2$")
+_IN_METRES = {Place.TABLE: _METRES_PER_SECOND, Place.REPORT: _METRES_PER_SECOND}
+
+CATALOGUE: Final = (
+    QuantityDefinition(
+        "friction_dynamic", Symbol("f", "d"), "1", N_("dynamic friction"), _NUMBER,
+        column=TableColumn(
+            8, "friction_dynamic",
+            missing=N_("Nothing slipped, or no law could be fitted: f_d is not known."),
+        ),
+    ),
+    QuantityDefinition(
+        "friction_static", Symbol("f", "s"), "1", N_("static friction"), _NUMBER,
+        column=TableColumn(
+            7, "friction_static", missing=N_("No stick ended in a slip: f_s has no value.")
+        ),
+    ),
+    QuantityDefinition(
+        "friction_static_lower", Symbol("f", "s", relation="≥"), "1", N_("static friction, at least"), _NUMBER
+    ),
+    QuantityDefinition(
+        "friction_static_upper", Symbol("f", "s", relation="≤"), "1", N_("static friction, at most"), _NUMBER
+    ),
+    QuantityDefinition(
+        "stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"), _MILLIMETRES_PER_SECOND
+    ),
+    QuantityDefinition("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), _MILLIRADIAN),
+    QuantityDefinition(
+        "period_s", Symbol("T"), "s", N_("period"), _MILLISECOND, {Place.TABLE: Unit("s")},
+        column=TableColumn(3, "period_s", is_of_stand=True),
+    ),
+    QuantityDefinition(
+        "log_decrement", Symbol("δ", ascii="log decrement"), "1", N_("log decrement"), _NUMBER
+    ),
+    QuantityDefinition(
+        "log_decrement_classical", Symbol("δ", "c", ascii="log decrement of turning points"), "1",
+        N_("log decrement of the turning points"), _NUMBER, is_minor=True,
+    ),
+    QuantityDefinition(
+        "damping_n1_per_s", Symbol("n", "1"), "1/s", N_("damping"), _PER_SECOND,
+        column=TableColumn(5, "damping_n1_per_s", is_of_stand=True),
+    ),
+    QuantityDefinition(
+        "damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), _PER_SECOND,
+        column=TableColumn(6, "damping_n2_per_s", is_of_stand=True),
+    ),
+    QuantityDefinition("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), _PER_SECOND),
+    QuantityDefinition(
+        "stiffness_n_per_m", Symbol("c"), "N/m", N_("stiffness"), Unit("N/m"), {Place.WINDOW: Unit("kN/m",
+        1e-3)},
+        column=TableColumn(2, "stiffness_as_printed", is_of_stand=True),
+    ),
+    QuantityDefinition(
+        "damping_coefficient_kg_per_s", Symbol("μ", ascii="mu"), "kg/s", N_("damping coefficient"),
+        Unit("kg/s")
+    ),
+    QuantityDefinition(
+        "frequency_k1_rad_per_s", Symbol("k", "1"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
+        is_minor=True,
+    ),
+    QuantityDefinition(
+        "frequency_k2_rad_per_s", Symbol("k", "2"), "rad/s", N_("circular frequency, table alone"),
+        _RADIANS_PER_SECOND, is_minor=True,
+    ),
+    QuantityDefinition(
+        "frequency_k_rad_per_s", Symbol("k"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
+        is_minor=True
+    ),
+    QuantityDefinition(
+        "damping_ratio", Symbol("ζ", ascii="damping ratio"), "1", N_("damping ratio"), _NUMBER, is_minor=True
+    ),
+    QuantityDefinition("pullback_m", Symbol("u", "0"), "m", N_("pullback"), _MILLIMETRE),
+    QuantityDefinition(
+        "residual_displacement_m", Symbol("u", "s"), "m", N_("residual displacement"), _MILLIMETRE,
+        column=TableColumn(
+            4, "residual_displacement_m", is_proportional=False,
+            missing=N_("Slip had not ended when the record did: u_s is not known."),
+        ),
+    ),
+    QuantityDefinition(
+        "coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), _MILLIMETRE
+    ),
+    QuantityDefinition(
+        "table_velocity_max_m_per_s", Symbol("v", "max"), "m/s", N_("table velocity"),
+        _MILLIMETRES_PER_SECOND,
+        _IN_METRES, column=TableColumn(9, "velocity_max_m_per_s"),
+    ),
+    QuantityDefinition(
+        "plate_velocity_max_m_per_s", Symbol("v", "2"), "m/s", N_("plate velocity"), _MILLIMETRES_PER_SECOND,
+        _IN_METRES, is_minor=True,
+    ),
+    QuantityDefinition(
+        "table_acceleration_max_m_per_s2", Symbol("a", "max"), "m/s2", N_("table acceleration"),
+        _ACCELERATION,
+        column=TableColumn(10, "acceleration_max_m_per_s2"),
+    ),
+    QuantityDefinition(
+        "plate_acceleration_max_m_per_s2", Symbol("a", "2"), "m/s2", N_("plate acceleration"), _ACCELERATION,
+        is_minor=True,
+    ),
+    QuantityDefinition(
+        "plate_mass_kg", Symbol("m", "2"), "kg", N_("plate mass"), Unit("kg"),
+        column=TableColumn(1, "plate_mass_kg"), is_minor=True,
+    ),
+)  # fmt: skip
+"""Every quantity that an analysis finds, in the order of reports."""
+
+
+def definition(name: str) -> QuantityDefinition:
+    """Row of a quantity. Raises KeyError for a name that the catalogue does not hold."""
+    for row in CATALOGUE:
+        if row.name == name:
+            return row
+    raise KeyError(name)
+
+
+def table_columns() -> tuple[tuple[QuantityDefinition, TableColumn], ...]:
+    """Quantities of the campaign's table with their rules, in the paper's order."""
+    columns = [(row, row.column) for row in CATALOGUE if row.column is not None]
+    return tuple(sorted(columns, key=lambda pair: pair[1].position))
