@@ -152,7 +152,7 @@ class WindowPresenter(Presenter[WindowState]):
         if screen is Screen.RUNS:
             self.runs.refresh()
         elif screen is Screen.CAMPAIGN:
-            self.campaign.enter()
+            self.campaign.refresh()
         self._show(screen)
 
     def dismiss_notice(self) -> None:

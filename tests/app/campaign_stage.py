@@ -8,8 +8,7 @@ from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
-from app.presenters.campaign.next_test import PlannedTest
-from app.presenters.campaign.tasks import CampaignData, CampaignRun
+from app.presenters.campaign.tasks import CampaignData, CampaignRun, PlannedTest
 
 FOLDER = "/recordings"
 ALL_SERIES = ("1FFM0", "1FFM1", "1SSM0", "1SSM1")

@@ -1,4 +1,4 @@
-"""A campaign that was summed up, as rows and words for people."""
+"""Rows and texts of a campaign."""
 
 import math
 from pathlib import Path
@@ -8,7 +8,6 @@ from analysis.catalogue import Place, QuantityDefinition, TableColumn, table_col
 from analysis.formatting import typeset, with_unit
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest
 from app.presenters.campaign.state import (
     Bar,
     Cell,
@@ -19,7 +18,7 @@ from app.presenters.campaign.state import (
     RunRow,
     TableRow,
 )
-from app.presenters.campaign.tasks import CampaignData, CampaignRun
+from app.presenters.campaign.tasks import TARGET_REPEATS, CampaignData, CampaignRun, PlannedTest
 from app.presenters.results import in_words, sentence
 from messages.i18n import N_, gettext, ngettext, translate
 
@@ -38,7 +37,7 @@ _MARKS = (
     ("gain-not-stated", Tone.WARN, N_("gain not stated")),
     ("single-run", Tone.PLAIN, N_("one run")),
 )
-"""Cautions of a series by weight, and how they are called in the table."""
+"""Warnings of a series in order of importance, and their labels in the table."""
 _VERDICTS = {
     True: N_("found"),
     False: N_("none found"),
@@ -52,7 +51,7 @@ def column_titles() -> tuple[tuple[str, str], ...]:
 
 
 def table_rows(found: CampaignData | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
-    """Every series of the stand in the paper's order, then those that the runs have besides."""
+    """Every series of the stand in the paper's order, then other series of the runs."""
     rows = () if found is None else found.campaign.rows
     by_code: dict[str, list[SeriesRow]] = {}
     for row in rows:
@@ -85,7 +84,7 @@ def contact_bars(found: CampaignData) -> tuple[ContactBars, ...]:
 
 
 def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
-    """What f_d depends on."""
+    """Effects on f_d."""
     return tuple(
         EffectRow(
             sentence(effect.cause.value),
@@ -98,7 +97,7 @@ def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
 
 
 def repeatability_rows(found: CampaignData) -> tuple[RepeatabilityRow, ...]:
-    """How f_d repeats in each series with several runs, the worst first."""
+    """Repeatability of f_d in each series with several runs, the worst first."""
     with_repeats = [
         (row, pooled)
         for row in found.campaign.rows
@@ -112,7 +111,7 @@ def repeatability_rows(found: CampaignData) -> tuple[RepeatabilityRow, ...]:
 
 
 def next_test(found: CampaignData) -> NextTest:
-    """Which test to make next, and what to expect of it."""
+    """The recommended next test."""
     expected = found.next_test
     if expected is None:
         return NextTest("", gettext("Every series has {count} runs or more.", count=TARGET_REPEATS), ())
@@ -129,7 +128,7 @@ def next_test(found: CampaignData) -> NextTest:
 
 
 def run_rows(found: CampaignData, label: str) -> tuple[RunRow, ...]:
-    """The runs of a row, with those that are out of place marked."""
+    """Runs of a row; outliers are marked."""
     row = next((row for row in found.campaign.rows if row.label == label), None)
     if row is None:
         return ()
@@ -139,7 +138,7 @@ def run_rows(found: CampaignData, label: str) -> tuple[RunRow, ...]:
 
 
 def excluded_rows(found: CampaignData) -> tuple[RunRow, ...]:
-    """Runs that do not count, and why; those that somebody has left out can be taken in again."""
+    """Excluded runs, and why; those that an operator excluded can be included again."""
     return tuple(
         RunRow(
             one.run,
@@ -153,12 +152,12 @@ def excluded_rows(found: CampaignData) -> tuple[RunRow, ...]:
 
 
 def failure_texts(found: CampaignData) -> tuple[str, ...]:
-    """Runs that gave no result, a line each."""
+    """A line for each run without a result."""
     return tuple(f"{Path(path).name}: {sentence(error)}" for path, error in found.failures)
 
 
 def warning_texts(found: CampaignData) -> tuple[str, ...]:
-    """What must be known of the runs together, and of series; paths cut to names."""
+    """Warnings about the runs together and about series."""
     of_series = [caution.message for row in found.campaign.rows for caution in row.warnings]
     said = [*found.warnings, *(caution.message for caution in found.campaign.warnings), *of_series]
     return tuple(dict.fromkeys(_short(in_words(message), found) for message in said))
@@ -191,7 +190,7 @@ def _cell(row: "SeriesRow", quantity: QuantityDefinition, column: TableColumn) -
 
 
 def _bounds(row: "SeriesRow") -> tuple[str, str]:
-    """What f_s is at least, and at most."""
+    """Lower and upper bound of f_s."""
     low, high = row.quantities.get(_LOWER), row.quantities.get(_UPPER)
     least = "" if low is None else f"≥ {number_text.format_fixed(low.quantity.value, 4)}"
     most = "" if high is None else f"≤ {number_text.format_fixed(high.quantity.value, 4)}"
@@ -271,7 +270,7 @@ def _line(run: CampaignRun, *, is_outlier: bool = False) -> RunRow:
 
 
 def _short(message: str, found: CampaignData) -> str:
-    """The same with names in place of paths."""
+    """Replace paths by file names."""
     for path in found.runs:
         if path in message:
             message = message.replace(path, Path(path).name)

@@ -1,13 +1,14 @@
-"""What the Campaign screen does: a folder of runs gathered, and told as table, figure and sentences."""
+"""Presenter of the Campaign screen: collects and summarises the runs of a folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.campaign import formatting
 from app.presenters.campaign.state import CampaignState, Product
 from app.presenters.campaign.tasks import (
+    EXECUTE,
     CampaignData,
     CampaignTask,
     CollectRuns,
@@ -15,48 +16,35 @@ from app.presenters.campaign.tasks import (
     SimulateCampaign,
     UndoExclusion,
     WriteProduct,
-    execute,
 )
+from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
-class Navigator(Protocol):
-    """Where one comes to from this screen."""
-
-    def show_runs(self, folder: str, series: str) -> None:
-        """Show runs of a folder on the Runs screen, those of a series alone unless it is ""."""
-
-    def open_run(self, path: str) -> None:
-        """Show a run on Identify."""
-
-    def show_record(self) -> None:
-        """Go to Record."""
-
-
 @dataclass(frozen=True, slots=True)
 class _Undo:
-    """How a leaving out or taking in is taken back, and how that is called."""
+    """Task that undoes an exclusion or inclusion, and its description."""
 
     text: str
     task: UndoExclusion
 
 
 class CampaignPresenter(Presenter[CampaignState]):
-    """Sums up a folder.
+    """Campaign of a folder.
 
     Parameters
     ----------
     worker : Worker
-        Its own one; closed by `close`.
+        Used by this screen only. Closed by `close`.
     folder : str
-        Whose runs are gathered at first.
+        Folder at first.
     all_series : tuple of str
         Series codes of the stand, in the paper's order.
     author : str
-        Who leaves runs out.
-    ways : Ways
+        Recorded with each exclusion.
+    navigator : Navigator
     """
 
     def __init__(
@@ -67,29 +55,23 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._worker = worker
         self._all_series = all_series
         self._author = author
-        self._navigator = navigator
+        self.navigator = navigator
         self._data: CampaignData | None = None
         self._undos: list[_Undo] = []
-        self._gathering: CollectRuns | None = None
-
-    # --- what the operator does ---
-
-    def enter(self) -> None:
-        """The screen is shown: what was recorded meanwhile belongs into the table."""
-        self.refresh()
+        self._collecting: CollectRuns | None = None
 
     def refresh(self) -> None:
-        """Gather the folder again."""
-        self._gather(save=False)
+        """Collect new and changed runs of the folder."""
+        self._collect(save=False)
 
     def set_author(self, name: str) -> None:
-        """Who leaves runs out from now on."""
+        """Set the author of later exclusions."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
-        """Gather another folder."""
+        """Collect another folder."""
         self._worker.cancel()
-        self._undos, self._data, self._gathering = [], None, None
+        self._undos, self._data, self._collecting = [], None, None
         self._update(
             folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0,
             contacts=(), effects=(),
@@ -100,11 +82,11 @@ class CampaignPresenter(Presenter[CampaignState]):
         self.refresh()
 
     def cancel(self) -> None:
-        """Give up what goes on; what is shown stays."""
+        """Cancel the work in progress; what is shown stays."""
         self._worker.cancel()
 
     def select_series(self, label: str) -> None:
-        """Show the runs of a row."""
+        """Select a row, and list its runs."""
         runs = () if self._data is None else formatting.run_rows(self._data, label)
         self._update(selected=label, selected_runs=runs)
 
@@ -112,18 +94,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         """Show the runs of a row on the Runs screen."""
         row = next((row for row in self.state.rows if row.label == label), None)
         if row is not None and row.runs:
-            self._navigator.show_runs(self.state.folder, row.code)
-
-    def open_run(self, path: str) -> None:
-        """Show a run on Identify."""
-        self._navigator.open_run(path)
-
-    def show_record(self) -> None:
-        """Go and record."""
-        self._navigator.show_record()
+            self.navigator.show_runs(self.state.folder, row.code)
 
     def exclude_run(self, path: str, reason: str) -> None:
-        """A run does not count from now on, for a reason that must be given and is kept in it."""
+        """Exclude a run; the reason is required, and recorded in the run."""
         if not reason.strip():
             self._set_message(
                 Chip(gettext("Say why the run is left out: the reason stands in the table"), Tone.WARN)
@@ -132,51 +106,47 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._exclude(path, reason.strip())
 
     def include_run(self, path: str) -> None:
-        """A run that was left out counts again."""
+        """Include a run that was excluded."""
         self._exclude(path, "")
 
     def undo(self) -> None:
-        """Take back the last leaving out or taking in."""
+        """Undo the last exclusion or inclusion."""
         if self._undos:
             self._submit(self._undos.pop().task)
 
     def save_results(self) -> None:
-        """Keep new results in their runs."""
-        self._gather(save=True)
+        """Save new results in their runs."""
+        self._collect(save=True)
 
     def export(self, product: Product, target: str) -> None:
-        """Write something of the campaign to a file or folder."""
+        """Write a product of the campaign to a file or folder."""
         if self.state.runs:
             self._submit(WriteProduct(self.state.folder, product, target))
 
     def simulate_campaign(self, folder: str) -> None:
-        """Simulate a whole campaign into a new folder below this one, and show it."""
+        """Simulate a campaign into a new folder below `folder`, and show it."""
         self._update(progress=Progress(gettext("Simulating the campaign")))
         self._submit(SimulateCampaign(folder))
 
-    # --- what time brings ---
-
     def tick(self) -> None:
-        """Take in what the worker has said."""
-        for news in self._worker.poll():
-            self._on_event(news)
+        """Process the events of the worker."""
+        for event in self._worker.poll():
+            self._on_event(event)
 
     def close(self) -> None:
         """End the worker."""
         self._worker.close()
 
-    # --- inside ---
-
     def _submit(self, task: CampaignTask) -> None:
-        self._worker.submit(execute, task)
+        self._worker.submit(EXECUTE, task)
 
-    def _gather(self, *, save: bool) -> None:
-        if self._gathering is not None:
+    def _collect(self, *, save: bool) -> None:
+        if self._collecting is not None:
             return
-        self._gathering = CollectRuns(self.state.folder, self._all_series, save)
+        self._collecting = CollectRuns(self.state.folder, self._all_series, save)
         if self._data is None:
             self._update(progress=Progress(gettext("Gathering runs")))
-        self._submit(self._gathering)
+        self._submit(self._collecting)
 
     def _exclude(self, path: str, reason: str) -> None:
         self._submit(ExcludeRun(self.state.folder, self._all_series, path, reason, self._author))
@@ -185,27 +155,27 @@ class CampaignPresenter(Presenter[CampaignState]):
         back = UndoExclusion(done.folder, done.all_series, done.path, self._author)
         self._undos.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
 
-    def _on_event(self, news: WorkerEvent) -> None:
-        task = news.argument
+    def _on_event(self, event: WorkerEvent) -> None:
+        task = event.argument
         if isinstance(task, CollectRuns | ExcludeRun | UndoExclusion) and task.folder != self.state.folder:
             return  # another folder was chosen meanwhile
-        if isinstance(news, TaskProgress):
-            self._update(progress=news.progress)
+        if isinstance(event, TaskProgress):
+            self._update(progress=event.progress)
             return
         self._update(progress=None)
-        if task == self._gathering:
-            self._gathering = None
-        if isinstance(news, TaskFailed):
-            self._on_failed(news.message)
+        if task == self._collecting:
+            self._collecting = None
+        if isinstance(event, TaskFailed):
+            self._on_failed(event.message)
         else:
-            self._on_done(news)
+            self._on_done(event)
 
     def _on_failed(self, message: str) -> None:
         if message != CANCELLED:
             self._set_message(Chip(sentence(message), Tone.BAD))
 
-    def _on_done(self, news: TaskDone[Any]) -> None:
-        task, answer = news.argument, news.answer
+    def _on_done(self, event: TaskDone[Any]) -> None:
+        task, answer = event.argument, event.answer
         match task:
             case CollectRuns(save=save):
                 self._show(answer)
@@ -215,41 +185,41 @@ class CampaignPresenter(Presenter[CampaignState]):
                 self._push_undo(task)
                 self._show(answer)
                 run = Path(task.path).stem
-                words = (
+                text = (
                     gettext("{run} is left out", run=run)
                     if task.reason
                     else gettext("{run} counts again", run=run)
                 )
-                self._set_message(Chip(words, Tone.OK))
+                self._set_message(Chip(text, Tone.OK))
             case UndoExclusion():
                 self._show(answer)
             case WriteProduct():
-                words = ngettext(
+                text = ngettext(
                     "Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0]
                 )
-                self._set_message(Chip(words, Tone.OK))
+                self._set_message(Chip(text, Tone.OK))
             case SimulateCampaign():
                 self.choose_folder(answer)
 
-    def _show(self, found: CampaignData) -> None:
-        self._data = found
+    def _show(self, data: CampaignData) -> None:
+        self._data = data
         chosen = (
-            self.state.selected if any(r.label == self.state.selected for r in found.campaign.rows) else ""
+            self.state.selected if any(r.label == self.state.selected for r in data.campaign.rows) else ""
         )
         self._update(
-            rows=formatting.table_rows(found, self._all_series),
-            runs=sum(len(row.runs) for row in found.campaign.rows),
-            series=len(found.campaign.rows),
-            contacts=formatting.contact_bars(found),
-            effects=formatting.effect_rows(found),
-            repeatability=formatting.repeatability_rows(found),
-            next_test=formatting.next_test(found),
+            rows=formatting.table_rows(data, self._all_series),
+            runs=sum(len(row.runs) for row in data.campaign.rows),
+            series=len(data.campaign.rows),
+            contacts=formatting.contact_bars(data),
+            effects=formatting.effect_rows(data),
+            repeatability=formatting.repeatability_rows(data),
+            next_test=formatting.next_test(data),
             selected=chosen,
-            selected_runs=formatting.run_rows(found, chosen),
-            excluded=formatting.excluded_rows(found),
-            faults=formatting.failure_texts(found),
-            warnings=formatting.warning_texts(found),
-            unsaved_count=found.unsaved_count,
+            selected_runs=formatting.run_rows(data, chosen),
+            excluded=formatting.excluded_rows(data),
+            faults=formatting.failure_texts(data),
+            warnings=formatting.warning_texts(data),
+            unsaved_count=data.unsaved_count,
             undo_text=self._undos[-1].text if self._undos else "",
             message=EMPTY_CHIP,
             is_gathered=True,

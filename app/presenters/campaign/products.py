@@ -1,4 +1,4 @@
-"""Table, figures and report of a campaign, by the code of the command line. Runs in the worker's process."""
+"""Products of a campaign: table, figures and report, written by the code of the command line."""
 
 import datetime
 from pathlib import Path
@@ -7,64 +7,59 @@ from analysis.campaign.campaign import Campaign
 from app.presenters.base import Progress
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
+from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.content import TableContent
+from app.reports.table.files import as_text, write_text, write_workbook
+from app.reports.test_report.build import TITLE, ReportHead, build_report
+from app.reports.test_report.render import write_report
 from app.runs.campaign.collect import CollectedRuns
 from messages.i18n import gettext
 
 _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-_ENDLESS = 1_000_000
-"""Width of a text that is not for a terminal."""
+_UNLIMITED_WIDTH = 1_000_000
+"""Width of a text that is not printed on a terminal."""
 
 
 def write_product(
-    product: Product, target: Path, gathered: CollectedRuns, campaign: Campaign, report: ReportProgress
+    product: Product, target: Path, runs: CollectedRuns, report: ReportProgress
 ) -> tuple[str, ...]:
-    """Write a product, over a file of that name as the dialog has asked; returns the files.
+    """Write a product; return the files. Raises RunError.
 
-    Figures go to a folder, and never over others. Raises RunError.
+    Tables and reports replace a file: the dialog has asked. Figures go to a folder and replace nothing.
     """
+    campaign = runs.campaign()
     report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
-        return _figures(target, gathered, campaign, report)
-    failures = tuple((failure.run, failure.reason) for failure in gathered.failures)
-    content = TableContent(campaign, gathered.warnings, failures)
+        return _write_figures(target, runs, campaign, report)
+    failures = tuple((failure.run, failure.reason) for failure in runs.failures)
+    content = TableContent(campaign, runs.warnings, failures)
     if product is Product.TABLE:
-        _table(target, content)
+        _write_table(target, content)
     else:
-        _report(target, gathered, content)
+        head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
+        write_report(build_report(runs, content, head), target, replace=True)
     return (str(target),)
 
 
-def _table(target: Path, content: TableContent) -> None:
-    """In the format that the name of the file says; text where it says none."""
-    from app.reports.table.files import as_text, write_text, write_workbook
-
+def _write_table(target: Path, content: TableContent) -> None:
+    """Write a table in the format of the suffix; text for an unknown one."""
     if target.suffix.lower() == ".xlsx":
         write_workbook(content, target, replace=True)
     else:
         name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
-        write_text(as_text(content, name, _ENDLESS, with_repeats=True), target, replace=True)
+        write_text(as_text(content, name, _UNLIMITED_WIDTH, with_repeats=True), target, replace=True)
 
 
-def _report(target: Path, gathered: CollectedRuns, content: TableContent) -> None:
-    from app.reports.test_report.build import TITLE, ReportHead, build_report
-    from app.reports.test_report.render import write_report
-
-    head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
-    write_report(build_report(gathered, content, head), target, replace=True)
-
-
-def _figures(
-    target: Path, gathered: CollectedRuns, campaign: Campaign, report: ReportProgress
+def _write_figures(
+    target: Path, runs: CollectedRuns, campaign: Campaign, report: ReportProgress
 ) -> tuple[str, ...]:
-    """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
-    from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
+    """Write Fig. 2 of all runs, and Figs. 3a to 5b of a representative run."""
 
     def drawing(share: float, run: str) -> None:
         report(Progress(gettext("Drawing {run}", run=run), share))
 
-    chosen = representative_runs(campaign, gathered.runs) if campaign.rows else []
+    chosen = representative_runs(campaign, runs.runs) if campaign.rows else []
     folder = FigureFolder(str(target))
     folder.check()
-    files, _ = write_figures(folder, NUMBERS, chosen, campaign, gathered.stands.values(), drawing)
+    files, _ = write_figures(folder, NUMBERS, chosen, campaign, runs.stands.values(), drawing)
     return tuple(file.file for file in files)

@@ -1,15 +1,14 @@
-"""What the Campaign screen shows, as values."""
+"""State of the Campaign screen."""
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A quantity of a series: value and uncertainty as text; `hint` says where from, or what is missing."""
+    """Value and uncertainty as text; `hint` says which runs they are from, or why there is no value."""
 
     value: str = ""
     uncertainty: str = ""
@@ -18,7 +17,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """A series of Table 1.
+    """Row of Table 1: a series.
 
     Attributes
     ----------
@@ -27,11 +26,11 @@ class TableRow:
     code : str
         Series code; "" for runs without one.
     runs : int
-        That count.
+        Number of runs that are included.
     cells : tuple of Cell
         In the order of the columns.
-    mark : Chip
-        What must be known of the series; empty where nothing.
+    status : Chip
+        Most important warning about the series.
     """
 
     label: str
@@ -43,7 +42,7 @@ class TableRow:
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A value with the ends of its 95 % interval."""
+    """Value and 95 % interval."""
 
     value: float
     low: float
@@ -52,19 +51,19 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class ContactBars:
-    """Fig. 2 of one contact: means over the series, and the series themselves.
+    """Bars of Fig. 2 for one contact: means over its series, and the series.
 
     Attributes
     ----------
     contact, name : str
-        Code, and what it stands for.
+        Code and name.
     static, dynamic : Bar or None
-        None where no series determined it.
+        None if no series determined it.
     static_of_series, dynamic_of_series : tuple of Bar
     static_at_least : tuple of float
-        Of series that bound f_s from below alone.
+        Lower bounds of f_s, from series without a value.
     ratio : str
-        f_s over f_d as text; "" where not known.
+        f_s over f_d as text; "" if unknown.
     """
 
     contact: str
@@ -79,7 +78,7 @@ class ContactBars:
 
 @dataclass(frozen=True, slots=True)
 class EffectRow:
-    """Whether f_d depends on something: in a word and in a sentence."""
+    """Whether f_d depends on `cause`."""
 
     cause: str
     conclusion: str
@@ -89,17 +88,17 @@ class EffectRow:
 
 @dataclass(frozen=True, slots=True)
 class RepeatabilityRow:
-    """How well the f_d of a series repeats.
+    """Repeatability of f_d in a series.
 
     Attributes
     ----------
     label : str
     runs : int
     scatter : str
-        Standard deviation of the runs, relative.
-    birge : str
-    mark : Chip
-        Outliers by name, or that the runs differ.
+        Relative standard deviation of the runs.
+    birge_ratio : str
+    status : Chip
+        Outliers, or that the runs differ.
     """
 
     label: str
@@ -111,7 +110,7 @@ class RepeatabilityRow:
 
 @dataclass(frozen=True, slots=True)
 class RunRow:
-    """A run of the chosen series, or one that is left out (`reason`)."""
+    """Run of the selected series, or an excluded one with its `reason`."""
 
     path: str
     name: str
@@ -120,12 +119,12 @@ class RunRow:
     status: Chip = EMPTY_CHIP
     reason: str = ""
     can_return: bool = False
-    """Left out by somebody, and can be taken in again; not so the second file of a recording."""
+    """Excluded by an operator, not for being a duplicate file of a recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextTest:
-    """Which test to make next: the series, why that one, and what to expect of it."""
+    """The recommended next test: series, reason, expected results."""
 
     series: str
     reason: str
@@ -133,7 +132,7 @@ class NextTest:
 
 
 class Product(StrEnum):
-    """What can be written of a campaign; the value is how it is called."""
+    """Product of a campaign; the value is the label."""
 
     TABLE = "Table"
     FIGURES = "Figures"
@@ -142,7 +141,7 @@ class Product(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CampaignState:
-    """The whole screen.
+    """State of the screen.
 
     Attributes
     ----------
@@ -150,23 +149,19 @@ class CampaignState:
     columns : tuple of (str, str)
         Symbol and unit of each column.
     rows : tuple of TableRow
-        Every series of the stand in the paper's order, and others that the runs have.
+        Every series of the stand in the paper's order, then other series of the runs.
     runs, series : int
-        That count.
-    contacts, effects, spread, next_test
-        See there.
-    chosen : str
-        Label of the row whose runs are `of_chosen`.
-    left_out : tuple of RunLine
+        Numbers of included runs and series.
+    selected : str
+        Label of the row whose runs are `selected_runs`.
     faults : tuple of str
-        Runs without a result, a line each.
-    notes : tuple of str
-        What must be known of the runs together.
-    unsaved : int
-        Runs whose result is not kept in them.
-    undo : str
-        What undoing would take back.
-    is_gathered : bool
+        A line for each run without a result.
+    warnings : tuple of str
+        Warnings about the runs together.
+    unsaved_count : int
+        Number of runs whose result is not saved in them.
+    undo_text : str
+        Change that undo would undo; empty without one.
     """
 
     folder: str = ""
@@ -188,46 +183,3 @@ class CampaignState:
     message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False
-
-
-class CampaignEvents(Protocol):
-    """What the Campaign screen tells its presenter."""
-
-    def refresh(self) -> None:
-        """Gather the folder again."""
-
-    def choose_folder(self, folder: str) -> None:
-        """Gather another folder."""
-
-    def cancel(self) -> None:
-        """Give up what goes on."""
-
-    def select_series(self, label: str) -> None:
-        """Show the runs of a row."""
-
-    def open_row(self, label: str) -> None:
-        """Show the runs of a row on the Runs screen."""
-
-    def open_run(self, path: str) -> None:
-        """Show a run on Identify."""
-
-    def exclude_run(self, path: str, reason: str) -> None:
-        """A run does not count, from now on."""
-
-    def include_run(self, path: str) -> None:
-        """A run that was left out counts again."""
-
-    def undo(self) -> None:
-        """Take back the last leaving out or taking in."""
-
-    def save_results(self) -> None:
-        """Keep new results in their runs."""
-
-    def export(self, product: Product, target: str) -> None:
-        """Write something of the campaign to a file or folder."""
-
-    def simulate_campaign(self, folder: str) -> None:
-        """Simulate a whole campaign into a folder, and show it."""
-
-    def show_record(self) -> None:
-        """Go and record."""

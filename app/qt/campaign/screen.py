@@ -16,7 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Progress
-from app.presenters.campaign.state import CampaignEvents, CampaignState, Product
+from app.presenters.campaign.presenter import CampaignPresenter
+from app.presenters.campaign.state import CampaignState, Product
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections
 from app.qt.campaign.selected_runs import SelectedRuns
@@ -43,17 +44,16 @@ class CampaignScreen(QWidget):
     Parameters
     ----------
     theme : Theme
-    events : CampaignEvents
-        Told what the operator does.
+    presenter : CampaignPresenter
     """
 
-    def __init__(self, theme: Theme, events: CampaignEvents) -> None:
+    def __init__(self, theme: Theme, presenter: CampaignPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._shown: CampaignState | None = None
         self._title = label(role=TextRole.HEADING)
         self._message = label()
-        self._working = _Working(events)
+        self._working = _Working(presenter)
         self._keep = QPushButton()
         self._export = QPushButton(gettext("Export…"))
         self._undo = QPushButton(gettext("Undo"))
@@ -61,9 +61,9 @@ class CampaignScreen(QWidget):
         self._refresh = QPushButton(gettext("Refresh"))
         self._table = SeriesTable(theme)
         self._plot = FrictionPlot(theme)
-        self._chosen = SelectedRuns(events)
+        self._chosen = SelectedRuns(presenter)
         self._sections = QVBoxLayout()
-        self._empty = _Empty(events, self._choose_folder)
+        self._empty = _Empty(presenter, self._choose_folder)
         self._stack = QStackedWidget()
         self._lay_out()
         self._connect()
@@ -84,7 +84,7 @@ class CampaignScreen(QWidget):
             self._plot.show_contacts(state.contacts)
         if old is None or (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
             self._chosen.show_runs(state.selected, state.selected_runs)
-        if old is None or _told(state) != _told(old):
+        if old is None or _section_parts(state) != _section_parts(old):
             self._show_sections(state)
         if old is not None and len(state.excluded) > len(old.excluded):
             self._chosen.clear_reason()
@@ -94,7 +94,7 @@ class CampaignScreen(QWidget):
         while (item := self._sections.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
-        self._sections.addWidget(Sections(state, self._events))
+        self._sections.addWidget(Sections(state, self._presenter))
 
     def _show_head(self, state: CampaignState) -> None:
         counted = ngettext("{count} run", "{count} runs", state.runs)
@@ -112,7 +112,7 @@ class CampaignScreen(QWidget):
         dialog = QFileDialog(self, gettext("Gather the runs of a folder"), self._start_folder())
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._events.choose_folder)
+        dialog.fileSelected.connect(self._presenter.choose_folder)
         dialog.open()
 
     def _ask_for_target(self, product: Product) -> None:
@@ -126,7 +126,7 @@ class CampaignScreen(QWidget):
             dialog.selectFile(name)
         else:
             dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.fileSelected.connect(partial(self._events.export, product))
+        dialog.fileSelected.connect(partial(self._presenter.export, product))
         dialog.open()
 
     def _start_folder(self) -> str:
@@ -143,12 +143,12 @@ class CampaignScreen(QWidget):
         bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
         bind_button(self._refresh, "F5", gettext("Gather the folder again"), self)
         add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
-        self._keep.clicked.connect(self._events.save_results)
-        self._undo.clicked.connect(self._events.undo)
+        self._keep.clicked.connect(self._presenter.save_results)
+        self._undo.clicked.connect(self._presenter.undo)
         self._folder.clicked.connect(self._choose_folder)
-        self._refresh.clicked.connect(self._events.refresh)
-        self._table.row_selected.connect(self._events.select_series)
-        self._table.row_opened.connect(self._events.open_row)
+        self._refresh.clicked.connect(self._presenter.refresh)
+        self._table.row_selected.connect(self._presenter.select_series)
+        self._table.row_opened.connect(self._presenter.open_row)
 
     def _lay_out(self) -> None:
         top = QHBoxLayout()
@@ -190,14 +190,14 @@ class CampaignScreen(QWidget):
 class _Working(QWidget):
     """A bar with words and Cancel, while something goes on."""
 
-    def __init__(self, events: CampaignEvents) -> None:
+    def __init__(self, presenter: CampaignPresenter) -> None:
         super().__init__()
         self._words = label(muted=True)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setMaximumWidth(200)
         self._cancel = QPushButton(gettext("Cancel"))
-        self._cancel.clicked.connect(events.cancel)
+        self._cancel.clicked.connect(presenter.cancel)
         self._parts = (self._words, self._bar, self._cancel)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(12, 0, 12, 0)
@@ -222,16 +222,16 @@ class _Working(QWidget):
 class _Empty(QFrame):
     """In place of the table: what will be here, and how to get it."""
 
-    def __init__(self, events: CampaignEvents, choose_folder: object) -> None:
+    def __init__(self, presenter: CampaignPresenter, choose_folder: object) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._events = events
+        self._presenter = presenter
         self._words = label(role=TextRole.HEADING, wrap=True)
         self._where = label(muted=True, wrap=True)
         for words in (self._words, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         record = QPushButton(gettext("Record"))
-        record.clicked.connect(events.show_record)
+        record.clicked.connect(presenter.navigator.show_record)
         synthetic = QPushButton(gettext("Make the synthetic campaign"))
         synthetic.setToolTip(gettext("Simulate 36 series, three tests each, into a new folder: some minutes"))
         synthetic.clicked.connect(self._make)
@@ -260,7 +260,7 @@ class _Empty(QFrame):
         self._where.setText(gettext(_where(state), folder=break_path(state.folder)))
 
     def _make(self) -> None:
-        self._events.simulate_campaign(self._folder)
+        self._presenter.simulate_campaign(self._folder)
 
 
 def _where(state: CampaignState) -> str:
@@ -282,6 +282,6 @@ def _card(*parts: QWidget) -> QFrame:
     return card
 
 
-def _told(state: CampaignState) -> tuple[object, ...]:
+def _section_parts(state: CampaignState) -> tuple[object, ...]:
     """What the sections are made of."""
     return state.next_test, state.effects, state.repeatability, state.excluded, state.faults, state.warnings

@@ -4,7 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip, Tone
-from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RepeatabilityRow, RunRow
+from app.presenters.campaign.presenter import CampaignPresenter
+from app.presenters.campaign.state import CampaignState, NextTest, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -15,9 +16,9 @@ _SPREAD_SHOWN = 8
 class Sections(QWidget):
     """Built anew whenever the campaign was summed up."""
 
-    def __init__(self, state: CampaignState, events: CampaignEvents) -> None:
+    def __init__(self, state: CampaignState, presenter: CampaignPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(8)
@@ -40,7 +41,7 @@ class Sections(QWidget):
         if test.series:
             record = QPushButton(gettext("Record"))
             record.setToolTip(gettext("Go to Record"))
-            record.clicked.connect(self._events.show_record)
+            record.clicked.connect(self._presenter.navigator.show_record)
             layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
 
     def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
@@ -90,7 +91,7 @@ class Sections(QWidget):
             if line.can_return:
                 back = QPushButton(gettext("Take in"))
                 back.setAccessibleName(gettext("Let {run} count again", run=line.name))
-                back.clicked.connect(lambda _=False, path=line.path: self._events.include_run(path))
+                back.clicked.connect(lambda _=False, path=line.path: self._presenter.include_run(path))
                 row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
             layout.addLayout(row)
 

@@ -3,7 +3,8 @@
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from analysis.formatting import THIN_SPACE
-from app.presenters.campaign.state import CampaignEvents, RunRow
+from app.presenters.campaign.presenter import CampaignPresenter
+from app.presenters.campaign.state import RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -12,9 +13,9 @@ from messages.i18n import gettext
 class SelectedRuns(QWidget):
     """Hidden while no series is chosen."""
 
-    def __init__(self, events: CampaignEvents) -> None:
+    def __init__(self, presenter: CampaignPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._title = label(role=TextRole.HEADING)
         self._lines = QVBoxLayout()
         self._lines.setSpacing(8)
@@ -48,11 +49,11 @@ class SelectedRuns(QWidget):
         name = QPushButton(run.name)
         name.setProperty("role", "row")
         name.setToolTip(gettext("Show this run on Identify"))
-        name.clicked.connect(lambda: self._events.open_run(run.path))
+        name.clicked.connect(lambda: self._presenter.navigator.open_run(run.path))
         out = QPushButton(gettext("Leave out"))
         out.setAccessibleName(gettext("Leave {run} out", run=run.name))
         out.setToolTip(gettext("Leave this run out, for the reason below"))
-        out.clicked.connect(lambda: self._events.exclude_run(run.path, self._reason.text()))
+        out.clicked.connect(lambda: self._presenter.exclude_run(run.path, self._reason.text()))
         chip = label()
         show_chip(chip, run.status)
         below = QHBoxLayout()

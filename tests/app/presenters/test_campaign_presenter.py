@@ -45,7 +45,7 @@ class Stage:
         self.presenter.tick()
 
     def gather(self, answer: Any = None) -> None:
-        self.presenter.enter()
+        self.presenter.refresh()
         self.say(TaskDone(self.last(), answer or found()))
 
 
@@ -55,14 +55,14 @@ def stage() -> Stage:
 
 
 def test_entering_gathers_once_and_shows_how_far_it_is(stage: Stage) -> None:
-    stage.presenter.enter()
-    stage.presenter.enter()
+    stage.presenter.refresh()
+    stage.presenter.refresh()
     assert [task for _, task in stage.worker.submitted] == [CollectRuns(FOLDER, ALL_SERIES)]
     stage.say(TaskProgress(stage.last(), Progress("3 of 9 runs", 0.3)))
     assert stage.presenter.state.progress == Progress("3 of 9 runs", 0.3)
     stage.say(TaskDone(stage.last(), found()))
     assert stage.presenter.state.progress is None
-    stage.presenter.enter()
+    stage.presenter.refresh()
     assert len(stage.worker.submitted) == 2
 
 
@@ -195,8 +195,8 @@ def test_a_row_leads_to_its_runs_and_a_run_to_identify(stage: Stage) -> None:
     stage.presenter.open_row("1SSM1")
     assert stage.went == []
     stage.presenter.open_row("1FFM1")
-    stage.presenter.open_run(path_of("1FFM1", 2))
-    stage.presenter.show_record()
+    stage.presenter.navigator.open_run(path_of("1FFM1", 2))
+    stage.presenter.navigator.show_record()
     assert stage.went == [(FOLDER, "1FFM1"), (path_of("1FFM1", 2),), ("record",)]
 
 

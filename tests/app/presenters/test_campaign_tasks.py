@@ -18,8 +18,8 @@ from app.presenters.campaign.tasks import (
     SimulateCampaign,
     UndoExclusion,
     WriteProduct,
-    execute,
 )
+from app.presenters.campaign.work import execute
 from app.runs.campaign.collect import collect_runs
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
@@ -119,9 +119,7 @@ def test_only_results_that_are_not_kept_are_made_again_to_be_kept(folder: Path) 
 def test_a_synthetic_campaign_is_recorded_with_progress(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "app.simulated_stand.synthetic_campaign.plan_tests", lambda *given: plan_tests(*given)[:2]
-    )
+    monkeypatch.setattr("app.presenters.campaign.work.plan_tests", lambda *given: plan_tests(*given)[:2])
     said: list[Progress] = []
     place = execute(SimulateCampaign(str(tmp_path)), said.append)
     assert len(list(Path(place).glob("*.h5"))) == 2

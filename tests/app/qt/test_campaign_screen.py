@@ -31,7 +31,7 @@ class Stage:
         self.presenter.attach(self.screen)
         self.screen.show()
         qtbot.waitExposed(self.screen)
-        self.presenter.enter()
+        self.presenter.refresh()
 
     def show_runs(self, folder: str, series: str) -> None:
         self.went.append((folder, series))
