@@ -93,8 +93,8 @@ def dominant_period(channel: Channel) -> float:
     peak = first + int(np.argmax(power[first:-1]))
     if peak <= first or power[peak] <= 0.0:
         raise RecordError(
-            f"no oscillation found in {format_number(t[-1] - t[0])} s of gauge 1."
-            " Record a free decay of some periods."
+            "no oscillation found in {length_s} s of gauge 1. Record a free decay of some periods.",
+            length_s=format_number(t[-1] - t[0]),
         )
     below, top, above = np.log(power[peak - 1 : peak + 2] + 1e-300)
     shift = 0.5 * (below - above) / (below - 2.0 * top + above)
@@ -119,7 +119,8 @@ def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:
         raise RecordError(
-            f"a decay of {format_number(length_s)} s is shorter than its period. Record longer."
+            "a decay of {length_s} s is shorter than its period. Record longer.",
+            length_s=format_number(length_s),
         )
     shape = np.array([0.1, 2.0 * np.pi / period_s])
     stretch_s = 2.0 * period_s
@@ -194,8 +195,8 @@ def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
         covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise RecordError(
-            f"{format_number(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a"
-            f" free decay of"
-            " some periods."
+            "{length_s} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay"
+            " of some periods.",
+            length_s=format_number(tau[-1]),
         ) from None
     return DampedCosine(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

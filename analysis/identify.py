@@ -189,11 +189,11 @@ def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[R
     if without.bic > asked.bic:
         return []
     text = message(
-        "the law {plain} explains the record as well (BIC {bic:.1f}, with f_s {bic_2:.1f}): f_s may"
+        "the law {plain} explains the record as well (BIC {bic:.1f}, with f_s {bic_with:.1f}): f_s may"
         " be as small as f_d, outside its interval too.",
         plain=plain.name,
         bic=without.bic,
-        bic_2=asked.bic,
+        bic_with=asked.bic,
     )
     return [ResultWarning("static-not-needed", text)]
 

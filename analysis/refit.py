@@ -99,7 +99,8 @@ class Refitter:
         missing = [name for name in (*PARAMETER_NAMES.values(), "release_s") if name not in start]
         if missing:
             raise AnalysisError(
-                f"the start of a refit lacks {', '.join(missing)}: hand over Identification.parameters."
+                "the start of a refit lacks {missing}: hand over Identification.parameters.",
+                missing=", ".join(missing),
             )
         point = self._problem.prior_mean.copy()
         for place, name in PARAMETER_NAMES.items():
@@ -113,7 +114,9 @@ class Refitter:
         free = self._problem.free_parameters(law)
         places = {PARAMETER_NAMES[place]: place for place in PARAMETER_NAMES if place in free}
         if name not in places:
-            raise AnalysisError(f"{name!r} cannot be held. Choose one of {', '.join(places)}.")
+            raise AnalysisError(
+                "{name!r} cannot be held. Choose one of {places}.", name=name, places=", ".join(places)
+            )
         return places[name]
 
 

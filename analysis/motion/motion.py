@@ -115,17 +115,24 @@ def rising_times(
     """
     times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
     if times.ndim != 1:
-        raise MotionError(f"times of shape {times.shape}: give one dimension")
+        raise MotionError("times of shape {shape}: give one dimension", shape=str(times.shape))
     if not (times.flags.c_contiguous and times.flags.writeable):
         times = times.copy()
     back = None
     if out_of_order(times):
         if np.isnan(times).any():
-            raise MotionError(f"time {np.flatnonzero(np.isnan(times))[0]} is not a number: leave it out")
+            raise MotionError(
+                "time {index} is not a number: leave it out",
+                index=np.flatnonzero(np.isnan(times))[0],
+            )
         order = np.argsort(times, kind="stable")
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         times = times[order]
     if len(times) and times[-1] > duration_s * (1 + 1e-12):
-        raise MotionError(f"time {times[-1]:g} s is after the simulated {duration_s:g} s: simulate longer")
+        raise MotionError(
+            "time {time_s:g} s is after the simulated {duration_s:g} s: simulate longer",
+            time_s=times[-1],
+            duration_s=duration_s,
+        )
     return times, back

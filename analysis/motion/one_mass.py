@@ -215,4 +215,6 @@ def _turning_points(decay: OneMassDecay, last_s: float) -> tuple[Floats, Floats,
 def _check(name: str, value: float, allowed: bool, range_text: str) -> None:
     if not (math.isfinite(value) and allowed):
         needed = f"a finite number {range_text}".rstrip()
-        raise DecayError(f"{name} = {value!r} describes no free decay: give {needed}")
+        raise DecayError(
+            "{name} = {value!r} describes no free decay: give {needed}", name=name, value=value, needed=needed
+        )

@@ -90,22 +90,33 @@ def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> N
     static, dynamic = parameters.static_or_dynamic, parameters.friction_dynamic
     if static != dynamic:
         raise MotionError(
-            f"friction_static is {static:g}, but the paper's method knows only friction_dynamic"
-            f" ({dynamic:g}): leave it out, or take the exact method"
+            "friction_static is {static:g}, but the paper's method knows only friction_dynamic"
+            " ({dynamic:g}): leave it out, or take the exact method",
+            static=static,
+            dynamic=dynamic,
         )
     if parameters.tilt_rad != 0.0:
         raise MotionError(
-            f"tilt_rad is {parameters.tilt_rad:g}, but the paper's method knows no tilt: leave it out, or"
-            " take the exact method"
+            "tilt_rad is {tilt_rad:g}, but the paper's method knows no tilt: leave it out, or"
+            " take the exact method",
+            tilt_rad=parameters.tilt_rad,
         )
     if not 0.0 < duration_s < math.inf:
-        raise MotionError(f"duration_s is {duration_s:g}: give a positive number of seconds")
+        raise MotionError(
+            "duration_s is {duration_s:g}: give a positive number of seconds", duration_s=duration_s
+        )
     if not 0.0 < step_s <= duration_s:
-        raise MotionError(f"step_s is {step_s:g}: give more than 0 and at most the duration, {duration_s:g}")
+        raise MotionError(
+            "step_s is {step_s:g}: give more than 0 and at most the duration, {duration_s:g}",
+            step_s=step_s,
+            duration_s=duration_s,
+        )
     if duration_s / step_s > _MOST_STEPS:
         raise MotionError(
-            f"step_s is {step_s:g}, {duration_s / step_s:.0f} steps: give at least"
-            f" {duration_s / _MOST_STEPS:g}"
+            "step_s is {step_s:g}, {steps:.0f} steps: give at least {smallest:g}",
+            step_s=step_s,
+            steps=duration_s / step_s,
+            smallest=duration_s / _MOST_STEPS,
         )
 
 

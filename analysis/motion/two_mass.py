@@ -122,7 +122,9 @@ class TwoMassParameters:
             The duration is not positive and finite.
         """
         if not 0.0 < duration_s < math.inf:
-            raise MotionError(f"duration_s is {duration_s:g}: give a positive number of seconds")
+            raise MotionError(
+                "duration_s is {duration_s:g}: give a positive number of seconds", duration_s=duration_s
+            )
         parameters = self.vector()
         phases = integrate_events(parameters, duration_s)
         starts, signs = phases[:, START].copy(), phases[:, SIGN].astype(np.int8)
@@ -203,7 +205,7 @@ def stiffness_and_damping(
     c = ((2 pi / T)^2 + n1^2) (m1 + m2), mu = 2 n1 (m1 + m2).
     """
     if not 0.0 < period_s < math.inf:
-        raise MotionError(f"period_s is {period_s:g}: give a positive number of seconds")
+        raise MotionError("period_s is {period_s:g}: give a positive number of seconds", period_s=period_s)
     mass = table_mass_kg + plate_mass_kg
     frequency = 2.0 * math.pi / period_s
     return (frequency**2 + damping_n1_per_s**2) * mass, 2.0 * damping_n1_per_s * mass
@@ -219,18 +221,28 @@ def _check(parameters: TwoMassParameters) -> None:
     positive = ("table_mass_kg", "plate_mass_kg", "stiffness_n_per_m", "gravity_m_per_s2")
     for name in positive:
         if not 0.0 < getattr(parameters, name) < math.inf:
-            raise MotionError(f"{name} is {getattr(parameters, name):g}: give a positive number")
+            raise MotionError(
+                "{name} is {value:g}: give a positive number", name=name, value=getattr(parameters, name)
+            )
     for name in ("damping_coefficient_kg_per_s", "friction_dynamic"):
         if not 0.0 <= getattr(parameters, name) < math.inf:
-            raise MotionError(f"{name} is {getattr(parameters, name):g}: give zero or a positive number")
+            raise MotionError(
+                "{name} is {value:g}: give zero or a positive number",
+                name=name,
+                value=getattr(parameters, name),
+            )
     if not math.isfinite(parameters.pullback_m):
-        raise MotionError(f"pullback_m is {parameters.pullback_m:g}: give a finite number of metres")
+        raise MotionError(
+            "pullback_m is {pullback_m:g}: give a finite number of metres", pullback_m=parameters.pullback_m
+        )
     _check_friction(parameters)
     critical = 2.0 * math.sqrt(parameters.stiffness_n_per_m * parameters.table_mass_kg)
     if parameters.damping_coefficient_kg_per_s >= critical:
         raise MotionError(
-            f"damping_coefficient_kg_per_s is {parameters.damping_coefficient_kg_per_s:g}: the table does not"
-            f" oscillate from {critical:g} on (2 sqrt(c m1)); give less"
+            "damping_coefficient_kg_per_s is {damping_coefficient_kg_per_s:g}: the table does"
+            " not oscillate from {critical:g} on (2 sqrt(c m1)); give less",
+            damping_coefficient_kg_per_s=parameters.damping_coefficient_kg_per_s,
+            critical=critical,
         )
 
 
@@ -238,11 +250,15 @@ def _check_friction(parameters: TwoMassParameters) -> None:
     static = parameters.static_or_dynamic
     if not parameters.friction_dynamic <= static < math.inf:
         raise MotionError(
-            f"friction_static is {static:g}, less than friction_dynamic {parameters.friction_dynamic:g}:"
-            " give at least that"
+            "friction_static is {static:g}, less than friction_dynamic {friction_dynamic:g}:"
+            " give at least that",
+            static=static,
+            friction_dynamic=parameters.friction_dynamic,
         )
     if not abs(parameters.tilt_rad) <= static:
         raise MotionError(
-            f"tilt_rad is {parameters.tilt_rad:g}, steeper than friction_static {static:g}: the plate slides"
-            " off before release; give a smaller tilt"
+            "tilt_rad is {tilt_rad:g}, steeper than friction_static {static:g}: the plate"
+            " slides off before release; give a smaller tilt",
+            tilt_rad=parameters.tilt_rad,
+            static=static,
         )

@@ -244,8 +244,9 @@ def parameter_shift(found: OneMassFit, disturbance: Floats) -> Floats:
 
 def _no_decay(period_s: float) -> RecordError:
     return RecordError(
-        f"no single free decay of about {format_number(period_s)} s fits the readings."
-        " Take one swing from release to rest, of one mode."
+        "no single free decay of about {period_s} s fits the readings. Take one swing from"
+        " release to rest, of one mode.",
+        period_s=format_number(period_s),
     )
 
 

@@ -115,8 +115,11 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
     length_s = float(free.time_s[-1]) - crossings.first_s
     if length_s < (PERIODS_MIN - 0.25) * crossings.period_s:
         raise RecordError(
-            f"the free swing lasts {length_s / crossings.period_s:.1f} periods of"
-            f" {format_number(crossings.period_s)} s, under {PERIODS_MIN:g}. Record until rest."
+            "the free swing lasts {periods:.1f} periods of {period_s} s, under"
+            " {periods_min:g}. Record until rest.",
+            periods=length_s / crossings.period_s,
+            period_s=format_number(crossings.period_s),
+            periods_min=PERIODS_MIN,
         )
     found = fit_with_friction(free, crossings.period_s, order)
     first_s = found.parameters.from_turning_point_before(start_s).turning_s
@@ -200,15 +203,19 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> 
     loss, uncertainty = _loss(found)
     if not loss > max(_SIGMAS * uncertainty, _LOSS_MIN):
         raise RecordError(
-            f"no free decay: the swing changes by {-100.0 * loss:+.2f} ± {100.0 * uncertainty:.2f} % over"
-            " the record, it does not die away. Take a record after the release, with the drive off."
+            "no free decay: the swing changes by {change:+.2f} ± {uncertainty:.2f} % over the"
+            " record, it does not die away. Take a record after the release, with the drive"
+            " off.",
+            change=-100.0 * loss,
+            uncertainty=100.0 * uncertainty,
         )
 
 
 def _no_single_decay(explained: float) -> RecordError:
     return RecordError(
-        f"no single free decay fits the readings, the best explains {100.0 * explained:.0f} % of the motion."
-        " Take one swing from release to rest, of one mode."
+        "no single free decay fits the readings, the best explains {explained:.0f} % of the"
+        " motion. Take one swing from release to rest, of one mode.",
+        explained=100.0 * explained,
     )
 
 

@@ -100,8 +100,11 @@ def mass_from_added_mass(
     point = np.array([quantity.value for quantity in given])
     if not (np.isfinite(point).all() and 0.0 < point[0] < point[1] and point[2] > 0.0 and mass(point) > 0.0):
         raise AnalysisError(
-            f"periods of {point[0]:.6g} s alone and {point[1]:.6g} s with {point[2]:.6g} kg give no mass."
-            " The loaded period must be the longer one."
+            "periods of {alone_s:.6g} s alone and {loaded_s:.6g} s with {added_kg:.6g} kg give no"
+            " mass. The loaded period must be the longer one.",
+            alone_s=point[0],
+            loaded_s=point[1],
+            added_kg=point[2],
         )
     deviations = np.array([quantity.standard_uncertainty for quantity in given])
     return Quantity.normal(
@@ -128,9 +131,15 @@ def _noise_factor(found: OneMassFit) -> float:
 
 def _check_asked(quantity: str, mass: Quantity | None) -> None:
     if quantity not in _ORDERS:
-        raise AnalysisError(f"quantity {quantity!r} is unknown. Choose one of {', '.join(_ORDERS)}.")
+        raise AnalysisError(
+            "quantity {quantity!r} is unknown. Choose one of {orders}.",
+            quantity=quantity,
+            orders=", ".join(_ORDERS),
+        )
     if mass is not None and not (math.isfinite(mass.value) and mass.value > 0.0):
-        raise AnalysisError(f"mass {mass.value!r} kg is not a positive number. Give the moving mass.")
+        raise AnalysisError(
+            "mass {mass!r} kg is not a positive number. Give the moving mass.", mass=mass.value
+        )
 
 
 def _identification(

@@ -85,8 +85,8 @@ def find_crossings(channel: Channel) -> Crossings:
     before, after = seen[flips], seen[flips + 1]
     if len(flips) < 3:
         raise RecordError(
-            f"no free decay: the readings pass their middle {len(flips)} times."
-            " Record at least two free swings."
+            "no free decay: the readings pass their middle {count} times. Record at least two free swings.",
+            count=len(flips),
         )
     share = away[before] / (away[before] - away[after])
     t = smooth.time_s[before] + share * (smooth.time_s[after] - smooth.time_s[before])

@@ -112,7 +112,11 @@ def check_masses(masses: StandMasses) -> None:
     for name in ("table_mass_kg", "plate_mass_kg", "gravity_m_per_s2"):
         value = getattr(masses, name)
         if not (np.isfinite(value) and value > 0.0):
-            raise RecordError(f"{name} = {value!r} is not a positive number. Give the stand's true value.")
+            raise RecordError(
+                "{name} = {value!r} is not a positive number. Give the stand's true value.",
+                name=name,
+                value=value,
+            )
         stated = name.replace("_kg", "_uncertainty_kg").replace("gravity_", "gravity_uncertainty_")
         _check_not_negative(stated, getattr(masses, stated))
 
@@ -126,14 +130,22 @@ def check_gauges(record: Record) -> None:
         _check_not_negative(f"{gauge}.delay_s_uncertainty", known.delay_s_uncertainty)
         if not abs(known.delay_s) <= DELAY_MAX_S:
             raise RecordError(
-                f"{gauge}.delay_s = {known.delay_s!r} is not within {DELAY_MAX_S:g} s. Measure it anew."
+                "{gauge}.delay_s = {delay_s!r} is not within {delay_max_s:g} s. Measure it anew.",
+                gauge=gauge,
+                delay_s=known.delay_s,
+                delay_max_s=DELAY_MAX_S,
             )
         if known.range_m is not None and not known.range_m > 0.0:
             raise RecordError(
-                f"{gauge}.range_m = {known.range_m!r} is not positive. Give the range, or none."
+                "{gauge}.range_m = {range_m!r} is not positive. Give the range, or none.",
+                gauge=gauge,
+                range_m=known.range_m,
             )
     if record.pullback_m is not None and not np.isfinite(record.pullback_m):
-        raise RecordError(f"pullback_m = {record.pullback_m!r} is not a number. Give the pullback, or none.")
+        raise RecordError(
+            "pullback_m = {pullback_m!r} is not a number. Give the pullback, or none.",
+            pullback_m=record.pullback_m,
+        )
 
 
 def quantisation_m(value_m: Floats) -> float:
@@ -144,24 +156,33 @@ def quantisation_m(value_m: Floats) -> float:
 
 def _check_not_negative(name: str, value: float) -> None:
     if not (np.isfinite(value) and value >= 0.0):
-        raise RecordError(f"{name} = {value!r} is not zero or a positive number. State it, or leave it out.")
+        raise RecordError(
+            "{name} = {value!r} is not zero or a positive number. State it, or leave it out.",
+            name=name,
+            value=value,
+        )
 
 
 def _check_columns(record: Record) -> None:
     time_s = record.time_s
     if len(time_s) < SAMPLES_MIN:
         raise RecordError(
-            f"the record has {len(time_s)} samples, too short for a decay. Record from the hold to rest."
+            "the record has {count} samples, too short for a decay. Record from the hold to rest.",
+            count=len(time_s),
         )
     for name in ("table_displacement_m", "relative_displacement_m", "table_overload", "relative_overload"):
         column = getattr(record, name)
         if column is not None and len(column) != len(time_s):
             raise RecordError(
-                f"{name} has {len(column)} values for {len(time_s)} times. Give one for each time."
+                "{name} has {count} values for {times} times. Give one for each time.",
+                name=name,
+                count=len(column),
+                times=len(time_s),
             )
     if not (np.isfinite(record.clock_scale) and 0.5 < record.clock_scale < 2.0):
         raise RecordError(
-            f"clock_scale = {record.clock_scale!r} is not near 1. Check the clock fit of the run."
+            "clock_scale = {clock_scale!r} is not near 1. Check the clock fit of the run.",
+            clock_scale=record.clock_scale,
         )
     _check_times(time_s)
 
@@ -169,14 +190,18 @@ def _check_columns(record: Record) -> None:
 def _check_times(time_s: Floats) -> None:
     if not np.isfinite(time_s).all():
         row = int(np.flatnonzero(~np.isfinite(time_s))[0])
-        raise RecordError(f"time_s[{row}] is {time_s[row]}. Leave out rows without a time.")
+        raise RecordError(
+            "time_s[{row}] is {time_s}. Leave out rows without a time.", row=row, time_s=time_s[row]
+        )
     steps = np.diff(time_s)
     if (steps <= 0.0).any():
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
         raise RecordError(
-            f"time goes back at row {row}: {format_number(time_s[row - 1], 15)} s, then"
-            f" {format_number(time_s[row], 15)} s."
-            " Sort the rows, or take one stretch of them."
+            "time goes back at row {row}: {before_s} s, then {after_s} s. Sort the rows, or"
+            " take one stretch of them.",
+            row=row,
+            before_s=format_number(time_s[row - 1], 15),
+            after_s=format_number(time_s[row], 15),
         )
 
 
@@ -185,7 +210,9 @@ def _valid(
 ) -> NDArray[np.bool_]:
     present = np.isfinite(value_m)
     if not present.any():
-        raise RecordError(f"{gauge} holds no reading (all are NaN). Check its cable and the import column.")
+        raise RecordError(
+            "{gauge} holds no reading (all are NaN). Check its cable and the import column.", gauge=gauge
+        )
     valid = present.copy()
     if overload is not None:
         valid &= ~overload
@@ -193,8 +220,11 @@ def _valid(
         valid[present] &= np.abs(value_m[present]) < range_m
     if int(valid.sum()) < SAMPLES_MIN:
         raise RecordError(
-            f"{gauge} has {int(valid.sum())} valid readings of {len(value_m)}, the rest missing or clipped."
-            " Re-centre the gauge or choose a wider range, and record again."
+            "{gauge} has {count} valid readings of {total}, the rest missing or clipped."
+            " Re-centre the gauge or choose a wider range, and record again.",
+            gauge=gauge,
+            count=int(valid.sum()),
+            total=len(value_m),
         )
     return valid
 

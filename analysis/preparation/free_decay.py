@@ -226,10 +226,10 @@ def _if_mostly_valid(readings: Channel, valid: Channel, warnings: list[ResultWar
     if len(valid) >= _KEPT_MIN * len(readings):
         return valid
     text = message(
-        "only {count} of {count_2} readings of gauge 2 are sound: it is left out, and the friction"
+        "only {count} of {total} readings of gauge 2 are sound: it is left out, and the friction"
         " comes from the table channel alone. Re-centre gauge 2.",
         count=len(valid),
-        count_2=len(readings),
+        total=len(readings),
     )
     warnings.append(ResultWarning("gauge-2-absent", text))
     return None

@@ -27,20 +27,20 @@ def check_span(table: Channel) -> None:
     length_s = float(table.time_s[-1] - table.time_s[0])
     if length_s < _LENGTH_MIN_S:
         raise RecordError(
-            f"the record spans {length_s:.1g} s, in which no stand swings. Check the unit of its times."
+            "the record spans {length_s:.1g} s, in which no stand swings. Check the unit of its times.",
+            length_s=length_s,
         )
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
-            f"the record spans {format_number(length_s)} s, a test takes a minute. Check the unit of its"
-            f" times."
+            "the record spans {length_s} s, a test takes a minute. Check the unit of its times.",
+            length_s=format_number(length_s),
         )
     check_gap(table, _GAP_MAX_S)
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
         raise RecordError(
-            f"gauge 1 moves over {format_length(travel_m)}, no stand does. Check the unit: are the"
-            f" readings in"
-            " millimetres?"
+            "gauge 1 moves over {travel_m}, no stand does. Check the unit: are the readings in millimetres?",
+            travel_m=format_length(travel_m),
         )
 
 
@@ -50,9 +50,10 @@ def check_gap(table: Channel, longest_s: float) -> None:
     widest = int(np.argmax(steps_s))
     if steps_s[widest] > longest_s:
         raise RecordError(
-            f"gauge 1 has no reading for {format_number(steps_s[widest])} s after"
-            f" {format_number(table.time_s[widest], 6)} s"
-            " of the record. Take the stretch before or after that gap."
+            "gauge 1 has no reading for {gap_s} s after {start_s} s of the record. Take the"
+            " stretch before or after that gap.",
+            gap_s=format_number(steps_s[widest]),
+            start_s=format_number(table.time_s[widest], 6),
         )
 
 
@@ -69,8 +70,11 @@ def check_rate(table: Channel) -> None:
     period_s = dominant_period(Channel(table.time_s[1:], np.diff(table.value_m)))
     if period_s < _READINGS_A_SWING * interval_s:
         raise RecordError(
-            f"gauge 1 is read every {interval_s:.3g} s, {period_s / interval_s:.2g} times a swing. Record"
-            f" {_READINGS_A_SWING} readings a swing at the least, better 100."
+            "gauge 1 is read every {interval_s:.3g} s, {readings:.2g} times a swing. Record"
+            " {needed} readings a swing at the least, better 100.",
+            interval_s=interval_s,
+            readings=period_s / interval_s,
+            needed=_READINGS_A_SWING,
         )
 
 
@@ -87,13 +91,17 @@ def estimate_period(table: Channel, release: Release) -> float:
         period_s = dominant_period(swing)
     except RecordError:
         raise RecordError(
-            f"the record ends {format_number(swing.time_s[-1] - release.time_s)} s after the release, before"
-            " the table has swung once and a quarter. Record for 20 s after the release, or until rest."
+            "the record ends {length_s} s after the release, before the table has swung once and"
+            " a quarter. Record for 20 s after the release, or until rest.",
+            length_s=format_number(swing.time_s[-1] - release.time_s),
         ) from None
     if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
         raise RecordError(
-            f"gauge 1 swings with a period of {format_number(period_s)} s, no stand does ({PERIOD_MIN_S:g} to"
-            f" {PERIOD_MAX_S:g} s). Check the unit of its times: are they seconds?"
+            "gauge 1 swings with a period of {period_s} s, no stand does ({shortest_s:g} to"
+            " {longest_s:g} s). Check the unit of its times: are they seconds?",
+            period_s=format_number(period_s),
+            shortest_s=PERIOD_MIN_S,
+            longest_s=PERIOD_MAX_S,
         )
     return period_s
 
@@ -118,7 +126,9 @@ def check_friction(friction_dynamic: float) -> None:
     """Raise RecordError for a coefficient that no dry plates have."""
     if friction_dynamic > FRICTION_MAX:
         raise RecordError(
-            f"the fit gives f_d = {format_number(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no"
-            f" dry plates"
-            " have. Check the units of times and readings, and whether gauge 1 shows the swing of the table."
+            "the fit gives f_d = {friction_dynamic}, over {largest:g}, which no dry"
+            " plates have. Check the units of times and readings, and whether gauge 1 shows"
+            " the swing of the table.",
+            friction_dynamic=format_number(friction_dynamic, 4),
+            largest=FRICTION_MAX,
         )

@@ -139,7 +139,8 @@ def msk64_degree(velocity_max_m_per_s: float) -> str:
     """
     if not (math.isfinite(velocity_max_m_per_s) and velocity_max_m_per_s >= 0.0):
         raise AnalysisError(
-            f"velocity {velocity_max_m_per_s!r} m/s has no MSK-64 degree: give a finite number, 0 or above"
+            "velocity {velocity!r} m/s has no MSK-64 degree: give a finite number, 0 or above",
+            velocity=velocity_max_m_per_s,
         )
     if velocity_max_m_per_s <= _BOUNDS_M_PER_S[0]:
         return "below V"

@@ -34,8 +34,9 @@ def identifiable_fits(fits: list[Fit]) -> list[Fit]:
     candidates = [fit for fit in fits if not fit.law.has_tilt or fit.determines(Parameter.TILT)]
     if not candidates:
         raise RecordError(
-            f"{fits[0].law.name} cannot be identified: the plate slips one way only, so that tilt_rad and"
-            " friction_dynamic act alike. Choose a model without tilt."
+            "{law} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            " friction_dynamic act alike. Choose a model without tilt.",
+            law=fits[0].law.name,
         )
     return candidates
 
