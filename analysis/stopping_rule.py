@@ -23,7 +23,7 @@ RELATIVE_REDUCTION_MIN = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
 LATEST_END_S = 20.0
 """After the release no record goes on for longer."""
-_READINGS = 400
+_LATER_READINGS = 400
 """So many later readings a channel stand for all of them, with the noise of their mean."""
 
 
@@ -53,9 +53,9 @@ def tail_variance_reduction(tail: DampedCosine, end_s: float) -> Floats:
     if end_s <= tail.end_s:
         return np.zeros(2)
     density_hz = len(tail.residual_m) / (tail.end_s - tail.start_s)
-    times_s = np.linspace(tail.end_s, end_s, _READINGS)
+    times_s = np.linspace(tail.end_s, end_s, _LATER_READINGS)
     _, columns = damped_cosine(tail.parameters, times_s - tail.start_s)
-    weight = density_hz * (end_s - tail.end_s) / _READINGS
+    weight = density_hz * (end_s - tail.end_s) / _LATER_READINGS
     variance = float(np.mean(tail.residual_m**2))
     now = tail.covariance
     then = np.linalg.inv(np.linalg.inv(now) + weight * columns @ columns.T / variance)
@@ -68,11 +68,11 @@ def _later(problem: FitProblem, end_s: float) -> FitProblem | None:
     start_s = float(problem.table.time_s[-1])
     if end_s <= start_s:
         return None
-    times_s = np.linspace(start_s, end_s, _READINGS)
-    empty = Channel(times_s, np.zeros(_READINGS))
+    times_s = np.linspace(start_s, end_s, _LATER_READINGS)
+    empty = Channel(times_s, np.zeros(_LATER_READINGS))
     table = problem.table
     density_hz = len(table) / float(table.time_s[-1] - table.time_s[0])
-    stands_for = max(density_hz * (end_s - start_s) / _READINGS, 1e-9)
+    stands_for = max(density_hz * (end_s - start_s) / _LATER_READINGS, 1e-9)
     noise = problem.noise_m[0] / stands_for**0.5, problem.noise_m[1] / stands_for**0.5
     relative = None if problem.relative is None else empty
     return replace(problem, table=empty, relative=relative, noise_m=noise)

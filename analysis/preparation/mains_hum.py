@@ -10,13 +10,13 @@ from messages.message import message
 
 MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
-_BLOCK_S = 0.4
+_HUM_BLOCK_S = 0.4
 """Whole cycles of 50, 60 and of all the frequencies beside them."""
 _BLOCKS = 25
-_KEPT = (1.0 - np.sinc(np.array([*MAINS_HZ, *_BESIDE_HZ]) / MAINS_HZ[0])) ** 2
+_REMAINING_POWER = (1.0 - np.sinc(np.array([*MAINS_HZ, *_BESIDE_HZ]) / MAINS_HZ[0])) ** 2
 """What taking off means over a cycle, twice, leaves of each frequency."""
-_READINGS_MIN = 20
-_STANDS_OUT = 8.0
+_BLOCK_READINGS_MIN = 20
+_HUM_RATIO_MIN = 8.0
 """Mean power of the mains over that beside them."""
 _NOTHING_M = 1e-7
 _DISTURBS = 0.002
@@ -30,7 +30,7 @@ def detect_hum(channel: Channel) -> tuple[float, float] | None:
         return None
     beside = max(float(np.median(powers[len(MAINS_HZ) :])), _NOTHING_M**2)
     strongest = int(np.argmax(powers[: len(MAINS_HZ)]))
-    if powers[strongest] <= _STANDS_OUT * beside:
+    if powers[strongest] <= _HUM_RATIO_MIN * beside:
         return None
     return MAINS_HZ[strongest], float(np.sqrt(powers[strongest]))
 
@@ -60,9 +60,9 @@ def _powers(channel: Channel) -> Floats | None:
     """Squared amplitudes at the mains and beside them, typical of blocks of whole cycles; None for few."""
     still = Channel(channel.time_s, channel.value_m - _means(channel, 1.0 / MAINS_HZ[0]))
     still = Channel(still.time_s, still.value_m - _means(still, 1.0 / MAINS_HZ[0]))
-    starts = np.arange(channel.time_s[0], channel.time_s[-1] - _BLOCK_S, _BLOCK_S)
+    starts = np.arange(channel.time_s[0], channel.time_s[-1] - _HUM_BLOCK_S, _HUM_BLOCK_S)
     chosen = starts[:: max(1, len(starts) // _BLOCKS)]
-    found = [_amplitudes(still.between(start, start + _BLOCK_S)) for start in chosen]
+    found = [_amplitudes(still.between(start, start + _HUM_BLOCK_S)) for start in chosen]
     whole = [amplitudes for amplitudes in found if amplitudes is not None]
     return np.median(np.square(whole), axis=0) if len(whole) > 1 else None
 
@@ -70,10 +70,10 @@ def _powers(channel: Channel) -> Floats | None:
 def _amplitudes(block: Channel) -> Floats | None:
     """Amplitudes at all frequencies; None for a block with a gap."""
     steps = np.diff(block.time_s)
-    if len(block) < _READINGS_MIN or steps.max() > 0.1 * _BLOCK_S:
+    if len(block) < _BLOCK_READINGS_MIN or steps.max() > 0.1 * _HUM_BLOCK_S:
         return None
     turns = np.exp(2j * np.pi * np.outer((*MAINS_HZ, *_BESIDE_HZ), block.time_s))
-    return np.asarray(2.0 / len(block) * np.abs(turns @ block.value_m)) / _KEPT
+    return np.asarray(2.0 / len(block) * np.abs(turns @ block.value_m)) / _REMAINING_POWER
 
 
 def _means(channel: Channel, window_s: float) -> Floats:
