@@ -7,8 +7,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from analysis.motion.motion import MotionError
-from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters
+from analysis.motion.two_mass import MotionError, TwoMassMotion, TwoMassParameters
 from analysis.record import AnalysisError
 
 KILOGRAM_FORCE_N: Final = 9.80665

@@ -11,7 +11,7 @@ from scipy.signal import detrend, welch
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
-from analysis.preparation.mains_hum import MAINS_HZ
+from analysis.preparation.noise import MAINS_HZ
 from analysis.record import AnalysisError
 
 SECONDS_MIN: Final = 1.0

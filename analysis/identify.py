@@ -22,12 +22,11 @@ from analysis.results.decay_constants import (
     constants_from_joint_fit,
     constants_from_tail,
 )
-from analysis.results.events import build_events, find_slip_end
 from analysis.results.fitted_quantities import add_fitted_quantities
 from analysis.results.joint_fit import JointFit, choose_law
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
-from analysis.results.static_bounds import add_no_slip_bound, add_static_friction_bounds
+from analysis.results.slip import add_no_slip_bound, add_static_friction_bounds, build_events, find_slip_end
 from analysis.results.verdict import (
     assess_model,
     identifiability_warnings,

@@ -11,27 +11,22 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.averaging import average_record
-from analysis.damped_cosine import DampedCosine, refit_damped_cosine
+from analysis.damped_cosine import DampedCosine, damped_cosine, refit_damped_cosine
 from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess
+from analysis.fitting.least_squares import covariance
 from analysis.fitting.problem import FitProblem, motion_phases
 from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
-from analysis.preparation.drift import remove_drift
 from analysis.preparation.free_decay import FreeDecay, prepare
+from analysis.preparation.noise import remove_drift
 from analysis.quantities import BudgetSource, Quantity
 from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.results.decay_constants import DecayConstants, constants_from_joint_fit, constants_from_tail
 from analysis.results.joint_fit import joint_fit_uncertainty
 from analysis.results.verdict import assess_model, identifiable_fits
-from analysis.stopping_rule import (
-    LATEST_END_S,
-    friction_variance_reduction,
-    is_worth_waiting,
-    tail_variance_reduction,
-)
 from analysis.uncertainty import ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
@@ -67,7 +62,7 @@ class LiveState:
     friction_dynamic, period_s, damping_n1_per_s : Quantity or None
     narrowing : tuple of str
         Which of these three readings until 20 s after the release would still narrow by more than a
-        twentieth of their standard uncertainty (`analysis.stopping_rule`).
+        twentieth of their standard uncertainty (`analysis.live`).
     may_stop : bool
         True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing
         slips: neither of the others).
@@ -327,3 +322,68 @@ def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:
     last = motion_phases(chosen.parameters, chosen.law, now_s - release_s)[-1]
     end_s = float(last[0]) + release_s
     return end_s if last[1] == 0.0 and now_s - end_s > decay.period_s else None
+
+
+RELATIVE_REDUCTION_MIN = 0.05
+"""Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
+LATEST_END_S = 20.0
+"""After the release no record goes on for longer."""
+_LATER_READINGS = 400
+"""So many later readings a channel stand for all of them, with the noise of their mean."""
+
+
+def is_worth_waiting(deviation: float, removed_variance: float) -> bool:
+    """Whether taking `removed_variance` away narrows a standard uncertainty by more than a twentieth."""
+    return removed_variance > (1.0 - (1.0 - RELATIVE_REDUCTION_MIN) ** 2) * deviation**2
+
+
+def friction_variance_reduction(problem: FitProblem, fit: Fit, noise_variance: float, end_s: float) -> float:
+    """Variance of f_d that readings until `end_s` would take away.
+
+    `noise_variance` is the part of the variance of f_d that comes from noise, as the residuals show it.
+    """
+    now, _ = covariance(fit.normal_matrix)
+    later = _later(problem, end_s)
+    if later is None:
+        return 0.0
+    then, _ = covariance(fit.normal_matrix + _information(later, fit))
+    place = int(np.flatnonzero(fit.free == Parameter.FRICTION_DYNAMIC)[0])
+    white = float((now @ _information(problem, fit) @ now)[place, place])
+    factor = noise_variance / white if white > 0.0 else 1.0
+    return float(now[place, place] - then[place, place]) * factor
+
+
+def tail_variance_reduction(tail: DampedCosine, end_s: float) -> Floats:
+    """Shares (2,) of the noise variance of T and of n1 that a tail until `end_s` would take away."""
+    if end_s <= tail.end_s:
+        return np.zeros(2)
+    density_hz = len(tail.residual_m) / (tail.end_s - tail.start_s)
+    times_s = np.linspace(tail.end_s, end_s, _LATER_READINGS)
+    _, columns = damped_cosine(tail.parameters, times_s - tail.start_s)
+    weight = density_hz * (end_s - tail.end_s) / _LATER_READINGS
+    variance = float(np.mean(tail.residual_m**2))
+    now = tail.covariance
+    then = np.linalg.inv(np.linalg.inv(now) + weight * columns @ columns.T / variance)
+    shares = 1.0 - np.diag(then)[:2] / np.diag(now)[:2]
+    return np.asarray(shares[::-1])
+
+
+def _later(problem: FitProblem, end_s: float) -> FitProblem | None:
+    """The same gauges after their last reading, with the noise of the mean of as many as one stands for."""
+    start_s = float(problem.table.time_s[-1])
+    if end_s <= start_s:
+        return None
+    times_s = np.linspace(start_s, end_s, _LATER_READINGS)
+    empty = Channel(times_s, np.zeros(_LATER_READINGS))
+    table = problem.table
+    density_hz = len(table) / float(table.time_s[-1] - table.time_s[0])
+    stands_for = max(density_hz * (end_s - start_s) / _LATER_READINGS, 1e-9)
+    noise = problem.noise_m[0] / stands_for**0.5, problem.noise_m[1] / stands_for**0.5
+    relative = None if problem.relative is None else empty
+    return replace(problem, table=empty, relative=relative, noise_m=noise)
+
+
+def _information(problem: FitProblem, fit: Fit) -> Floats:
+    """Curvature (k, k) of half of chi-square that the readings of `problem` bring, without priors."""
+    systems = problem.normal_equations(fit.parameters, fit.law, fit.free)
+    return np.asarray(np.sum(systems, axis=0)[:-1, :-1])

@@ -18,8 +18,7 @@ from analysis.fitting.search import Fit, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT, compared_law, default_point
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.motion.motion import Motion
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, TwoMassParameters
 from analysis.preparation.channels import SAMPLES_MIN, Channel
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN
 from analysis.quantities import BudgetLine, Quantity, ResultWarning

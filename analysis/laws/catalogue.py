@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.laws.coulomb import COULOMB, COULOMB_TILT
+from analysis.laws.coulomb import COULOMB, COULOMB_TILT, STATIC, STATIC_TILT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
-from analysis.laws.static_friction import STATIC, STATIC_TILT
 from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.record import AnalysisError
 

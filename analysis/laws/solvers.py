@@ -12,9 +12,8 @@ from analysis.motion import events
 from analysis.motion.events import DURATION_MIN_S, integrate_events
 from analysis.motion.gradients import phase_responses
 from analysis.motion.integration import Friction, final_relative, integrated_kernels, simulate_integrated
-from analysis.motion.motion import Motion
 from analysis.motion.sampling import sample_displacements
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, TwoMassParameters
 
 Gauge = tuple[Floats, Floats, int, float]
 """Times, readings (m), which gauge (see `closed_form`) and standard deviation of the noise (m)."""

@@ -12,8 +12,7 @@ from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Param
 from analysis.laws.solvers import IntegratedSolver
 from analysis.motion.events import FRICTION_DYNAMIC, FRICTION_STATIC
 from analysis.motion.integration import IntegratedMotion, simulate_integrated
-from analysis.motion.motion import MotionError
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import MotionError, TwoMassParameters
 
 VELOCITY = OwnParameter("stribeck_velocity_m_per_s", "m/s", default=0.01, lower=1e-4, upper=1.0)
 _VELOCITY = MOTION_PARAMETER_COUNT

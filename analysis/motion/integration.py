@@ -48,7 +48,6 @@ from analysis.motion.events import (
 from analysis.motion.events import (
     PARAMETER_COUNT as OWN,
 )
-from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
 from analysis.motion.sampling import (
     BLOCK,
     block_basis,
@@ -57,6 +56,7 @@ from analysis.motion.sampling import (
     phase_blocks,
     rotation_tables,
 )
+from analysis.motion.two_mass import Motion, MotionError, MotionSamples, rising_times
 
 Friction = Callable[[float, Floats], float]
 """Compiled: coefficient of friction at a sliding speed (m/s) with the parameters of `IntegratedKernels`."""

@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.events import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
-from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, MotionError, MotionSamples, TwoMassParameters, rising_times
 
 _MOST_STEPS = 10_000_000
 

@@ -8,15 +8,18 @@ import numpy as np
 from analysis.damped_cosine import DampedCosine, fit_damped_cosine
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.preparation.cleaning import remove_invalid_readings
-from analysis.preparation.drift import drift_warning, find_drift, remove_drift
-from analysis.preparation.mains_hum import detect_hum, hum_warning
 from analysis.preparation.mounting import detect_mounting, relative_to_table
 from analysis.preparation.noise import (
     NOISE_FLOOR_M,
+    detect_hum,
     detrended_noise,
+    drift_warning,
+    find_drift,
+    hum_warning,
     merge_repeated_readings,
     noise_with_floor,
     pool_noise,
+    remove_drift,
     third_difference_noise,
 )
 from analysis.preparation.plausibility import check_rate, check_span, estimate_period

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.formatting import format_length
 from analysis.preparation.channels import Channel
-from analysis.preparation.mains_hum import detect_hum, remove_hum
+from analysis.preparation.noise import detect_hum, remove_hum
 from analysis.record import RecordError
 
 _HALF_WINDOW_S = 0.006

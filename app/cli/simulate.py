@@ -24,8 +24,7 @@ from app.cli.motion_options import (
 from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass
 
 if TYPE_CHECKING:
-    from analysis.motion.motion import Motion
-    from analysis.motion.two_mass import TwoMassParameters
+    from analysis.motion.two_mass import Motion, TwoMassParameters
 
 
 def simulate(

@@ -13,7 +13,7 @@ from app.presenters.worker import ReportProgress
 
 if TYPE_CHECKING:
     from analysis.identification import Identification
-    from analysis.motion.motion import Motion
+    from analysis.motion.two_mass import Motion
     from analysis.record import Record
     from app.runs.analyze import Analysis, AnalysisRequest
 

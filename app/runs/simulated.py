@@ -16,8 +16,7 @@ from config.schema import Gauge, Gauges
 from drivers.samples import DeviceIdentity, Losses
 
 if TYPE_CHECKING:
-    from analysis.motion.motion import Motion
-    from analysis.motion.two_mass import TwoMassParameters
+    from analysis.motion.two_mass import Motion, TwoMassParameters
 
 PLATEAU_S = 1.0
 _EXACT = Gauge(

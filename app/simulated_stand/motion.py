@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.motion.motion import Motion
-from analysis.motion.two_mass import simulate, stiffness_and_damping
+from analysis.motion.two_mass import Motion, simulate, stiffness_and_damping
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.truth import StandTruth
 from config.files import published_row

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.campaign.rows import SeriesRow
 from analysis.catalogue import table_columns
-from analysis.motion.motion import Motion
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, TwoMassParameters
 from app.runs.batch.tasks import error_text
 from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from analysis.catalogue import Place, definition
 from analysis.identification import Identification
 from analysis.laws.catalogue import law_with_own_parameters
-from analysis.motion.motion import Motion, MotionSamples
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.reports.figures.style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.fitting.profile import distribution
 from analysis.identify import identify
+from analysis.results.fitted_quantities import distribution
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks import study_coverage

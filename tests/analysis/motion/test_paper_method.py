@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.motion import paper_method
-from analysis.motion.motion import MotionError
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import MotionError, TwoMassParameters
 from benchmarks.reference_solvers import march_like_the_paper
 
 FIRST = TwoMassParameters.from_free_decay(

@@ -10,8 +10,7 @@ from analysis.laws import stribeck
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT
 from analysis.motion.events import FRICTION_STATIC, integrate_events
 from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.motion import MotionError
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import MotionError, TwoMassParameters
 from benchmarks.reference_solvers import integrate_with_events
 
 KERNELS = stribeck.STRIBECK_TILT.solver.kernels

@@ -21,8 +21,14 @@ from analysis.motion.events import (
     integrate_events,
 )
 from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.motion import MotionError, MotionSamples
-from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
+from analysis.motion.two_mass import (
+    MotionError,
+    MotionSamples,
+    TwoMassMotion,
+    TwoMassParameters,
+    simulate,
+    stiffness_and_damping,
+)
 from benchmarks.reference_solvers import integrate_with_events
 
 # Made independently of this project and handed over with the task; times and displacements to 1e-12.

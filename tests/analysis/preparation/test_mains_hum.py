@@ -6,7 +6,7 @@ from synthetic import Truth, simulate_readings
 
 from analysis.identify import identify
 from analysis.preparation.channels import Channel
-from analysis.preparation.mains_hum import detect_hum
+from analysis.preparation.noise import detect_hum
 from analysis.preparation.release import find_releases
 from analysis.record import Record, StandMasses
 
