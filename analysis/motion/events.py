@@ -102,12 +102,9 @@ def peak_amplitude(damping: float, frequency: float, cosine: float, sine: float,
 
 @compiled_part
 def _zero(
-    damping: float,
-    frequency: float,
-    cosine: float,
-    sine: float,
-    drive: float,
-    offset: float,
+    mode: tuple[float, float],
+    swing: tuple[float, float],
+    line: tuple[float, float],
     low: float,
     high: float,
     guess: float,
@@ -116,7 +113,17 @@ def _zero(
 
     It does so once. Halley's steps from `guess`, kept inside a bracket; they end when what the next one
     would change, to leading order, is below rounding.
+
+    Parameters
+    ----------
+    mode : (float, float)
+        Damping n and damped frequency w.
+    swing : (float, float)
+        Coefficients cosine and sine.
+    line : (float, float)
+        drive and offset.
     """
+    (damping, frequency), (cosine, sine), (drive, offset) = mode, swing, line
     rate_cosine, rate_sine = oscillation_derivative(damping, frequency, cosine, sine)
     bend_cosine, bend_sine = oscillation_derivative(damping, frequency, rate_cosine, rate_sine)
     tau = guess
@@ -152,7 +159,7 @@ def _limit_reached(
     tau = (math.atan2(sine, cosine) - angle) / frequency
     period = 2.0 * math.pi / frequency
     tau += period * math.ceil((low - tau) / period)
-    return _zero(damping, frequency, cosine, sine, 0.0, limit, low, high, tau)
+    return _zero((damping, frequency), (cosine, sine), (0.0, limit), low, high, tau)
 
 
 @compiled_part
@@ -221,7 +228,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
         speed = velocity + drive * turn + lag * peak
         if speed <= 0.0:
             guess = turn - speed / (drive - peak)
-            tau = _zero(damping, frequency, cosine, sine, drive, velocity, low, turn, guess)
+            tau = _zero((damping, frequency), (cosine, sine), (drive, velocity), low, turn, guess)
             return max(tau, shortest)
         if not turn <= longest:
             return math.inf
@@ -231,7 +238,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
             if drive + decay * peak > 0.0:
                 bottom = _limit_reached(damping, frequency, -rate_cosine, -rate_sine, -drive, low, turn)
             if _speed(damping, frequency, cosine, sine, drive, velocity, bottom) <= 0.0:
-                return _zero(damping, frequency, cosine, sine, drive, velocity, low, bottom, low)
+                return _zero((damping, frequency), (cosine, sine), (drive, velocity), low, bottom, low)
         low, turn, peak = turn, turn + half_period, decay * decay * peak
 
 

@@ -1,4 +1,4 @@
-"""Noise of readings: about lines, by third differences, and pooled over the quiet stretches of a record."""
+"""White noise, steady drift and mains hum of a gauge, measured from its readings."""
 
 import numpy as np
 

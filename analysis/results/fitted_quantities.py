@@ -1,4 +1,7 @@
-"""Quantities of INTERFACE ("results") from fitted parameters, each with its uncertainty by source."""
+"""Results from the fitted parameters, each with its uncertainty by source.
+
+Intervals of f_d and f_s come from the profile of chi-square where that is not a parabola.
+"""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Least and largest f_s that a record allows, whether or not the chosen law has an f_s of its own."""
+"""What the slips of the fitted motion tell: release, end of slip, rest, and the bounds of f_s."""
 
 from dataclasses import dataclass
 
