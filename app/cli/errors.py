@@ -7,11 +7,11 @@ class CommandError(Exception):
 
 def error_text(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
-    from app.runs.errors import internal_error_text
+    from app.runs.errors import internal_error
 
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}. Check the path, its rights and its disk"
-    return " ".join(str(error).split()) if is_expected(error) else internal_error_text(error)
+    return " ".join(str(error).split()) if is_expected(error) else str(internal_error(error))
 
 
 def is_expected(error: Exception) -> bool:

@@ -101,8 +101,8 @@ def trash(
     The trash is the folder .trash beside them.
     """
     from app.cli import output as out
+    from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
     from app.runs.paths import recordings_directory
-    from app.runs.trash import list_trash, move_to_trash, restore_from_trash
 
     if show and bring_back:
         raise CommandError("--list and --restore exclude each other. Give one of them")

@@ -39,12 +39,15 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
         The run holds no samples, or readings of another kind.
     """
     if not len(run):
-        raise UnsuitableRunError(f"{run.path} holds no samples. Record the run again")
+        raise UnsuitableRunError("{path} holds no samples. Record the run again", path=run.path)
     quantity, unit = run.metadata.quantity, run.metadata.unit
     if metres_only and (quantity, unit) != ("displacement", "m"):
         raise UnsuitableRunError(
-            f"{run.path} holds a {quantity} in {unit}, but friction needs displacements in m."
-            " Analyse it with --kind one-mass"
+            "{path} holds a {quantity} in {unit}, but friction needs displacements in m."
+            " Analyse it with --kind one-mass",
+            path=run.path,
+            quantity=quantity,
+            unit=unit,
         )
     no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_BY_GAUGE)
     relative = run.relative_reading

@@ -52,7 +52,9 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
         for name in ("table_mass_kg", "plate_mass_kg"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
-                raise MetadataError(f"{name} = {value:g} must be a finite number above 0")
+                raise MetadataError(
+                    "{name} = {value:g} must be a finite number above 0", name=name, value=value
+                )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

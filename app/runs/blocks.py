@@ -58,9 +58,7 @@ class RunBlock:
         if any(a.shape != (n, channels) for a in (self.readings, *counts)) or self.status.shape != (n,):
             raise ValueError(f"a block of {n} rows and {channels} channels does not have one shape")
         if bool(counts) != bool(layout.counts):
-            raise ValueError(
-                f"a block {'with' if counts else 'without'} counts, in a run that says otherwise"
-            )
+            raise ValueError(f"a block {'with' if counts else 'without'} counts does not fit the run")
         if counts and not np.can_cast(counts[0].dtype, layout.counts, "safe"):
             raise ValueError(f"counts of type {counts[0].dtype} do not fit a run of {layout.counts}")
         columns: Columns = [np.ascontiguousarray(self.time_s, np.float64)]

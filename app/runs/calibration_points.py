@@ -75,14 +75,22 @@ def read_points(path: Path) -> CalibrationPoints:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise PointsError(f"{path}: cannot be read ({error}). Give a readable CSV file") from None
+        raise PointsError(
+            "{path}: cannot be read ({error}). Give a readable CSV file", path=path, error=error
+        ) from None
     header = lines[0] if lines else ""
     separator = next((mark for mark in ";\t" if mark in header), ",")
     table = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
     names = [name.lower() for name in table[0]] if table else []
     for column in _COLUMNS:
         if column not in names:
-            raise PointsError(f"{path}: there is no column {column} in {header[:60]!r}. {_RANGE_OF_FILE}")
+            raise PointsError(
+                "{path}: there is no column {column} in {header!r}. {range_of_file}",
+                path=path,
+                column=column,
+                header=header[:60],
+                range_of_file=_RANGE_OF_FILE,
+            )
     rows = [(line, dict(zip(names, row, strict=False))) for line, row in enumerate(table[1:], 2) if any(row)]
     counts, dial_mm = (_numbers(path, rows, name, separator) for name in _COLUMNS)
     dial_m = np.array(dial_mm) * 1e-3
@@ -107,7 +115,13 @@ def _numbers(path: Path, rows: list[tuple[int, dict[str, str]]], name: str, sepa
         try:
             values.append(float(text if separator == "," else text.replace(",", ".")))
         except ValueError:
-            raise PointsError(f"{path}: line {line}: {name} {text!r} is not a number. Correct it") from None
+            raise PointsError(
+                "{path}: line {line}: {name} {text!r} is not a number. Correct it",
+                path=path,
+                line=line,
+                name=name,
+                text=text,
+            ) from None
     return values
 
 
@@ -115,4 +129,9 @@ def _way(path: Path, line: int, text: str) -> int:
     try:
         return _WAYS[text.lower()]
     except KeyError:
-        raise PointsError(f"{path}: line {line}: direction {text!r} is not known. Use up or down") from None
+        raise PointsError(
+            "{path}: line {line}: direction {text!r} is not known. Use up or down",
+            path=path,
+            line=line,
+            text=text,
+        ) from None

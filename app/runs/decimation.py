@@ -9,11 +9,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.columns import stored_rows
+from app.runs.fields import read_number
 from app.runs.metadata_io import read_changes, read_metadata
 from app.runs.reader import reading_columns, validate_and_read
 from app.runs.saved_analyses import read_analyses
-from app.runs.schema import TIME, event_path, read_number
-from app.runs.validation import stored_rows
+from app.runs.schema import RELEASE, TIME
 from app.runs.validator import Validator
 
 Floats = NDArray[np.float64]
@@ -91,7 +92,7 @@ def _overview(file: h5py.File, spans: int, before_release_s: float) -> Decimated
 
 
 def _release_s(file: h5py.File) -> float | None:
-    release_s = read_number(file, event_path("release_s"))
+    release_s = read_number(file, RELEASE)
     for analysis in read_analyses(file)[-1:]:
         release_s = analysis.document["events"].get("release_s") or release_s
     return release_s

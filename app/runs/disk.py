@@ -1,4 +1,4 @@
-"""Room on the disk, and making what was written last."""
+"""Free space of a disk, durable and atomic writes, and the errors of storage."""
 
 import errno
 import os
@@ -12,23 +12,27 @@ from pathlib import Path
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 
 MARGIN_BYTES = 1 << 20
-"""Claimed beyond what a run needs next, so that its file can still be closed in good order."""
+"""Claimed beyond the next need of a run, so that its file can still be closed in good order."""
 
-_NO_ROOM = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
-
+_NO_SPACE = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
+"""No space on the disk, in the quota, or within the largest size of a file."""
 _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 
 
 def reserve_space(path: Path, size: int, more: int) -> None:
     """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
 
-    HDF5 can crash after a failed write, and leaves a file that says it is longer than it is; so no
-    write of HDF5 may be the one that finds the disk full. Where the system can, the blocks are
-    claimed behind the end of the file, which also meets quotas; HDF5 does not mind them.
+    HDF5 can crash after a failed write, and leaves a file that states a greater length than it has. So no
+    write of HDF5 may be the first to find the disk full. Linux claims the blocks behind the end of the
+    file, which also respects quotas; HDF5 accepts such a file.
     """
     try:
         if sys.platform == "linux":
-            _claim(path, size, more)
+            handle = os.open(path, os.O_WRONLY)
+            try:
+                os.posix_fallocate(handle, size, more)
+            finally:
+                os.close(handle)
         else:
             check_free_space(path.parent, more)
     except OSError as error:
@@ -40,39 +44,31 @@ def check_free_space(folder: Path, more: int) -> None:
     free = shutil.disk_usage(folder).free
     if free < more:
         raise DiskFullError(
-            f"{folder}: the disk has only {free / 1e6:.1f} MB left. Free some space or take another disk"
+            "{folder}: the disk has only {free:.1f} MB left. Free some space or take another disk",
+            folder=folder,
+            free=free / 1e6,
         )
 
 
 def has_free_space(folder: Path, size: int) -> bool:
-    """Tell whether a folder, which need not exist yet, has `size` free bytes; yes if nobody can tell."""
+    """Tell whether a folder, which need not exist yet, has `size` free bytes; True where it is unknown."""
     free = free_bytes(folder)
     return free is None or free >= size
 
 
 def free_bytes(folder: Path) -> int | None:
-    """Free bytes where a folder is or would be made; None where nobody can tell."""
-    there = next((place for place in (folder, *folder.parents) if place.is_dir()), folder)
+    """Free bytes where a folder is or would be made; None where the system cannot tell."""
+    existing = next((path for path in (folder, *folder.parents) if path.is_dir()), folder)
     try:
-        usage = shutil.disk_usage(there)
+        usage = shutil.disk_usage(existing)
     except OSError:
         return None
-    return usage.free if usage.total else None  # some network file systems say nothing
+    return usage.free if usage.total else None  # some network file systems report 0 of 0
 
 
 def is_disk_full(error: OSError) -> bool:
-    """Tell whether a write failed for want of room: disk, quota, or largest size of a file."""
-    return error.errno in _NO_ROOM
-
-
-if sys.platform == "linux":
-
-    def _claim(path: Path, size: int, more: int) -> None:
-        handle = os.open(path, os.O_WRONLY)
-        try:
-            os.posix_fallocate(handle, size, more)
-        finally:
-            os.close(handle)
+    """Tell whether a write failed for lack of space: disk, quota, or largest size of a file."""
+    return error.errno in _NO_SPACE
 
 
 def truncate(path: Path, size: int) -> None:
@@ -82,25 +78,42 @@ def truncate(path: Path, size: int) -> None:
 
 
 def storage_error(path: Path, error: Exception) -> RunError:
-    """Say what stopped a write to `path`: full, or else; HDF5 tells its `errno` only in its words."""
+    """Convert an error of a write to `path`. HDF5 states its `errno` only in its text."""
     number = getattr(error, "errno", None)
     words = str(error).replace("\n", " ")
     if isinstance(error, FileExistsError):
-        return RunExistsError(f"{path} exists already and is not overwritten. Choose another name")
-    if number in _NO_ROOM or any(f"errno = {code}," in words for code in _NO_ROOM):
-        return DiskFullError(f"{path}: the disk or its quota is full. Free some space or take another disk")
-    reason = getattr(error, "strerror", None) or words
-    return WriteError(f"{path}: cannot be written ({reason}). Check the folder, its rights and its disk")
+        return RunExistsError("{path} exists already and is not overwritten. Choose another name", path=path)
+    if number in _NO_SPACE or any(f"errno = {code}," in words for code in _NO_SPACE):
+        return DiskFullError(
+            "{path}: the disk or its quota is full. Free some space or take another disk", path=path
+        )
+    return WriteError(
+        "{path}: cannot be written ({reason}). Check the folder, its rights and its disk",
+        path=path,
+        reason=getattr(error, "strerror", None) or words,
+    )
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder with its parents; one that exists stays. Raises DiskFullError, WriteError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise WriteError(
+            "{folder} is a file and cannot be written into. Choose a folder", folder=folder
+        ) from None
+    except OSError as error:
+        raise storage_error(folder, error) from None
 
 
 def sync_file(path: Path) -> None:
-    """Make the contents of a file last through a power cut."""
+    """Bring the contents of a file to disk, so that they last through a power cut."""
     with path.open("r+b") as file:
         os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Make new names in a folder last through a power cut, where the system can.
+    """Bring new names in a folder to disk, where the system can.
 
     Some network shares cannot, nor can a folder that this user may write to but not read.
     """
@@ -119,29 +132,29 @@ def sync_folder(folder: Path) -> None:
 
 @contextmanager
 def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
-    """Yield a path beside `path` to write to; what stands there at the end becomes `path`.
+    """Yield a temporary path beside `path`; the file written there becomes `path` at the end.
 
     Raises
     ------
     RunExistsError
-        `path` exists, and `replace` was not asked for.
+        `path` exists, and `replace` is False.
     DiskFullError, WriteError
-        Nothing is left behind then.
+        Nothing is left behind.
     """
-    made = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
     claimed = False
     try:
         if not replace:
             path.open("x").close()  # nobody else can take the name meanwhile
             claimed = True
-        yield made
-        sync_file(made)
-        made.replace(path)
+        yield temporary
+        sync_file(temporary)
+        temporary.replace(path)
         claimed = False
         sync_folder(path.parent)
     except OSError as error:
         raise storage_error(path, error) from None
     finally:
-        made.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         if claimed:
             path.unlink(missing_ok=True)

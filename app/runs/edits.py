@@ -9,6 +9,7 @@ import h5py
 import msgspec
 
 from app.runs.errors import MetadataError, UnsuitableRunError
+from app.runs.fields import encode_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import (
     EDITABLE,
@@ -20,7 +21,6 @@ from app.runs.metadata_io import (
     read_recorded_metadata,
 )
 from app.runs.rewrite import rewrite
-from app.runs.schema import encode_text
 from config.schema import Stand
 
 
@@ -65,7 +65,7 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Ch
         changes = read_changes(file)
         number = _last_undoable(changes, fields)
         if number is None:
-            raise UnsuitableRunError(f"{path}: there is no edit to undo. It is as it was recorded")
+            raise UnsuitableRunError("{path}: there is no edit to undo. It is as it was recorded", path=path)
         before = apply_changes(read_recorded_metadata(file), changes[:number])
         since = {name for i in _undoable(changes) if i > number for name in changes[i].fields}
         old = {name: getattr(before, name) for name in changes[number].fields if name not in since}
@@ -104,7 +104,7 @@ def _append(path: Path, make: Callable[[h5py.File], Change]) -> Change:
         try:
             apply_change(read_metadata(file), change)
         except ValueError as error:
-            raise MetadataError(f"{path}: {error}") from None
+            raise MetadataError("{path}: {error}", path=path, error=error) from None
         append_change(file, change)
         made.append(change)
 

@@ -1,73 +1,109 @@
-"""What can go wrong with a run file. Each message names the file, the fault and the remedy in one line."""
+"""Errors of run files. Each message names the file, the fault and the remedy in one line."""
+
+from pathlib import Path
+
+from messages.message import Message, MessageError, message
 
 
-class RunError(Exception):
+class RunError(MessageError):
     """Root of the run file errors."""
 
     stored_samples: int = 0
-    """Rows that the file holds all the same, where its writer has failed."""
-
-
-def internal_error_text(error: Exception) -> str:
-    """Say in one line that the program itself failed."""
-    said = " ".join(str(error).split())
-    return (
-        f"Slipstand itself failed ({type(error).__name__}: {said}). "
-        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints"
-    )
+    """Rows that the file holds although its writer failed."""
 
 
 class RunNotFoundError(RunError):
-    """There is no such file, or it cannot be opened by this user."""
+    """There is no such file, or this user cannot open it."""
 
 
 class NotARunError(RunError):
-    """A file, but not a run of this program: other bytes, or HDF5 of another kind."""
+    """The file is not a run of this program: other bytes, or HDF5 of another kind."""
 
 
 class BeingRecordedError(RunError):
-    """The run is still being written; live samples come from the engine, not from the file."""
+    """The run is still being written. Live samples come from the engine, not from the file."""
 
 
 class DamagedRunError(RunError):
-    """A run file whose contents contradict themselves, cannot be read, or want too much memory or time."""
+    """A run file contradicts itself, cannot be read, or needs too much memory or time."""
 
 
 class ValidationTimeoutError(RunError):
-    """A file that nobody came to look over in time, since computer or disk were busy; it may be sound."""
+    """The validator process gave no answer in time. The file may be sound."""
 
 
 class RunExistsError(RunError):
-    """The file to be written exists already; nothing is ever overwritten."""
+    """The file to be written exists. Nothing is overwritten."""
 
 
 class MetadataError(RunError, ValueError):
-    """A fact about a run that cannot be stored as it stands."""
+    """A value of the metadata cannot be stored."""
 
 
 class DiskFullError(RunError):
-    """No space is left for the run; what was recorded until then is in the file."""
+    """The disk or a quota is full. The samples stored before are in the file."""
 
 
 class WriteError(RunError):
-    """The run could not be written for another reason than space."""
+    """The run could not be written for a reason other than space."""
 
 
 class WriterBehindError(WriteError):
-    """The writer cannot keep up; the run can still be closed."""
+    """The writer cannot keep up. The run can still be closed."""
 
 
 class UnsuitableRunError(RunError):
-    """A good run that does not hold what was asked of it."""
+    """A valid run that does not hold what the caller needs."""
 
 
 class ImportFileError(RunError):
-    """A foreign record that cannot be read as told: names file, row or column, and remedy."""
+    """A foreign record cannot be read: names file, row or column, and remedy."""
 
 
 class ExtraMissingError(RunError):
-    """A format whose library is not installed."""
+    """The library of a file format is not installed."""
 
 
 class ClusterError(RunError):
-    """A cluster that cannot do the work: nobody answers there, or its workers are not fit for it."""
+    """The Dask scheduler does not answer, or its workers cannot do the work."""
+
+
+def no_such_run(path: Path) -> RunNotFoundError:
+    """Error for a path without a file."""
+    return RunNotFoundError("{path}: there is no such file. Give the path of a run", path=path)
+
+
+def unreadable(path: Path, error: OSError) -> RunNotFoundError:
+    """Error for a file that the operating system refuses to open."""
+    return RunNotFoundError(
+        "{path}: cannot be read ({reason}). Check its rights", path=path, reason=error.strerror
+    )
+
+
+def being_recorded(path: Path | str) -> BeingRecordedError:
+    """Error for a run whose writer is still at work."""
+    return BeingRecordedError("{path} is being recorded. Wait until the run has ended", path=path)
+
+
+def damaged(path: Path | str, fault: Exception | Message | str) -> DamagedRunError:
+    """Error for a damaged file; the text of an exception of HDF5 is cut to one line of 160 characters."""
+    if isinstance(fault, Exception):
+        fault = one_line(fault)[:160]
+    return DamagedRunError(
+        "{path} is damaged ({fault}). Restore a good copy, or recover it", path=path, fault=fault
+    )
+
+
+def one_line(error: BaseException) -> str:
+    """Text of an exception without line breaks."""
+    return " ".join(str(error).split())
+
+
+def internal_error(error: Exception) -> Message:
+    """Message for a fault of the program itself."""
+    return message(
+        "Slipstand itself failed ({kind}: {text}). "
+        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints",
+        kind=type(error).__name__,
+        text=one_line(error),
+    )

@@ -196,8 +196,8 @@ def list_runs(
     RunNotFoundError
         There is no such folder.
     """
-    if folder is not None and not folder.is_dir():
-        raise RunNotFoundError(f"{folder}: there is no such folder. Give a folder with runs")
+    if folder is not None:
+        check_folder_exists(folder)
     folder = (folder or recordings_directory()).absolute()
     found = _summaries(folder, progress or (lambda _done, _all: None))
     return sorted(filter(wanted.matches, found) if wanted else found, key=_order)
@@ -215,8 +215,16 @@ def resolve_run_files(given: Iterable[Path]) -> list[Path]:
     found = [file for path in paths for file in (sorted(find_run_files(path)) if path.is_dir() else [path])]
     if not found:
         places = ", ".join(map(str, paths)) or "nothing"
-        raise RunNotFoundError(f"{places}: there are no runs. Give run files or a folder of runs")
+        raise RunNotFoundError(
+            "{places}: there are no runs. Give run files or a folder of runs", places=places
+        )
     return list(dict.fromkeys(found))
+
+
+def check_folder_exists(folder: Path) -> None:
+    """Raise RunNotFoundError unless there is such a folder."""
+    if not folder.is_dir():
+        raise RunNotFoundError("{folder}: there is no such folder. Give a folder with runs", folder=folder)
 
 
 def find_run_files(folder: Path) -> Iterator[Path]:

@@ -57,18 +57,25 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise MetadataError(
-                    f"condition {name} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out"
+                    "condition {name} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
+                    name=name,
+                    value=value,
+                    low=low,
+                    high=high,
                 )
         texts = {name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other
         for name, text in texts.items():
             if len(text) > _TEXT_MAX or not text.isprintable():
                 raise MetadataError(
-                    f"condition {name} = {text[:40]!r} is not a line of text of up to {_TEXT_MAX} characters"
+                    "condition {name} = {text!r} is not a line of text of up to {text_max} characters",
+                    name=name,
+                    text=text[:40],
+                    text_max=_TEXT_MAX,
                 )
         for name in self.other:
             if not is_field_name(name) or name in Conditions.__struct_fields__:
                 raise MetadataError(
-                    f"condition {name!r} is not a usable name. Use letters, digits and underscores"
+                    "condition {name!r} is not a usable name. Use letters, digits and underscores", name=name
                 )
 
     def as_text(self) -> str:
@@ -106,7 +113,7 @@ def _typed(name: str, text: str) -> str | float | int:
         return int(text) if name == "run_in_number" else text
     except ValueError:
         raise MetadataError(
-            f"condition {name} = {text!r} is not a number. Give digits, or leave it out"
+            "condition {name} = {text!r} is not a number. Give digits, or leave it out", name=name, text=text
         ) from None
 
 
@@ -149,27 +156,40 @@ class RunMetadata(_FrozenStruct, frozen=True):
 
     def __post_init__(self) -> None:
         if self.start_time.tzinfo is None:
-            raise MetadataError(f"start_time {self.start_time.isoformat()} has no time zone. Give one")
+            raise MetadataError(
+                "start_time {isoformat} has no time zone. Give one", isoformat=self.start_time.isoformat()
+            )
         if not _YEARS[0] <= self.start_time.year <= _YEARS[1]:
-            raise MetadataError(f"start_time {self.start_time.isoformat()} cannot be. Set the clock")
+            raise MetadataError(
+                "start_time {isoformat} cannot be. Set the clock", isoformat=self.start_time.isoformat()
+            )
         if any(c in _NOT_IN_NAMES or not c.isprintable() for c in self.series or ""):
             raise MetadataError(
-                f"series {self.series!r} cannot be part of a file's name. Use letters and digits"
+                "series {series!r} cannot be part of a file's name. Use letters and digits",
+                series=self.series,
             )
         for name in ("table_mass_kg", "plate_mass_kg", "pullback_m", "rate_hz"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise MetadataError(f"{name} = {value!r} must be a finite number above 0")
+                raise MetadataError(
+                    "{name} = {value!r} must be a finite number above 0", name=name, value=value
+                )
         if len(self.excluded) > _TEXT_MAX or not self.excluded.isprintable():
             raise MetadataError(
-                f"excluded = {self.excluded[:40]!r} is not a line of text of up to {_TEXT_MAX} characters"
+                "excluded = {excluded!r} is not a line of text of up to {text_max} characters",
+                excluded=self.excluded[:40],
+                text_max=_TEXT_MAX,
             )
         if self.quantity not in QUANTITY_UNITS:
-            raise MetadataError(f"quantity {self.quantity!r} is not known. Use {', '.join(QUANTITY_UNITS)}")
+            raise MetadataError(
+                "quantity {quantity!r} is not known. Use {quantity_units}",
+                quantity=self.quantity,
+                quantity_units=", ".join(QUANTITY_UNITS),
+            )
         for name in self.truth:
             if not is_field_name(name):
                 raise MetadataError(
-                    f"truth {name!r} is not a usable name. Use letters, digits and underscores"
+                    "truth {name!r} is not a usable name. Use letters, digits and underscores", name=name
                 )
 
     @property

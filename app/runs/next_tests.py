@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import msgspec
 
-from app.runs.disk import atomic_write, storage_error
+from app.runs.disk import atomic_write, make_folder
 from app.runs.errors import MetadataError
 from app.runs.metadata import Conditions
 
@@ -56,16 +56,13 @@ def load_next_tests(folder: Path) -> NextTests:
         return NextTests()
     except (OSError, msgspec.MsgspecError, ValueError) as error:
         raise MetadataError(
-            f"{path}: cannot be used ({error}). Mend it, or put it aside to plan anew"
+            "{path}: cannot be used ({error}). Mend it, or put it aside to plan anew", path=path, error=error
         ) from None
 
 
 def save_next_tests(folder: Path, tests: NextTests) -> None:
     """Keep it, all at once or not at all. Raises DiskFullError, WriteError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise storage_error(folder, error) from None
+    make_folder(folder)
     with atomic_write(folder / FILE_NAME, replace=True) as made:
         made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
 

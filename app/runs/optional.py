@@ -13,5 +13,7 @@ def import_optional(module: str, for_what: str) -> Any:
     except ImportError:
         package = module.partition(".")[0]
         raise ExtraMissingError(
-            f"{for_what} needs {package}, which is not installed. Install it: pip install {package}"
+            "{for_what} needs {package}, which is not installed. Install it: pip install {package}",
+            for_what=for_what,
+            package=package,
         ) from None

@@ -1,4 +1,4 @@
-"""The bytes as they came: from a journal into a run file, and out of it."""
+"""Raw bytes of a run, as received: copied from the journal into the run file, and read back."""
 
 import zlib
 from collections.abc import Iterator
@@ -9,17 +9,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs import schema as names
-from app.runs.journal import (
-    JournalRecord,
-    JournalSpan,
-    RecordKind,
-    UnreadableJournalError,
-    read_journal,
-)
-from app.runs.validation import is_finished
+from app.runs.columns import is_finished
+from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJournalError, read_journal
+from app.runs.schema import WIRE_ARRIVAL, WIRE_COLUMNS, WIRE_DATA, WIRE_END
 
-_AT_ONCE_BYTES = 1 << 20
+_BATCH_BYTES = 1 << 20
+"""Bytes copied at once: one compressed write of HDF5 a megabyte, whatever the length of a run."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,7 +26,7 @@ class RawBytes:
     end: NDArray[np.uint64]
 
     def chunks(self) -> Iterator[tuple[bytes, int]]:
-        """Bytes and arrival time (ns) of each read, in order: what a decoder is fed with."""
+        """Bytes and arrival time (ns) of each read, in order, as a decoder takes them."""
         first = 0
         for end, arrival_ns in zip(self.end.tolist(), self.arrival_ns.tolist(), strict=True):
             yield self.data[first:end].tobytes(), arrival_ns
@@ -39,7 +34,7 @@ class RawBytes:
 
 
 def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
-    """Append the wire records of a journal to an open run file, about 1 MiB at a time.
+    """Append the raw bytes of a journal to an open run file.
 
     Returns
     -------
@@ -49,7 +44,7 @@ def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
     Raises
     ------
     UnreadableJournalError
-        The file then holds no wire bytes.
+        The file then holds no raw bytes.
     """
     checksum = 0
     try:
@@ -58,17 +53,17 @@ def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
             checksum = zlib.crc32(data, checksum)
             _extend(file, data, records)
     except UnreadableJournalError:
-        for path in (names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END):
-            file[path].resize((0,))
+        for column in WIRE_COLUMNS:
+            file[column.path].resize((0,))
         raise
     return checksum
 
 
 def read_raw_bytes(file: h5py.File) -> RawBytes:
-    """All received bytes of a run file; none of a run that was never closed, whose journal has them."""
+    """All received bytes of a run file; none of a run that was never closed, whose journal holds them."""
     if not is_finished(file):
         return RawBytes(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.uint64))
-    return RawBytes(file[names.WIRE_DATA][:], file[names.WIRE_ARRIVAL][:], file[names.WIRE_END][:])
+    return RawBytes(*(file[column.path][:] for column in WIRE_COLUMNS))
 
 
 def _records(journal: JournalSpan) -> Iterator[JournalRecord]:
@@ -86,7 +81,7 @@ def _batches(records: Iterator[JournalRecord]) -> Iterator[list[JournalRecord]]:
     for record in records:
         batch.append(record)
         size += len(record.data)
-        if size >= _AT_ONCE_BYTES:
+        if size >= _BATCH_BYTES:
             yield batch
             batch, size = [], 0
     if batch:
@@ -95,10 +90,10 @@ def _batches(records: Iterator[JournalRecord]) -> Iterator[list[JournalRecord]]:
 
 def _extend(file: h5py.File, data: bytes, records: list[JournalRecord]) -> None:
     lengths = np.array([len(record.data) for record in records], np.uint64)
-    first = len(file[names.WIRE_DATA])
-    _append(file[names.WIRE_DATA], np.frombuffer(data, np.uint8))
-    _append(file[names.WIRE_ARRIVAL], np.array([record.arrival_ns for record in records], np.int64))
-    _append(file[names.WIRE_END], np.uint64(first) + np.cumsum(lengths))
+    first = len(file[WIRE_DATA.path])
+    _append(file[WIRE_DATA.path], np.frombuffer(data, np.uint8))
+    _append(file[WIRE_ARRIVAL.path], np.array([record.arrival_ns for record in records], np.int64))
+    _append(file[WIRE_END.path], np.uint64(first) + np.cumsum(lengths))
 
 
 def _append(dataset: h5py.Dataset, values: NDArray[np.generic]) -> None:

@@ -1,4 +1,4 @@
-"""Changes a closed run without ever opening it for writing: copy, change the copy, check it, replace."""
+"""Change a closed run without opening it for writing: copy, change the copy, verify it, replace."""
 
 import datetime
 import os
@@ -9,15 +9,17 @@ from pathlib import Path
 
 import h5py
 
-from app.runs import schema as names
-from app.runs.checksums import check_column, checksum
+from app.runs import schema
+from app.runs.columns import check_column, checksum, is_finished, sample_paths
 from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder
-from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
+from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
-from app.runs.validation import count_paths, is_finished, signal_paths, validate_file
+from app.runs.validation import validate_file
 
 _ROOM_BYTES = 1 << 22
+"""Beyond the size of the file: a long analysis with its tables needs less than 1 MB."""
 _REPLACE_S = 5.0
+"""Windows refuses to replace a file while it is read; a whole run is read in less."""
 
 
 def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
@@ -26,9 +28,9 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     Parameters
     ----------
     path
-        A run that has been opened, and so examined, before.
+        A run that was opened, and so validated, before.
     change
-        Adds to the copy. What was measured is compared afterwards, and must be the same.
+        Adds to the copy. The samples and raw bytes are compared afterwards and must be the same.
 
     Raises
     ------
@@ -36,22 +38,22 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     UnsuitableRunError
         The run was never closed, or is being changed by another program.
     DamagedRunError
-        What was measured is not what was stored when it was closed.
+        Samples or raw bytes differ from those that were stored when the run was closed.
     DiskFullError, WriteError
-        The run is as it was before.
+        The run is unchanged.
     """
     path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):
-        raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended")
+        raise being_recorded(path)
     copy = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with editing_lock(path):
             _make_copy(path, copy, change)
             replace_run(copy, path)
     except LockHeldError:
-        raise UnsuitableRunError(f"{path} is being changed by another program. Try again") from None
+        raise UnsuitableRunError("{path} is being changed by another program. Try again", path=path) from None
     except FileNotFoundError:
-        raise RunNotFoundError(f"{path}: there is no such file. Give the path of a run") from None
+        raise no_such_run(path) from None
     except (OSError, RuntimeError) as error:
         raise storage_error(path, error) from None
     finally:
@@ -64,7 +66,7 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
             raise UnsuitableRunError(
-                f"{path} was never closed, so it takes no results yet. Run `slipstand recover`"
+                "{path} was never closed, so it takes no results yet. Run `slipstand recover`", path=path
             )
         before = _measured(file)
         for name, value in before.items():
@@ -75,25 +77,25 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
         validate_file(file)
         if _measured(file) != before:
             raise WriteError(
-                f"{path}: its copy does not read back as written. Check the disk; the run is unharmed"
+                "{path}: its copy does not read back as written. Check the disk; the run is unharmed",
+                path=path,
             )
     sync_file(copy)
 
 
 def _measured(file: h5py.File) -> dict[str, int]:
-    """Checksum of everything that may never change."""
-    columns = [names.TIME, names.STATUS, *signal_paths(file), *count_paths(file)]
-    wire = [names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END]
-    return {path: checksum(file[path]) for path in (*columns, *wire)}
+    """Checksums of everything that never changes."""
+    wire = [column.path for column in schema.WIRE_COLUMNS]
+    return {path: checksum(file[path]) for path in (*sample_paths(file), *wire)}
 
 
 def editing_lock(path: Path) -> FileLock:
-    """Lock that is held by whoever replaces a closed run."""
+    """Lock that the process holds which replaces a closed run."""
     return FileLock(path.with_name(f".{path.name}.editing"))
 
 
 def replace_run(copy: Path, path: Path) -> None:
-    """Put the copy in place; Windows refuses while somebody reads the run, so it is tried for a while."""
+    """Put the copy in place, with retries on Windows while somebody reads the run."""
     deadline = time.monotonic() + _REPLACE_S
     while True:
         try:

@@ -14,12 +14,12 @@ import numpy as np
 from analysis.identification import Identification
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.runs import schema as names
+from app.runs import schema
 from app.runs.analysis_json import budget_documents, warning_documents
+from app.runs.fields import make_group, read_number, read_text, write_number, write_text
 from app.runs.metadata import RunMetadata
-from app.runs.metadata_io import make_group, read_metadata
+from app.runs.metadata_io import read_metadata
 from app.runs.rewrite import rewrite
-from app.runs.schema import read_number, read_text, write_number, write_text
 from app.version import __version__
 from config.schema import Gauge
 from drivers.samples import Losses
@@ -120,16 +120,16 @@ def read_analyses(file: h5py.File) -> tuple[SavedAnalysis, ...]:
 
 
 def _numbers(file: h5py.File) -> list[int]:
-    found = [name.removeprefix(names.ANALYSIS_PREFIX) for name in file[names.ENTRY] if _is_analysis(name)]
+    found = [name.removeprefix(schema.ANALYSIS_PREFIX) for name in file[schema.ENTRY] if _is_analysis(name)]
     return sorted(int(number) for number in found)
 
 
 def _is_analysis(name: str) -> bool:
-    return name.startswith(names.ANALYSIS_PREFIX) and name.removeprefix(names.ANALYSIS_PREFIX).isdigit()
+    return name.startswith(schema.ANALYSIS_PREFIX) and name.removeprefix(schema.ANALYSIS_PREFIX).isdigit()
 
 
 def _read(file: h5py.File, number: int) -> SavedAnalysis:
-    group = file[f"{names.ENTRY}/{names.ANALYSIS_PREFIX}{number:03d}"]
+    group = file[f"{schema.ENTRY}/{schema.ANALYSIS_PREFIX}{number:03d}"]
     return SavedAnalysis(
         number=number,
         date=datetime.datetime.fromisoformat(read_text(group, "date")),
@@ -142,7 +142,7 @@ def _read(file: h5py.File, number: int) -> SavedAnalysis:
 
 
 def _write(file: h5py.File, number: int, document: Document, inputs: str, settings: dict[str, Any]) -> None:
-    group = make_group(file[names.ENTRY], f"{names.ANALYSIS_PREFIX}{number:03d}", "NXprocess")
+    group = make_group(file[schema.ENTRY], f"{schema.ANALYSIS_PREFIX}{number:03d}", "NXprocess")
     write_text(group, "program", "slipstand")
     write_text(group, "version", __version__)
     write_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
@@ -237,7 +237,7 @@ def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses
     """
     metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}
-    clock = [read_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
+    clock = [read_number(file, path) for path in (schema.CLOCK_SCALE, schema.CLOCK_SCALE_UNCERTAINTY)]
     facts = [*_facts(metadata.replace(**given) if given else metadata), *clock]
     return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
 

@@ -1,42 +1,50 @@
-"""Names, types and small habits of the run file, in one place (people's version: recordings/README.md)."""
+"""The run file declared once: groups, columns and metadata fields of HDF5 with type, unit and meaning.
 
+Template, writer, reader, validation, recovery and docs/reference/run-file.md all read these tables. Paths
+are relative to the root of the file, except those of `GAUGE_FIELDS` and `CHECK_FIELDS`. The attribute of a
+field is its dotted path in `RunMetadata`, `EndMetadata`, `Gauge` or `GaugeCheck`; a field without one is
+written by the program itself.
+"""
+
+import enum
+from dataclasses import dataclass
 from typing import Any, Final
-
-import h5py
-import numpy as np
-
-from app.runs.errors import DamagedRunError, MetadataError
 
 SCHEMA: Final = 1
 SUFFIX: Final = ".h5"
+FIRST_VERSION: Final = "0.1.0"
 
 ENTRY: Final = "entry"
 RUN: Final = "entry/run"
-NOTES: Final = "entry/run/notes"
+NOTE: Final = "entry/run/notes/note_001"
 HISTORY: Final = "entry/run/history"
+OTHER_CONDITIONS: Final = "entry/run/conditions"
+CHECKSUMS: Final = "entry/run/crc32"
 USER: Final = "entry/user"
 SAMPLE: Final = "entry/sample"
 MOTION: Final = "entry/motion"
-INSTRUMENT: Final = "entry/instrument"
 GAUGES: Final = ("entry/instrument/gauge_table", "entry/instrument/gauge_plate")
+LAST_CHECK: Final = "last_check"
 STAND: Final = "entry/stand"
 ACQUISITION: Final = "entry/acquisition"
 LOSSES: Final = "entry/acquisition/losses"
 WIRE: Final = "entry/wire"
-CHECKSUMS: Final = "entry/run/crc32"
 EVENTS: Final = "entry/events"
 TRUTH: Final = "entry/truth"
 ANALYSIS_PREFIX: Final = "analysis_"
 
+CHUNK: Final = 8192
+"""Rows a chunk: 64 KiB of float64, with which an hour at 2 kHz is read fastest."""
+
 GROUPS: Final = {
     ENTRY: "NXentry",
     RUN: "NXcollection",
-    NOTES: "NXcollection",
+    f"{RUN}/notes": "NXcollection",
     HISTORY: "NXcollection",
     USER: "NXuser",
     SAMPLE: "NXsample",
     MOTION: "NXdata",
-    INSTRUMENT: "NXinstrument",
+    "entry/instrument": "NXinstrument",
     GAUGES[0]: "NXdetector",
     GAUGES[1]: "NXdetector",
     STAND: "NXcollection",
@@ -46,126 +54,328 @@ GROUPS: Final = {
     EVENTS: "NXcollection",
     CHECKSUMS: "NXcollection",
 }
-"""Groups of every run, made before the first sample: late ones can be lost to a `kill -9` in a flush."""
+"""NeXus classes of the groups that every run has. They are made before the first sample: a `kill -9` inside a
+flush can lose groups that are made later. A run of one gauge lacks the group of gauge 2."""
+
+
+class Kind(enum.Enum):
+    """How a field is stored."""
+
+    TEXT = "text"
+    NUMBER = "float64"
+    INTEGER = "int64"
+    VECTOR = "float64 (n,)"
+    DATE = "text, ISO 8601"
+    JSON = "text, JSON"
+    PASS_FAIL = "text, passed or failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One metadata field.
+
+    Attributes
+    ----------
+    path : str
+        Where it is stored.
+    description : str
+        One line for people.
+    attribute : str
+        Dotted path of the value in memory; "" where the program writes the field by itself.
+    kind : Kind
+    unit : str
+        Attribute `units`; `{unit}` stands for the unit of the readings.
+    default : object
+        Value of a field that the file does not hold or that is NaN.
+    required : bool
+        A file without the field is damaged.
+    reserved_bytes : int
+        Room that the template makes for a text which is known at the end only.
+    since : str
+        Version of the program that wrote the field first.
+    """
+
+    path: str
+    description: str
+    attribute: str = ""
+    kind: Kind = Kind.NUMBER
+    unit: str = ""
+    default: Any = None
+    required: bool = False
+    reserved_bytes: int = 0
+    since: str = FIRST_VERSION
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One dataset that grows with the run.
+
+    Attributes
+    ----------
+    path, description : str
+    dtype : str
+    attributes : dict
+        Attributes of HDF5.
+    fill : float
+        Value of rows that are not written.
+    chunk : int
+        Rows a chunk; 0 is `CHUNK`.
+    compressed : bool
+        Only datasets that are written when the run is closed are: a `kill -9` can make a compressed dataset
+        that grows unreadable.
+    """
+
+    path: str
+    description: str
+    dtype: str
+    attributes: dict[str, str]
+    fill: float = 0.0
+    chunk: int = 0
+    compressed: bool = False
+
+
+def _text(path: str, description: str, attribute: str = "", **more: Any) -> Field:
+    return Field(path, description, attribute, Kind.TEXT, **{"default": "", **more})
+
 
 TIME: Final = f"{MOTION}/time"
 STATUS: Final = f"{MOTION}/status"
 STORED: Final = f"{RUN}/samples_stored"
-"""Rows known to be whole on disk; written after the flush that put them there, so never too large."""
 ENDED: Final = f"{RUN}/ended"
 END_TIME: Final = f"{ENTRY}/end_time"
-WIRE_DATA: Final = f"{WIRE}/data"
-WIRE_ARRIVAL: Final = f"{WIRE}/arrival_time"
-WIRE_END: Final = f"{WIRE}/chunk_end"
-
-CHUNK: Final = 8192
-"""Samples a chunk: 64 KiB of float64, which an hour at 2 kHz reads fastest with."""
-
-MESSAGE: Final = f"{RUN}/message"
-DWELL: Final = f"{RUN}/dwell_before_release"
-ZERO: Final = f"{RUN}/zero_before_pull"
-RELATIVE_ZERO: Final = f"{RUN}/relative_zero_before_pull"
-ZERO_OF_CALIBRATION: Final = "that of the calibration; no tare is subtracted"
-ZERO_OF_SOURCE: Final = "that of the source; no tare is subtracted"
-"""What the attribute `zero` of the readings says: a run with counts was calibrated here."""
-HELD: Final = f"{RUN}/held_displacement"
+IDENTIFIER: Final = f"{ENTRY}/entry_identifier_uuid"
+PROGRAM: Final = f"{ENTRY}/program_name"
+CONTACT: Final = f"{STAND}/contact"
+DEVIATION: Final = "deviation"
 CLOCK_SCALE: Final = f"{ACQUISITION}/clock_scale"
 CLOCK_SCALE_UNCERTAINTY: Final = f"{ACQUISITION}/clock_scale_standard_uncertainty"
-SKEW: Final = f"{ACQUISITION}/skew"
-SKEW_UNCERTAINTY: Final = f"{ACQUISITION}/skew_standard_uncertainty"
+RELEASE: Final = f"{EVENTS}/release_s"
 
-TEXT_ROOM: Final = {END_TIME: 40, ENDED: 32, MESSAGE: 2000}
-"""Bytes of each text that is only known at the end."""
+TIME_COLUMN: Final = Column(
+    TIME,
+    "device's or nominal clock, 0 at the first stored sample",
+    "float64",
+    {"units": "s", "long_name": "time since the first stored sample"},
+    fill=float("nan"),
+)
+STATUS_COLUMN: Final = Column(
+    STATUS,
+    "flags of `drivers.samples.SampleStatus`",
+    "uint8",
+    {
+        "long_name": "flags: 1 missing, 2 damaged, 4 overload of the table gauge, 8 of the other,"
+        " 16 only the table gauge missing, 32 only the other"
+    },
+    fill=1,  # SampleStatus.MISSING
+)
+WIRE_DATA: Final = Column(
+    f"{WIRE}/data",
+    "bytes as they came, all chunks joined",
+    "uint8",
+    {"long_name": "bytes as they came, chunks joined"},
+    chunk=1 << 18,
+    compressed=True,
+)
+WIRE_ARRIVAL: Final = Column(
+    f"{WIRE}/arrival_time",
+    "monotonic time of the host after each read",
+    "int64",
+    {"units": "ns", "long_name": "monotonic time of the host after the read"},
+    chunk=4096,
+    compressed=True,
+)
+WIRE_END: Final = Column(
+    f"{WIRE}/chunk_end",
+    "index into `data` behind the last byte of each chunk",
+    "uint64",
+    {"long_name": "index into data behind the last byte of each chunk"},
+    chunk=4096,
+    compressed=True,
+)
+WIRE_COLUMNS: Final = (WIRE_DATA, WIRE_ARRIVAL, WIRE_END)
+
+ZERO_OF_CALIBRATION: Final = "that of the calibration; no tare is subtracted"
+ZERO_OF_SOURCE: Final = "that of the source; no tare is subtracted"
+"""Attribute `zero` of the readings. A run with counts was calibrated by this program."""
+
+RUN_FIELDS: Final = (
+    _text(f"{ENTRY}/title", "title", "title"),
+    Field(f"{ENTRY}/start_time", "time of the first stored sample", "start_time", Kind.DATE, required=True),
+    _text(f"{USER}/name", "operator", "operator"),
+    _text(f"{RUN}/series", "series code", "series", default=None),
+    _text(f"{RUN}/source", "origin of a run that was not recorded by this program", "source"),
+    _text(f"{RUN}/excluded", "reason why the run does not count in a campaign", "excluded"),
+    _text(f"{NOTE}/description", "note", "note"),
+    Field(f"{SAMPLE}/temperature", "temperature", "conditions.temperature_c", unit="degC"),
+    Field(f"{SAMPLE}/humidity", "relative humidity", "conditions.humidity_percent", unit="%"),
+    _text(f"{RUN}/plate_id", "plate", "conditions.plate_id"),
+    _text(f"{RUN}/contact_id", "contact", "conditions.contact_id"),
+    _text(f"{RUN}/surface_preparation", "surface preparation", "conditions.surface_preparation"),
+    Field(f"{RUN}/run_in_number", "run-in number", "conditions.run_in_number", Kind.INTEGER),
+    Field(
+        f"{STAND}/configuration", "the stand's settings at the time of the run", "stand", Kind.JSON,
+        required=True,
+    ),
+    _text(f"{STAND}/name", "name of the stand", "stand.name"),
+    Field(f"{STAND}/table_mass", "mass of the table", "table_mass_kg", unit="kg", required=True),
+    Field(
+        f"{STAND}/plate_mass", "mass of the plate with its added mass", "plate_mass_kg", unit="kg",
+        required=True,
+    ),
+    Field(f"{STAND}/pullback", "nominal pullback", "pullback_m", unit="m"),
+    Field(
+        f"{STAND}/table_mass_standard_uncertainty", "standard uncertainty of the table's mass",
+        "stand.table_mass_standard_uncertainty_kg", unit="kg", required=True,
+    ),
+    Field(
+        f"{STAND}/plate_mass_standard_uncertainty", "standard uncertainty of the plate's mass",
+        "stand.plate_mass_standard_uncertainty_kg", unit="kg", required=True,
+    ),
+    Field(f"{STAND}/gravity", "gravity", "stand.gravity_m_per_s2", unit="m/s^2", required=True),
+    Field(
+        f"{STAND}/gravity_standard_uncertainty", "standard uncertainty of gravity",
+        "stand.gravity_standard_uncertainty_m_per_s2", unit="m/s^2", required=True,
+    ),
+    _text(f"{ACQUISITION}/protocol", "protocol of the device", "device.protocol"),
+    _text(f"{ACQUISITION}/device", "name of the device", "device.name"),
+    _text(f"{ACQUISITION}/firmware", "firmware of the device", "device.firmware"),
+    _text(f"{ACQUISITION}/serial_number", "serial number of the device", "device.serial_number"),
+    Field(
+        f"{ACQUISITION}/device_settings", "settings that the device reported", "device.settings", Kind.JSON,
+        default={},
+    ),
+    Field(
+        f"{ACQUISITION}/configuration", "settings of the device in the calibration file", "gauges.device",
+        Kind.JSON, default={},
+    ),
+    _text(f"{ACQUISITION}/port", "address of the port and its USB identity", "port"),
+    _text(f"{ACQUISITION}/host", "name of the computer", "host"),
+    Field(f"{ACQUISITION}/rate_nominal", "nominal sampling rate", "rate_hz", unit="Hz"),
+)  # fmt: skip
+"""Fields of `app.runs.metadata.RunMetadata`, written before the first sample. An empty text and an unknown
+number are left out."""
+
+GAUGE_FIELDS: Final = (
+    _text("serial_number", "serial number of the gauge", "serial_number"),
+    Field("calibration_date", "day of the calibration", "date", Kind.DATE),
+    Field("calibration/gain", "gain", "gain_m_per_count", unit="{unit}/count", required=True),
+    Field("calibration/zero", "count at zero displacement", "zero_count", unit="count", required=True),
+    Field(
+        "calibration/gain_relative_standard_uncertainty", "relative standard uncertainty of the gain",
+        "gain_relative_standard_uncertainty", unit="1",
+    ),
+    Field(
+        "calibration/zero_standard_uncertainty", "standard uncertainty of the zero",
+        "zero_standard_uncertainty_m", unit="{unit}",
+    ),
+    Field(
+        "calibration/nonlinearity", "largest deviation from line or polynomial", "nonlinearity_m",
+        unit="{unit}",
+    ),
+    Field("calibration/hysteresis", "hysteresis", "hysteresis_m", unit="{unit}"),
+    Field("calibration/repeatability", "repeatability", "repeatability_m", unit="{unit}"),
+    Field("calibration/delay", "delay of the reading", "delay_s", unit="s", required=True),
+    Field(
+        "calibration/delay_standard_uncertainty", "standard uncertainty of the delay",
+        "delay_standard_uncertainty_s", unit="s", required=True,
+    ),
+    Field("calibration/range", "largest displacement of the gauge", "range_m", unit="{unit}"),
+    Field("calibration/polynomial", "p1, p2 in x + p1 x^2 + p2 x^3", "polynomial", Kind.VECTOR, default=()),
+    _text("calibration/reference", "reference of the calibration", "reference"),
+    _text("calibration/certificate", "certificate of the reference", "certificate"),
+    _text("calibration/calibrated_by", "who calibrated the gauge", "calibrated_by"),
+    Field("calibration/valid_until", "last day on which the calibration holds", "valid_until", Kind.DATE),
+    _text("calibration/measures", "what gauge 2 measures: relative or plate", "measures", required=True),
+)  # fmt: skip
+"""Fields of `config.schema.Gauge`, in the group of each gauge."""
+
+CHECK_FIELDS: Final = (
+    Field("date", "time of the check", "at", Kind.DATE, required=True),
+    Field("result", "whether the gauge passed", "passed", Kind.PASS_FAIL, required=True),
+    Field("expected", "displacement that was applied", "expected_m", unit="m", required=True),
+    Field("measured", "displacement that was measured", "measured_m", unit="m", required=True),
+    Field(DEVIATION, "measured minus expected", unit="m"),
+    Field("tolerance", "largest deviation that passes", "tolerance_m", unit="m", required=True),
+    Field(
+        "gain", "gain of the calibration that was checked", "gain_m_per_count", unit="m/count",
+        required=True,
+    ),
+    Field("polynomial", "polynomial of that calibration", "polynomial", Kind.VECTOR, default=()),
+    _text("kind", "displacement or shunt", "kind", required=True),
+    _text("reference", "reference of the check", "reference"),
+    _text("checked_by", "who checked the gauge", "checked_by"),
+    _text("device", "device that the gauge was read by", "device"),
+    _text("serial_number", "serial number of the gauge", "serial_number"),
+)  # fmt: skip
+"""Fields of `config.schema.GaugeCheck`, in the group `last_check` of each gauge that was checked."""
+
+END_FIELDS: Final = (
+    Field(f"{EVENTS}/pulled_back_s", "the pullback was reached", "events.pulled_back_s", unit="s"),
+    Field(f"{EVENTS}/armed_s", "the trigger was armed", "events.armed_s", unit="s"),
+    Field(RELEASE, "the table was released", "events.release_s", unit="s"),
+    Field(f"{EVENTS}/slip_end_s", "the plate stopped slipping", "events.slip_end_s", unit="s"),
+    Field(f"{EVENTS}/rest_s", "the table came to rest", "events.rest_s", unit="s"),
+    *(
+        Field(f"{LOSSES}/{name}", description, f"losses.{name}", Kind.INTEGER, default=0)
+        for name, description in (
+            ("samples", "rows, absent samples included"),
+            ("missing", "samples lost by the device's sequence numbers"),
+            ("missing_estimated", "samples lost by elapsed time and rate"),
+            ("damaged", "samples received damaged"),
+            ("overloaded", "samples beyond the range of the converter"),
+            ("discarded_bytes", "bytes that belong to no good frame or line"),
+            ("restarts", "restarts of the device within the stream"),
+            ("repeated", "frames or lines received twice and stored once"),
+            ("unexplained_drops", "drops that the device reported without a gap in its sequence"),
+        )
+    ),
+    Field(CLOCK_SCALE, "true seconds for one second of `time`", "clock_scale", unit="1", default=1.0),
+    Field(
+        CLOCK_SCALE_UNCERTAINTY, "standard uncertainty of the clock scale", "clock_scale_uncertainty",
+        unit="1", default=0.0,
+    ),
+    Field(f"{ACQUISITION}/skew", "time from the reading of gauge 1 to that of gauge 2", "skew_s", unit="s"),
+    Field(
+        f"{ACQUISITION}/skew_standard_uncertainty", "standard uncertainty of the skew",
+        "skew_standard_uncertainty_s", unit="s",
+    ),
+    Field(f"{RUN}/dwell_before_release", "hold at the pullback", "dwell_s", unit="s"),
+    Field(f"{RUN}/zero_before_pull", "table at rest before the pull", "zero_m", unit="m"),
+    Field(f"{RUN}/relative_zero_before_pull", "plate at rest before the pull", "relative_zero_m", unit="m"),
+    Field(f"{RUN}/held_displacement", "table in the hold", "held_m", unit="m"),
+    _text(f"{RUN}/message", "fault that ended the run", "message", reserved_bytes=2000),
+    Field(END_TIME, "time of the end", "end_time", Kind.DATE, reserved_bytes=40),
+    _text(ENDED, "reason of the end; empty while the run is not closed", "ended", reserved_bytes=32),
+)  # fmt: skip
+"""Fields of `app.runs.metadata.EndMetadata`. The template makes room for them; closing a run fills it."""
+
+PROGRAM_FIELDS: Final = (
+    _text(IDENTIFIER, "UUID of the run"),
+    _text(PROGRAM, "slipstand; its version is the attribute `version`"),
+    _text(CONTACT, "contact by the series code"),
+    Field(STORED, "rows that are whole on disk, written after each flush", kind=Kind.INTEGER, required=True),
+    _text(f"{NOTE}/author", "operator"),
+    Field(f"{NOTE}/date", "start of the run", kind=Kind.DATE),
+    _text(f"{NOTE}/type", "media type of the note"),
+)
+"""Fields that the program writes by itself."""
+
+REQUIRED_FIELDS: Final = tuple(
+    field for field in (*RUN_FIELDS, *END_FIELDS, *PROGRAM_FIELDS) if field.required
+)
+"""Fields without which a file is damaged, those of gauges aside."""
 
 
-def signal_name(gauge: int, quantity: str, measures: str) -> str:
-    """Path of the calibrated readings of gauge 0 or 1: `table_displacement`, `relative_displacement`, ..."""
-    what = "table" if gauge == 0 else measures
-    return f"{MOTION}/{what}_{quantity}"
+def signal_path(gauge: int, quantity: str, measures: str) -> str:
+    """Path of the calibrated readings of gauge 0 or 1, such as `entry/motion/table_displacement`."""
+    return f"{MOTION}/{'table' if gauge == 0 else measures}_{quantity}"
+
+
+def count_path(gauge: int) -> str:
+    """Path of the readings of gauge 0 or 1 as received."""
+    return f"{GAUGES[gauge]}/data"
 
 
 def checksum_path(column: str) -> str:
-    """Path of the CRC-32 of a column's bytes, by the path of the column."""
+    """Path of the CRC-32 of a column, by the path of the column."""
     return f"{CHECKSUMS}/{'_'.join(column.split('/')[2:])}"
-
-
-def event_path(name: str) -> str:
-    """Path of an event, by its field of `app.runs.metadata.Events`."""
-    return f"{EVENTS}/{name}"
-
-
-def write_text(group: h5py.Group, name: str, text: str) -> None:
-    """Store a text of fixed length; an empty one is left out. Raises MetadataError."""
-    if not text:
-        return
-    data = encode_text(name, text)
-    group.create_dataset(name, data=np.bytes_(data), dtype=h5py.string_dtype("utf-8", len(data)))
-
-
-def write_number(group: h5py.Group, name: str, value: float | None, units: str = "") -> None:
-    """Store a number with its units; None is left out."""
-    if value is None:
-        return
-    dataset = group.create_dataset(name, data=value)
-    if units:
-        dataset.attrs["units"] = units
-
-
-def reserve_text(file: h5py.File, path: str) -> None:
-    """Make room for a text that is only known at the end, so that no object is created then."""
-    file.create_dataset(path, data=np.bytes_(b""), dtype=h5py.string_dtype("utf-8", TEXT_ROOM[path]))
-
-
-def fill_text(file: h5py.File, path: str, text: str) -> None:
-    """Write a text into its reserved room, cut to fit."""
-    data = encode_text(path, text)[: TEXT_ROOM[path]]
-    file[path][()] = np.bytes_(data.decode("utf-8", "ignore").encode())
-
-
-def read_text(group: h5py.Group, name: str, default: str = "") -> str:
-    """Read a text, `default` where there is none. Raises DamagedRunError."""
-    dataset = group.get(name)
-    if dataset is None:
-        return default
-    value = dataset[()]
-    if not isinstance(value, bytes | str):
-        raise DamagedRunError(
-            f"{group.file.filename}: {group.name}/{name} is not a text. Restore a good copy"
-        )
-    return value if isinstance(value, str) else value.decode("utf-8", "replace")
-
-
-def read_number(group: h5py.Group, name: str) -> float | None:
-    """Read a number; None where it is absent or NaN. Raises DamagedRunError."""
-    dataset = group.get(name)
-    if dataset is None:
-        return None
-    value = dataset[()]
-    if not isinstance(value, np.number):
-        raise DamagedRunError(
-            f"{group.file.filename}: {group.name}/{name} is not a number. Restore a good copy"
-        )
-    return None if np.isnan(value) else float(value)
-
-
-def read_integer(group: h5py.Group, name: str) -> int:
-    """Read a whole number, 0 where there is none. Raises DamagedRunError."""
-    return int(read_number(group, name) or 0)
-
-
-def to_python(value: Any) -> Any:
-    """Turn what h5py reads into plain Python: str, int, float, bool or list."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
-def encode_text(name: str, text: str) -> bytes:
-    """Bytes of a text as a run file can hold it; `name` is what to call it. Raises MetadataError."""
-    try:
-        data = text.encode("utf-8")
-    except UnicodeEncodeError:
-        raise MetadataError(f"{name} = {text!r} is not valid Unicode. Write it again") from None
-    if b"\0" in data:
-        raise MetadataError(f"{name} = {text!r} holds a zero character. Leave it out")
-    return data

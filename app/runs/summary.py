@@ -1,21 +1,23 @@
-"""A run in a line: what a table of runs shows, read without its samples."""
+"""Summary of a run for the library, read without its samples."""
 
 import datetime
 
 import h5py
 import msgspec
 
-from app.runs import schema as names
+from app.runs import schema
+from app.runs.columns import stored_rows
+from app.runs.fields import read_text
 from app.runs.metadata import Conditions
-from app.runs.metadata_io import read_metadata
+from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.saved_analyses import metadata_hash, read_analyses
-from app.runs.validation import is_finished, stored_rows
 
 
 class RunSummary(msgspec.Struct, frozen=True, gc=False):
     """One line of the library. Where `fault` is set, the rest could not be read.
 
-    Ten thousand of them are listed at once, which a garbage collector that looks at each slows by half.
+    Ten thousand are listed at once. Without `gc=False` the garbage collector visits each and slows that by
+    half.
     """
 
     path: str
@@ -60,8 +62,8 @@ def summarize_file(file: h5py.File) -> RunSummary:
         series=metadata.series,
         start_time=metadata.start_time,
         samples=rows,
-        duration_s=float(file[names.TIME][rows - 1]) if rows else 0.0,
-        ended=names.read_text(file, names.ENDED) if is_finished(file) else "",
+        duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
+        ended=read_text(file, schema.ENDED),
         operator=metadata.operator,
         note=metadata.note,
         conditions=metadata.conditions,
@@ -73,7 +75,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
         stale=bool(analyses) and analyses[-1].metadata_hash != metadata_hash(file, metadata),
         adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
-        identifier=names.read_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
-        edits=len(file[names.HISTORY]),
+        identifier=read_identifier(file),
+        edits=len(file[schema.HISTORY]),
         excluded=metadata.excluded,
     )

@@ -1,15 +1,17 @@
-"""Has files looked over by a process of its own, before this one opens them."""
+"""Validate files in a child process, before this one opens them."""
 
 import atexit
 import contextlib
 import functools
 import queue
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
+import h5py
 import msgspec
 
 from app.child_process import ChildProcess, encode_line, json_decoder, spawn
@@ -21,6 +23,7 @@ from app.runs.errors import (
     ValidationTimeoutError,
 )
 from app.runs.summary import RunSummary
+from messages.message import Message
 
 _START_S = 60.0
 _STOP_S = 5.0
@@ -44,7 +47,7 @@ class ValidationReply(msgspec.Struct, frozen=True, tag=True):
 
     summary: RunSummary | None = None
     fault: Fault = ""
-    message: str = ""
+    message: Message = Message("")
 
 
 ValidatorEvent = ValidatorReady | ValidationReply
@@ -52,9 +55,9 @@ decode_validator_event: Callable[[bytes], ValidatorEvent] = json_decoder(Validat
 
 
 class Validator:
-    """Examines as many files as wanted, one after another; a file that brings the process down is damaged.
+    """Validates any number of files, one after another. A file that crashes the process is damaged.
 
-    Several threads may share one: they wait for each other.
+    Several threads may share one; they wait for each other.
     """
 
     def __init__(self) -> None:
@@ -69,13 +72,13 @@ class Validator:
         return validator
 
     def validate(self, path: Path) -> RunSummary:
-        """Look a file over, as told in `app.runs.validation`.
+        """Validate a file as `app.runs.validation` says, and return its summary.
 
         Raises
         ------
         NotARunError, BeingRecordedError, DamagedRunError
         ValidationTimeoutError
-            There was no verdict in time, which says nothing about the file.
+            No answer came in time. The file may be sound.
         """
         with self._turn:
             self._child = self._child or _Child()
@@ -84,13 +87,16 @@ class Validator:
             except _CrashedError:
                 self.stop()
                 raise DamagedRunError(
-                    f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
+                    "{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it",
+                    path=path,
                 ) from None
             except queue.Empty:
                 self.stop()
                 raise ValidationTimeoutError(
-                    f"{path} was not looked over within {_REPLY_S:g} s: this computer or the file's disk is"
-                    " too busy. Try again later"
+                    "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
+                    " too busy. Try again later",
+                    path=path,
+                    timeout=_REPLY_S,
                 ) from None
         if reply.summary is None:
             raise _ERRORS[reply.fault](reply.message)
@@ -118,13 +124,26 @@ class Validator:
 
 @functools.cache
 def shared_validator() -> Validator:
-    """The validator of a process that opens runs now and then: started when first asked for, and kept.
+    """The validator that this process keeps, started at the first call.
 
-    Starting one takes longer than examining and reading the run of an hour.
+    Starting one takes longer than validating and reading a run of an hour.
     """
     validator = Validator.start()
     atexit.register(validator.stop)
     return validator
+
+
+def check_validator() -> None:
+    """Validate a file that is HDF5 but no run. Raises RunError unless the validator says that."""
+    with tempfile.TemporaryDirectory(prefix="slipstand-check-") as folder:
+        path = Path(folder) / "no-run.h5"
+        h5py.File(path, "w").close()
+        try:
+            with Validator() as validator:
+                validator.validate(path)
+        except NotARunError:
+            return
+    raise RunError("a file that is no run was taken for one")
 
 
 class _CrashedError(Exception):

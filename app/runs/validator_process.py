@@ -1,6 +1,6 @@
 """Opens files that may crash or hang HDF5: `python -m app.runs.validator_process`, driven by `Validator`.
 
-One path a line on stdin, as JSON; one verdict a line on stdout. Memory and processor time are limited
+One path a line on stdin, as JSON; one reply a line on stdout. Memory and processor time are limited
 where the system can, so that a hostile file ends this process and nothing else.
 """
 
@@ -21,10 +21,10 @@ from app.child_process import (
     json_decoder,
     reserve_stdout,
 )
-from app.runs.errors import NotARunError, RunError
+from app.runs.errors import NotARunError, RunError, being_recorded, damaged
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
-from app.runs.validator import ValidationReply, ValidatorEvent, ValidatorReady
+from app.runs.validator import Fault, ValidationReply, ValidatorEvent, ValidatorReady
 
 _MEMORY_BYTES = 2 << 30
 _CPU_S = 2.0
@@ -70,7 +70,7 @@ def _limit_time(seconds: float) -> None:
 
 
 def _checked(summary: RunSummary) -> RunSummary:
-    """A summary whose values are of their types, and finite: they are as the file says. Raises ValueError."""
+    """Check types and that numbers are finite: the values come from the file. Raises ValueError."""
     for name, value in msgspec.structs.asdict(summary).items():
         if isinstance(value, float) and not math.isfinite(value):
             raise ValueError(f"{name} is {value}")
@@ -83,18 +83,12 @@ def _validate(path: str) -> ValidationReply:
             validate_file(file)
             return ValidationReply(summary=_checked(summarize_file(file)))
     except RunError as error:
-        return ValidationReply(
-            fault="not-a-run" if isinstance(error, NotARunError) else "damaged", message=str(error)
-        )
+        fault: Fault = "not-a-run" if isinstance(error, NotARunError) else "damaged"
+        return ValidationReply(fault=fault, message=error.message)
     except BlockingIOError:
-        return ValidationReply(
-            fault="being-recorded", message=f"{path} is being recorded. Wait until the run has ended"
-        )
+        return ValidationReply(fault="being-recorded", message=being_recorded(path).message)
     except Exception as error:
-        fault = " ".join(str(error).split())[:160]
-        return ValidationReply(
-            fault="damaged", message=f"{path} is damaged ({fault}). Restore a good copy, or recover it"
-        )
+        return ValidationReply(fault="damaged", message=damaged(path, error).message)
 
 
 if __name__ == "__main__":

@@ -81,7 +81,8 @@ class WriterClient:
             raise self._failure
         if not self._child.send(block):
             raise WriterBehindError(
-                f"the disk is too slow: {_QUEUE_COMMANDS} blocks wait to be written. Record to a faster disk"
+                "the disk is too slow: {blocks} blocks wait to be written. Record to a faster disk",
+                blocks=_QUEUE_COMMANDS,
             )
 
     def close(self, ending: EndMetadata) -> "Future[StoredRun]":
@@ -112,12 +113,14 @@ class WriterClient:
                 return answer
             waiting.append(answer)
         if not self._child.send(command, _WAIT_S):
-            self._fail(WriteError(f"the run writer took nothing for {_WAIT_S:g} s. Check the disk"))
+            self._fail(
+                WriteError("the run writer took nothing for {timeout:g} s. Check the disk", timeout=_WAIT_S)
+            )
         return answer
 
     def _on_exit(self, code: int) -> None:
         if code or self._opening or self._closing:
-            self._fail(WriteError(f"the run writer ended by itself (code {code})"))
+            self._fail(WriteError("the run writer ended by itself (code {code})", code=code))
 
     def _on_reply(self, reply: Reply) -> None:
         if isinstance(reply, Failed):

@@ -16,6 +16,7 @@ from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.errors import DiskFullError, MetadataError, RunError, RunExistsError, WriteError
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, RunMetadata
+from messages.message import Message
 
 _FRAME = struct.Struct("<BI")
 _ROWS = struct.Struct("<I")
@@ -57,7 +58,7 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     """It could not be done; the writer process ends after it."""
 
     reason: str
-    message: str
+    message: Message
     samples: int = 0
     """Rows that the file holds all the same."""
 
@@ -122,7 +123,7 @@ class FrameDecoder:
 def failure(error: RunError, samples: int = 0) -> Failed:
     """Say over the pipe what went wrong, and how many rows the file holds."""
     reasons = [reason for reason, kind in ERRORS.items() if isinstance(error, kind)]
-    return Failed(reasons[0] if reasons else "write-error", str(error), samples)
+    return Failed(reasons[0] if reasons else "write-error", error.message, samples)
 
 
 def error_of(failed: Failed) -> RunError:

@@ -58,7 +58,11 @@ class WriterServer:
 
     def _fail(self, error: Exception) -> None:
         """Close the run if that can be done, and say what went wrong."""
-        told = error if isinstance(error, RunError) else WriteError(f"the run writer failed: {error}")
+        told = (
+            error
+            if isinstance(error, RunError)
+            else WriteError("the run writer failed: {error}", error=error)
+        )
         writer = self._writer
         try:
             self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(told))

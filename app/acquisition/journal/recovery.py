@@ -20,9 +20,7 @@ from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
 from app.runs.disk import has_free_space, storage_error, sync_folder
 from app.runs.errors import RunError
-from app.runs.journal import find_journals
-from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
-from app.runs.restoring import (
+from app.runs.file_operations import (
     ExistingRun,
     contains_all_samples,
     find_run_by_uuid,
@@ -30,6 +28,8 @@ from app.runs.restoring import (
     move_to_free_name,
     replace_by_recovered,
 )
+from app.runs.journal import find_journals
+from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.schema import SUFFIX
 
 Progress = Callable[[float], None]
@@ -190,7 +190,7 @@ def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Pa
 
 def _is_whole(before: ExistingRun, rebuilt: RebuiltRun) -> bool:
     """Tell whether the run was closed as it should, so that only its journal was left over."""
-    return before.samples == rebuilt.stored.samples and before.ending == rebuilt.ending
+    return before.samples == rebuilt.stored.samples and before.end == rebuilt.ending
 
 
 def _earlier_file(story: JournalSummary, folder: Path) -> Path | None:

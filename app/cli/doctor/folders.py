@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Literal
 
 from app.cli.doctor import Finding, fail, ok, warn
+from app.runs.creation import check_folder
 from app.runs.disk import free_bytes
 from app.runs.errors import RunError
 from app.runs.journal import unfinished_journals
 from app.runs.paths import journal_fallback_folders, recordings_directory
-from app.runs.self_check import check_folder
 from config.files import (
     checks_path,
     config_directory,

@@ -56,7 +56,7 @@ def _version(name: str) -> str:
 
 def _examiner() -> Finding:
     try:
-        from app.runs.self_check import check_validator  # needs h5py, which may be what is missing
+        from app.runs.validator import check_validator  # needs h5py, which may be what is missing
 
         check_validator()
     except (ImportError, RunError, OSError) as error:

@@ -17,10 +17,10 @@ from app.presenters.worker import ReportProgress
 from app.runs.batch.tasks import AnalysisTask, analyze_one
 from app.runs.edits import edit_run
 from app.runs.errors import RunError
+from app.runs.file_operations import move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
 from app.runs.next_tests import counts_as_done, load_next_tests, save_next_tests
 from app.runs.reader import open_run
-from app.runs.trash import move_to_trash, restore_from_trash
 
 
 def execute(task: RecordTask, _report: ReportProgress) -> Any:

@@ -41,17 +41,16 @@ from app.presenters.worker import ReportProgress
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.blocks import RunBlock
-from app.runs.copying import copy_run_into
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields, undo_edit
 from app.runs.errors import RunError
 from app.runs.exchange.exporting import ExportRequest, export_runs
 from app.runs.exchange.importing import CsvImport, even_rate_hz, import_csv, read_record
 from app.runs.exchange.preview import ParseOptions, preview_file
+from app.runs.file_operations import copy_run_into, move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
 from app.runs.reader import open_run
 from app.runs.summary import RunSummary
-from app.runs.trash import move_to_trash, restore_from_trash
 from app.runs.validator import shared_validator
 from config.files import load_stand
 from config.schema import ConfigError

@@ -66,18 +66,25 @@ class DaskExecutor:
         except Exception as error:
             words = " ".join(str(error).split())[:120]
             raise ClusterError(
-                f"the workers of {self._address} cannot run Slipstand ({type(error).__name__}: {words})."
-                " Install it there, in the same version"
+                "the workers of {address} cannot run Slipstand ({name}: {words}). Install it"
+                " there, in the same version",
+                address=self._address,
+                name=type(error).__name__,
+                words=words,
             ) from None
         if not versions:
             raise ClusterError(
-                f"the cluster at {self._address} has no workers. Start some: dask worker {self._address}"
+                "the cluster at {address} has no workers. Start some: dask worker {address}",
+                address=self._address,
             )
         for worker, version in versions.items():
             if version != __version__:
                 raise ClusterError(
-                    f"worker {worker} has Slipstand {version}, here it is {__version__}."
-                    " Install the same version on both"
+                    "worker {worker} has Slipstand {version}, here it is {version_2}. Install"
+                    " the same version on both",
+                    worker=worker,
+                    version=version,
+                    version_2=__version__,
                 )
 
 
@@ -101,6 +108,8 @@ def _connected(address: str) -> Any:
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         words = " ".join(str(error).split())[:120]
         raise ClusterError(
-            f"no Dask scheduler answers at {address!r} ({words or type(error).__name__})."
-            " Start one with `dask scheduler`, and give its address, for example tcp://localhost:8786"
+            "no Dask scheduler answers at {address!r} ({value}). Start one with `dask"
+            " scheduler`, and give its address, for example tcp://localhost:8786",
+            address=address,
+            value=words or type(error).__name__,
         ) from None

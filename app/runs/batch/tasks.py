@@ -11,12 +11,13 @@ from analysis.record import AnalysisError
 from app.runs.analyze import Analysis, AnalysisRequest, Progress, analyze_run
 from app.runs.batch.executors import Executor, SerialExecutor
 from app.runs.batch.ordered_map import FailedItem, ordered_map
-from app.runs.errors import RunError, internal_error_text
+from app.runs.errors import RunError, internal_error
+from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
 from app.runs.reader import check_openable, read_file
 from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_analyses
-from app.runs.schema import ENDED, read_text
+from app.runs.schema import ENDED
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
 
@@ -88,7 +89,7 @@ def build_outcome(analysis: Analysis) -> AnalysisOutcome:
 def error_text(error: Exception) -> str:
     """One line on what went wrong with a run; a fault of the program itself is called one."""
     known = (RunError, AnalysisError, ConfigError, OSError)
-    return " ".join(str(error).split()) if isinstance(error, known) else internal_error_text(error)
+    return " ".join(str(error).split()) if isinstance(error, known) else str(internal_error(error))
 
 
 def validate_and_count(path: Path, validator: Validator) -> int:

@@ -16,9 +16,9 @@ from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.ordered_map import FailedItem
 from app.runs.batch.tasks import map_runs
 from app.runs.campaign.run_result import CollectedRun, CollectTask, RunDetails, collect_run
+from app.runs.file_operations import list_trash
 from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
-from app.runs.trash import list_trash
 from config.schema import ConfigError, Gauges, Stand
 from messages.message import message
 

@@ -15,10 +15,9 @@ from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import AnalysisRequest, Progress, analyze_run
 from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
 from app.runs.metadata import Conditions, RunMetadata
-from app.runs.metadata_io import read_metadata
+from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
 from app.runs.saved_analyses import Document
-from app.runs.schema import ENTRY, read_text
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError, Gauges, Stand
 
@@ -153,7 +152,7 @@ def _read(file: h5py.File) -> _Read:
     )
     return _Read(
         metadata,
-        read_text(file, f"{ENTRY}/entry_identifier_uuid"),
+        read_identifier(file),
         saved.document if saved else None,
         saved.number if saved else None,
         stale,

@@ -32,7 +32,13 @@ class ForeignColumns:
 
     def fault(self, row: int, column: int, fault: str) -> ImportFileError:
         """Error that names file, row, and column."""
-        return ImportFileError(f"{self.path}, {self.row_label(row)}, column {self.names[column]}: {fault}")
+        return ImportFileError(
+            "{path}, {row_label}, column {names}: {fault}",
+            path=self.path,
+            row_label=self.row_label(row),
+            names=self.names[column],
+            fault=fault,
+        )
 
     def check(self) -> None:
         """Refuse what cannot be a record. Raises ImportFileError."""
@@ -63,7 +69,12 @@ def find_columns(path: Path, wanted: list[str], names: list[str], width: int) ->
         at = _find_column(path, name, names, width)
         if at in found:
             other = _OF_TIME_AND_GAUGES[found.index(at)]
-            raise ImportFileError(f"column {name!r} is given for {other} and {one}. Give each its own")
+            raise ImportFileError(
+                "column {name!r} is given for {other} and {one}. Give each its own",
+                name=name,
+                other=other,
+                one=one,
+            )
         found.append(at)
     return found
 
@@ -73,14 +84,19 @@ def _find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
     name = wanted.strip().lstrip("\ufeff")
     if names.count(name) > 1:
         raise ImportFileError(
-            f"{path} has {names.count(name)} columns named {name!r}. Give its number, from 0"
+            "{path} has {count} columns named {name!r}. Give its number, from 0",
+            path=path,
+            count=names.count(name),
+            name=name,
         )
     if name in names:
         return names.index(name)
     if name.isdecimal() and int(name) < width:
         return int(name)
     there = ", ".join(names) if names else f"numbers 0 to {width - 1}"
-    raise ImportFileError(f"{path} has no column {wanted!r}. Choose from: {there}")
+    raise ImportFileError(
+        "{path} has no column {wanted!r}. Choose from: {there}", path=path, wanted=wanted, there=there
+    )
 
 
 def column_stack(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -88,7 +104,11 @@ def column_stack(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise ImportFileError(f"{path}: the columns differ in length ({told}). Choose columns of one record")
+        raise ImportFileError(
+            "{path}: the columns differ in length ({told}). Choose columns of one record",
+            path=path,
+            told=told,
+        )
     if not next(iter(lengths.values())):
-        raise ImportFileError(f"{path} holds no rows. Give a file with numbers")
+        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
     return np.column_stack(list(columns.values()))

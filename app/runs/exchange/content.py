@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.runs.reader import Run, load_counts
 from app.runs.saved_analyses import Document
-from app.runs.schema import signal_name
+from app.runs.schema import signal_path
 
 COEFFICIENT_COLUMNS = (
     "run", "series", "start_time", "kind", "model", "adequate",
@@ -140,6 +140,6 @@ def run_metadata_document(run: Run) -> dict[str, Any]:
 
 def _name(run: Run, gauge: int) -> str:
     metadata = run.metadata
-    path = signal_name(gauge, metadata.quantity, metadata.gauges.relative.measures)
+    path = signal_path(gauge, metadata.quantity, metadata.gauges.relative.measures)
     unit = metadata.unit.replace("/", "_per_").replace("^", "")
     return f"{path.rpartition('/')[2]}_{unit}"

@@ -145,14 +145,20 @@ def _decoded(path: Path) -> str:
     try:
         data = path.read_bytes()
     except FileNotFoundError:
-        raise ImportFileError(f"{path}: there is no such file. Give the path of a CSV file") from None
+        raise ImportFileError(
+            "{path}: there is no such file. Give the path of a CSV file", path=path
+        ) from None
     except OSError as error:
         raise ImportFileError(
-            f"{path}: cannot be read ({error.strerror}). Give a readable CSV file"
+            "{path}: cannot be read ({strerror}). Give a readable CSV file",
+            path=path,
+            strerror=error.strerror,
         ) from None
     encoding = next((name for bom, name in _BOMS.items() if data.startswith(bom)), "")
     if not encoding and b"\0" in data[:4096]:
-        raise ImportFileError(f"{path} is not a text file. Export it as CSV from the program that wrote it")
+        raise ImportFileError(
+            "{path} is not a text file. Export it as CSV from the program that wrote it", path=path
+        )
     try:
         text = data.decode(encoding or "utf-8")
     except UnicodeDecodeError:
@@ -172,7 +178,9 @@ def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
             break
     if not found:
         raise ImportFileError(
-            f"{path} holds no line of data. Give a file with numbers, and check --skip {skip}"
+            "{path} holds no line of data. Give a file with numbers, and check --skip {skip}",
+            path=path,
+            skip=skip,
         )
     return comment, found
 
@@ -182,8 +190,10 @@ def _delimiter(path: Path, layout: CsvOptions, lines: list[Line]) -> str:
         told = _WORDS.get(layout.delimiter, layout.delimiter)
         if len(told) != 1 or told in '\n"' or told == layout.decimal:
             raise ImportFileError(
-                f"--delimiter {layout.delimiter!r} cannot be. Give tab, space, or a character other than"
-                f" the decimal sign {layout.decimal}"
+                "--delimiter {delimiter!r} cannot be. Give tab, space, or a character other"
+                " than the decimal sign {decimal}",
+                delimiter=layout.delimiter,
+                decimal=layout.decimal,
             )
         return told
     scores = {c: _score(c, layout, lines) for c in _CANDIDATES if c != layout.decimal}
@@ -195,10 +205,15 @@ def _delimiter(path: Path, layout: CsvOptions, lines: list[Line]) -> str:
 
 def _no_numbers(path: Path, layout: CsvOptions, lines: list[Line]) -> ImportFileError:
     if layout.header and len(lines) < 2:
-        return ImportFileError(f"{path} holds a header but no line of data. Give a file with numbers")
+        return ImportFileError(
+            "{path} holds a header but no line of data. Give a file with numbers", path=path
+        )
     return ImportFileError(
-        f"{path}, line {lines[-1].number}: no columns of numbers are found in {lines[-1].text[:60]!r}."
-        " Check --skip, --delimiter and --decimal"
+        "{path}, line {number}: no columns of numbers are found in {text!r}. Check --skip,"
+        " --delimiter and --decimal",
+        path=path,
+        number=lines[-1].number,
+        text=lines[-1].text[:60],
     )
 
 
@@ -225,8 +240,11 @@ def _header(
     if len(names) == len(cells):
         return names, lines[0]
     raise ImportFileError(
-        f"{path}, line {lines[0].number}: {lines[0].text[:60]!r} is data, not column names."
-        " Add --no-header and give columns by number"
+        "{path}, line {number}: {text!r} is data, not column names. Add --no-header and give"
+        " columns by number",
+        path=path,
+        number=lines[0].number,
+        text=lines[0].text[:60],
     )
 
 
@@ -330,4 +348,10 @@ def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
 
 
 def _fault(source: CsvText, line: int, column: str, fault: str) -> ImportFileError:
-    return ImportFileError(f"{source.path}, line {line}, column {column}: {fault}")
+    return ImportFileError(
+        "{path}, line {line}, column {column}: {fault}",
+        path=source.path,
+        line=line,
+        column=column,
+        fault=fault,
+    )

@@ -177,11 +177,11 @@ def export_runs(
     """
     if request.content == "coefficients" and request.writer.write_coefficients is None:
         raise UnsuitableRunError(
-            f"{request.format} holds samples, not coefficients. Choose csv, json, xlsx or latex"
+            "{format} holds samples, not coefficients. Choose csv, json, xlsx or latex", format=request.format
         )
     if request.content == "samples" and not request.writer.holds_samples:
         raise UnsuitableRunError(
-            f"{request.format} holds coefficients, not samples. Choose csv, json or parquet"
+            "{format} holds coefficients, not samples. Choose csv, json or parquet", format=request.format
         )
     with Validator.start() as validator:
         if request.is_one_file:
@@ -199,7 +199,9 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
         return [output]
     if output.exists() and not output.is_dir():
         raise UnsuitableRunError(
-            f"{output} is a file, but {len(paths)} runs need a folder. Choose another -o"
+            "{output} is a file, but {count} runs need a folder. Choose another -o",
+            output=output,
+            count=len(paths),
         )
     output.mkdir(parents=True, exist_ok=True)
     return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]

@@ -57,22 +57,29 @@ def is_csv(path: Path) -> bool:
 def _reading(path: Path, read: Callable[[], Result]) -> Result:
     """Put into words whatever these libraries raise on a damaged file. Raises ImportFileError."""
     if not path.is_file():
-        raise ImportFileError(f"{path}: there is no such file. Give the path of a {path.suffix} file")
+        raise ImportFileError(
+            "{path}: there is no such file. Give the path of a {suffix} file", path=path, suffix=path.suffix
+        )
     try:
         return read()
     except (ImportFileError, ExtraMissingError):
         raise
     except Exception as error:
         fault = " ".join(str(error).split())[:120] or type(error).__name__
-        raise ImportFileError(f"{path} cannot be read as {path.suffix} ({fault}). Export it again") from error
+        raise ImportFileError(
+            "{path} cannot be read as {suffix} ({fault}). Export it again",
+            path=path,
+            suffix=path.suffix,
+            fault=fault,
+        ) from error
 
 
 def _check_layout(path: Path, layout: CsvOptions) -> None:
     """Refuse what only texts have."""
     if layout.delimiter is not None or layout.decimal != ".":
-        raise ImportFileError(f"{path.name} is no text: leave out --delimiter and --decimal")
+        raise ImportFileError("{name} is no text: leave out --delimiter and --decimal", name=path.name)
     if path.suffix.lower() != ".xlsx" and (layout.skip or not layout.header):
-        raise ImportFileError(f"{path.name} has no lines: leave out --skip and --no-header")
+        raise ImportFileError("{name} has no lines: leave out --skip and --no-header", name=path.name)
 
 
 def _wanted(layout: CsvOptions) -> list[str]:
@@ -87,7 +94,11 @@ def _read_parquet(path: Path, layout: CsvOptions) -> ForeignColumns:
     names = list(file.schema_arrow.names)
     chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
     if file.metadata.num_rows * 8 * len(chosen) > _LARGEST_BYTES:
-        raise ImportFileError(f"{path} holds {file.metadata.num_rows} rows, too many to load. Export a part")
+        raise ImportFileError(
+            "{path} holds {num_rows} rows, too many to load. Export a part",
+            path=path,
+            num_rows=file.metadata.num_rows,
+        )
     table = file.read(columns=chosen)
     columns = {name: _parquet_column(path, name, table.column(name)) for name in chosen}
     return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
@@ -101,7 +112,10 @@ def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
     values = column.to_numpy()
     if values.dtype.kind not in "iuf":
         raise ImportFileError(
-            f"{path}, column {name}: {column.type} is no number. Export plain numbers, times in seconds"
+            "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds",
+            path=path,
+            name=name,
+            type=column.type,
         )
     return np.asarray(values, dtype=np.float64)
 
@@ -123,9 +137,9 @@ def _load_mat(path: Path) -> dict[str, NDArray[np.float64]]:
 
     with path.open("rb") as file:
         if file.read(128)[124:128] in (b"\x00\x02IM", b"\x02\x00MI"):
-            raise ImportFileError(f"{path} is a version 7.3 MAT file. Save it with -v7 in MATLAB")
+            raise ImportFileError("{path} is a version 7.3 MAT file. Save it with -v7 in MATLAB", path=path)
     if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > _LARGEST_BYTES:
-        raise ImportFileError(f"{path} holds more numbers than can be loaded. Save a part of them")
+        raise ImportFileError("{path} holds more numbers than can be loaded. Save a part of them", path=path)
     content = loadmat(path, simplify_cells=True)
     return dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
 
@@ -148,7 +162,7 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
 def _open_book(path: Path) -> Iterator[Any]:
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
-            raise ImportFileError(f"{path} unpacks to more than can be loaded. Export it as CSV")
+            raise ImportFileError("{path} unpacks to more than can be loaded. Export it as CSV", path=path)
     book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
     try:
         yield book
@@ -192,7 +206,9 @@ def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], l
         if rows and all(name.strip() in header for name in _wanted(layout)):
             return found[-1]
     if not found:
-        raise ImportFileError(f"{path} holds no rows. Give a workbook with numbers, and check --skip")
+        raise ImportFileError(
+            "{path} holds no rows. Give a workbook with numbers, and check --skip", path=path
+        )
     return found[0]
 
 
@@ -202,8 +218,13 @@ def _xlsx_number(path: Path, sheet: str, row_number: int, column: int, row: tupl
         return math.nan
     if isinstance(cell, bool) or not isinstance(cell, int | float):
         raise ImportFileError(
-            f"{path}, sheet {sheet}, row {row_number}, column {column}: {str(cell)[:40]!r} is not a number."
-            " Correct it, or leave the cell empty if there is no reading"
+            "{path}, sheet {sheet}, row {row_number}, column {column}: {cell!r} is not a"
+            " number. Correct it, or leave the cell empty if there is no reading",
+            path=path,
+            sheet=sheet,
+            row_number=row_number,
+            column=column,
+            cell=str(cell)[:40],
         )
     return float(cell)
 

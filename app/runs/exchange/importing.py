@@ -110,12 +110,19 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
         block = _block(time_s - time_s[0], values[:, 1:], gauge)
     if block.time_s[-1] > _LONGEST_S:
         raise ImportFileError(
-            f"{path}: its times go from {time_s[0]:g} s to {time_s[-1]:g} s, too long for a record."
-            f" Check --time {plan.layout.time} and --time-unit {plan.time_unit}"
+            "{path}: its times go from {time_s:g} s to {time_s_2:g} s, too long for a record."
+            " Check --time {time} and --time-unit {time_unit}",
+            path=path,
+            time_s=time_s[0],
+            time_s_2=time_s[-1],
+            time=plan.layout.time,
+            time_unit=plan.time_unit,
         )
     if np.isinf(block.readings).any():
         raise ImportFileError(
-            f"{path}: with --gain {plan.gain or 1.0:g} its readings are too large. Check both"
+            "{path}: with --gain {value:g} its readings are too large. Check both",
+            path=path,
+            value=plan.gain or 1.0,
         )
     return gauge, float(time_s[0]), block
 
@@ -126,7 +133,8 @@ def _gauge(plan: CsvImport) -> Gauge:
         raise ImportFileError("--unit and --gain exclude each other: a gain says the unit. Give one of them")
     if plan.unit_name and plan.gain is None:
         raise ImportFileError(
-            f"--unit-name {plan.unit_name!r} needs --gain, the {plan.unit_name} of one cell unit"
+            "--unit-name {unit_name!r} needs --gain, the {unit_name} of one cell unit",
+            unit_name=plan.unit_name,
         )
     gain = _LENGTH_UNITS_M[plan.unit or "m"] if plan.gain is None else plan.gain
     try:
@@ -162,8 +170,13 @@ def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
     if not len(inside):
         low, high = time[segment][0] * scale, time[segment][-1] * scale
         raise ImportFileError(
-            f"{columns.path}: no row lies between {first:g} s and {last:g} s."
-            f" Its times go from {low:g} s to {high:g} s: change --from and --until"
+            "{path}: no row lies between {first:g} s and {last:g} s. Its times go from {low:g}"
+            " s to {high:g} s: change --from and --until",
+            path=columns.path,
+            first=first,
+            last=last,
+            low=low,
+            high=high,
         )
     return slice(segment.start + int(inside[0]), segment.start + int(inside[-1]) + 1)
 
@@ -176,8 +189,11 @@ def _segment(columns: ForeignColumns, number: int | None) -> slice:
     count = len(bounds) - 1
     if not 0 <= number < count:
         raise ImportFileError(
-            f"{columns.path}: there is no segment {number}. Its times rise in {count} stretches:"
-            f" give 0 to {count - 1}"
+            "{path}: there is no segment {number}. Its times rise in {count} stretches: give 0 to {count_2}",
+            path=columns.path,
+            number=number,
+            count=count,
+            count_2=count - 1,
         )
     return slice(bounds[number], bounds[number + 1])
 

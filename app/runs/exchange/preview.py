@@ -107,7 +107,9 @@ def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
         raise faults[0]
     share, source = max(found, key=lambda pair: pair[0])
     if not share:
-        raise ImportFileError(f"{path}: no columns of numbers. Check --skip, --delimiter and --decimal")
+        raise ImportFileError(
+            "{path}: no columns of numbers. Check --skip, --delimiter and --decimal", path=path
+        )
     rows = _first_rows(source)
     width = max(len(source.names), *(len(row) for row in rows))
     names = [*source.names, *[""] * (width - len(source.names))]

@@ -39,8 +39,10 @@ def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> No
     """
     if len(exported.run) >= _SHEET_ROWS and exported.samples:
         raise UnsuitableRunError(
-            f"{exported.run.path} has {len(exported.run)} samples, a sheet of xlsx at most {_SHEET_ROWS - 1}."
-            " Export it as parquet or csv"
+            "{path} has {count} samples, a sheet of xlsx at most {sheet_rows}. Export it as parquet or csv",
+            path=exported.run.path,
+            count=len(exported.run),
+            sheet_rows=_SHEET_ROWS - 1,
         )
     sheets = {
         "Coefficients": (COEFFICIENT_COLUMNS, coefficient_rows(exported)),

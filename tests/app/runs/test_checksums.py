@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs import schema as names
+from app.runs import schema
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
 from app.runs.reader import load_counts, open_run
@@ -69,14 +69,14 @@ def test_no_result_is_kept_in_a_run_whose_numbers_have_changed(run):
 
 def test_a_run_from_before_there_were_checksums_opens(run):
     with h5py.File(run, "r+") as file:
-        del file[names.CHECKSUMS]
+        del file[schema.CHECKSUMS]
     assert len(open_run(run)) == ROWS
 
 
 def test_a_checksum_that_is_no_number_is_damage_too(run):
     with h5py.File(run, "r+") as file:
-        del file[names.checksum_path(names.TIME)]
-        file[names.checksum_path(names.TIME)] = np.zeros(3)
+        del file[schema.checksum_path(schema.TIME)]
+        file[schema.checksum_path(schema.TIME)] = np.zeros(3)
     with pytest.raises(DamagedRunError, match="is not a number"):
         edit_run(run, "Ada", note="dry")
 

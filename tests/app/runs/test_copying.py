@@ -3,8 +3,8 @@
 import pytest
 from runs_kit import small_run
 
-from app.runs.copying import copy_run_into
 from app.runs.errors import NotARunError, RunExistsError
+from app.runs.file_operations import copy_run_into
 from app.runs.reader import open_run
 
 

@@ -9,8 +9,7 @@ import pytest
 from interrupted_writes import KeptWrites
 from runs_kit import ENDING, block
 
-from app.runs import creation
-from app.runs import schema as names
+from app.runs import creation, schema
 from app.runs.creation import remove_abandoned
 from app.runs.journal import MAGIC, JournalSpan, encode_record
 from app.runs.lock import FileLock
@@ -32,7 +31,7 @@ def test_a_file_has_its_name_only_when_it_is_whole(tmp_path, metadata, monkeypat
         seen.extend(tmp_path.glob("*.h5"))
         raise Interrupted
 
-    monkeypatch.setattr(creation, "_make_indices", interrupted)
+    monkeypatch.setattr(creation, "_create_chunk_indices", interrupted)
     with pytest.raises(Interrupted):
         create_run(tmp_path / "run.h5", metadata)
     assert not seen
@@ -44,7 +43,7 @@ def test_what_a_killed_process_was_making_is_removed(tmp_path, metadata):
     command = (
         "import os, sys, msgspec; from pathlib import Path; from app.runs import creation;"
         " from app.runs.metadata import RunMetadata; from app.runs.writer import create_run;"
-        " creation._name = lambda *_: os._exit(7);"
+        " creation._give_name = lambda *_: os._exit(7);"
         " create_run(Path(sys.argv[1]), msgspec.json.decode(sys.stdin.buffer.read(), type=RunMetadata))"
     )
     killed = subprocess.run(
@@ -91,7 +90,7 @@ def test_a_kill_at_any_write_leaves_a_file_with_all_that_was_flushed(tmp_path, m
         return h5py.File(kept[0], mode, alignment_threshold=2096, alignment_interval=4096)
 
     monkeypatch.setattr(creation, "_open", opened)
-    monkeypatch.setattr(names, "CHUNK", 512)
+    monkeypatch.setattr(schema, "CHUNK", 512)
     writer = create_run(tmp_path / "run.h5", metadata, journal=JournalSpan(str(journal)))
     flushed = {}
     for first in range(0, 1200, 400):
@@ -109,7 +108,7 @@ def test_a_kill_at_any_write_leaves_a_file_with_all_that_was_flushed(tmp_path, m
             validate_file(file)
             rows = stored_rows(file)
             assert rows >= safe, number
-            assert np.array_equal(file[names.TIME][:rows], block(0, rows).time_s), number
+            assert np.array_equal(file[schema.TIME][:rows], block(0, rows).time_s), number
         tried += 1
     assert tried > 100
     assert open_run(path).end == ENDING

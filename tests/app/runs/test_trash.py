@@ -5,11 +5,11 @@ import errno
 import pytest
 from runs_kit import ENDING, block, small_run
 
-from app.runs import trash as trash_module
+from app.runs import file_operations as trash_module
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
+from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
 from app.runs.listing import find_run_files
 from app.runs.reader import open_run
-from app.runs.trash import list_trash, move_to_trash, restore_from_trash
 from app.runs.writer import create_run
 
 

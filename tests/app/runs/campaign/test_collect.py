@@ -17,8 +17,8 @@ from app.runs.campaign.collect import (
 )
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError
+from app.runs.file_operations import move_to_trash
 from app.runs.reader import open_run
-from app.runs.trash import move_to_trash
 
 HERE = ExecutorOptions(jobs=1)
 QUICKLY = AnalysisRequest("static", classical=False)

@@ -1,0 +1,282 @@
+"""Move and copy run files without overwriting or deleting any: copies, trash, recovered runs."""
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from app.runs import schema
+from app.runs.columns import sample_paths, stored_rows
+from app.runs.disk import atomic_write, make_folder, storage_error, sync_folder
+from app.runs.errors import (
+    RunError,
+    RunExistsError,
+    UnsuitableRunError,
+    WriteError,
+    being_recorded,
+    no_such_run,
+)
+from app.runs.listing import check_folder_exists, find_run_files
+from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
+from app.runs.metadata import EndMetadata
+from app.runs.metadata_io import read_end_metadata, read_identifier
+from app.runs.reader import check_openable, read_file
+from app.runs.rewrite import editing_lock, replace_run
+from app.runs.validator import Validator
+
+TRASH = ".trash"
+ASIDE = ".before-recovery"
+"""Appended to the name of a file that a recovered run replaced, where it holds anything of its own."""
+
+_NAMES_MAX = 10_000
+_ROWS_AT_ONCE = 1 << 20
+"""8 MiB of float64 are compared at once."""
+
+
+def copy_run_into(path: Path, folder: Path) -> Path:
+    """Copy a run into a folder under its own name, or the next that is free. Returns the new path.
+
+    Raises
+    ------
+    RunError
+        The file is not a readable run, is in that folder already, or cannot be written there.
+    """
+    path = path.absolute()
+    check_openable(path)
+    if path.parent == folder.absolute():
+        raise RunExistsError("{path} lies in this folder already. Nothing was copied", path=path)
+    with Validator.start() as validator:
+        validator.validate(path)
+    make_folder(folder)
+    for target in _numbered(folder / path.name):
+        try:
+            with atomic_write(target) as temporary:
+                shutil.copyfile(path, temporary)
+        except RunExistsError:
+            continue
+        return target
+    raise _names_taken(folder, path)
+
+
+def move_to_trash(path: Path) -> Path:
+    """Move a run to the trash of its folder. Returns the new path.
+
+    Raises
+    ------
+    RunNotFoundError, BeingRecordedError, WriteError
+    UnsuitableRunError
+        It is in the trash already, is a link, or does not have the suffix of a run.
+    """
+    path = path.absolute()
+    if path.parent.name == TRASH:
+        raise UnsuitableRunError(
+            "{path} is in the trash already. Nothing is ever deleted by Slipstand", path=path
+        )
+    _check_movable(path)
+    if path.is_symlink():
+        raise UnsuitableRunError(
+            "{path} is a link to {target}. Give that file", path=path, target=path.resolve()
+        )
+    if path.suffix != schema.SUFFIX:
+        raise UnsuitableRunError(
+            "{path} is not named like a run. Give a file that ends in {suffix}",
+            path=path,
+            suffix=schema.SUFFIX,
+        )
+    make_folder(path.parent / TRASH)
+    return _move(path, path.parent / TRASH)
+
+
+def restore_from_trash(path: Path) -> Path:
+    """Move a run from the trash back to its folder. Returns the new path.
+
+    Raises
+    ------
+    RunNotFoundError, WriteError
+    UnsuitableRunError
+        It is not in a trash folder.
+    """
+    path = path.absolute()
+    if path.parent.name != TRASH:
+        raise UnsuitableRunError(
+            "{path} is not in a trash folder. Give a run in a folder named {trash}", path=path, trash=TRASH
+        )
+    _check_movable(path)
+    return _move(path, path.parent.parent)
+
+
+def list_trash(folder: Path) -> list[Path]:
+    """Runs in the trash of a folder and of those below it, the last one moved there first.
+
+    Raises
+    ------
+    RunNotFoundError
+        There is no such folder.
+    """
+    check_folder_exists(folder)
+    found = [path.absolute() for path in folder.rglob(f"{TRASH}/*{schema.SUFFIX}")]
+    return sorted(found, key=lambda path: path.stat().st_ctime, reverse=True)
+
+
+def find_run_by_uuid(folder: Path, identifier: str) -> Path | None:
+    """The run file of this UUID in a folder; files that are being recorded or not readable are skipped."""
+    with Validator() as validator:
+        for path in find_run_files(folder):
+            with contextlib.suppress(RunError):
+                check_openable(path)
+                if validator.validate(path).identifier == identifier:
+                    return path
+    return None
+
+
+@dataclass(frozen=True)
+class ExistingRun:
+    """Identity, length and additions of a run file that a recovered one may replace."""
+
+    identifier: str
+    samples: int
+    end: EndMetadata | None
+    has_additions: bool
+    """Analyses or edits were added after it was recorded."""
+
+
+def inspect_run(path: Path) -> ExistingRun | None:
+    """Inspect a run file that may be damaged; None where it cannot be read or does not exist."""
+
+    def inspect(file: h5py.File) -> ExistingRun:
+        additions = bool(len(file[schema.HISTORY])) or any(
+            name.startswith(schema.ANALYSIS_PREFIX) for name in file[schema.ENTRY]
+        )
+        return ExistingRun(read_identifier(file), stored_rows(file), read_end_metadata(file), additions)
+
+    try:
+        check_openable(path)
+        with Validator() as validator:
+            validator.validate(path)
+        return read_file(path, inspect)
+    except RunError:
+        return None
+
+
+def contains_all_samples(rebuilt: Path, other: Path) -> bool:
+    """Tell whether a run begins with all samples of another one, bit for bit.
+
+    Both files must have been validated or written by this program.
+    """
+    with (
+        h5py.File(rebuilt, "r", locking="best-effort") as ours,
+        h5py.File(other, "r", locking="best-effort") as theirs,
+    ):
+        rows = stored_rows(theirs)
+        return all(_begins_with(ours.get(path), theirs[path], rows) for path in sample_paths(theirs))
+
+
+def move_to_free_name(rebuilt: Path, target: Path) -> Path:
+    """Move a file to `target` or to the next number that is free. Returns the new path. Raises RunError."""
+    stem, _, number = target.stem.rpartition("_")
+    first = int(number)
+    for k in range(first, first + _NAMES_MAX):
+        path = target.with_name(f"{stem}_{k:03d}{schema.SUFFIX}")
+        try:
+            with recording_lock(path):  # as a recording holds it that looks for a name
+                if not path.exists():
+                    rebuilt.rename(path)
+                    sync_folder(path.parent)
+                    return path
+        except LockHeldError:
+            continue
+        except OSError as error:
+            raise storage_error(path, error) from None
+    raise _names_taken(target.parent, target)
+
+
+def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
+    """Replace an earlier file by a recovered one.
+
+    Parameters
+    ----------
+    keep : bool
+        Move the earlier file aside first; its new path is returned.
+
+    Raises
+    ------
+    RunError
+        Both files are where they were, or the earlier one is aside.
+    """
+    aside = _aside_name(target) if keep else None
+    try:
+        with recording_lock(target), editing_lock(target):  # also removes the lock file of a dead writer
+            if aside is not None:
+                target.rename(aside)
+                sync_folder(target.parent)
+            replace_run(rebuilt, target)
+    except LockHeldError:
+        raise WriteError("{path} is being changed by another program. Try again", path=target) from None
+    except OSError as error:
+        raise storage_error(target, error) from None
+    return aside
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    """`run.h5`, `run-2.h5`, ..."""
+    yield path
+    for number in range(2, _NAMES_MAX):
+        yield path.with_name(f"{path.stem}-{number}{path.suffix}")
+
+
+def _names_taken(folder: Path, path: Path) -> RunExistsError:
+    return RunExistsError(
+        "{folder}: all names like {name} are taken. Move some runs elsewhere", folder=folder, name=path.name
+    )
+
+
+def _check_movable(path: Path) -> None:
+    if not path.is_file():
+        raise no_such_run(path)
+    if is_being_recorded(path):
+        raise being_recorded(path)
+
+
+def _move(path: Path, folder: Path) -> Path:
+    """Claim a free name, then move: nothing is overwritten, whoever else moves at the same time."""
+    target = _claim_name(folder / path.name)
+    try:
+        path.replace(target)
+    except OSError as error:
+        target.unlink(missing_ok=True)
+        raise storage_error(path, error) from None
+    for changed in (folder, path.parent):
+        with contextlib.suppress(OSError):  # the run is moved; only a power cut could still undo that
+            sync_folder(changed)
+    return target
+
+
+def _claim_name(path: Path) -> Path:
+    for target in _numbered(path):
+        try:
+            target.open("x").close()
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise storage_error(path.parent, error) from None
+        return target
+    raise _names_taken(path.parent, path)
+
+
+def _begins_with(ours: h5py.Dataset | None, theirs: h5py.Dataset, rows: int) -> bool:
+    if ours is None or len(ours) < rows or ours.dtype != theirs.dtype:
+        return False
+    parts = (slice(first, min(first + _ROWS_AT_ONCE, rows)) for first in range(0, rows, _ROWS_AT_ONCE))
+    return all(np.array_equal(ours[part].view("u1"), theirs[part].view("u1")) for part in parts)
+
+
+def _aside_name(path: Path) -> Path:
+    for number in range(1, _NAMES_MAX):
+        aside = path.with_name(f"{path.name}{ASIDE}{'' if number == 1 else number}")
+        if not aside.exists():
+            return aside
+    raise _names_taken(path.parent, path)
