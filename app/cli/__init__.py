@@ -4,6 +4,9 @@ import io
 import os
 import sys
 
+from app.cli.commands import app
+from app.cli.errors import error_text
+
 
 def run() -> None:
     """Run the command that `sys.argv` names, and exit with its code.
@@ -14,8 +17,6 @@ def run() -> None:
     for stream in (sys.stdout, sys.stderr):  # names of files may be no text: `\\udcff` is, and is JSON too
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    from app.cli.commands import app
-    from app.cli.errors import error_text
 
     try:
         app()

@@ -1,40 +1,77 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
+import dataclasses
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from analysis.formatting import format_value
+from analysis.laws.catalogue import LAWS
+from analysis.one_mass.identify import mass_from_added_mass
+from analysis.quantities import BudgetSource, Quantity
 from app.cli import output as out
-from app.cli.errors import CommandError
+from app.cli.analysis_text import print_analysis
+from app.cli.errors import CommandError, error_text
 from app.cli.options import (
-    Dask,
     Force,
-    Jobs,
+    JobOptions,
     Json,
     PlateMass,
     RunsOrFolders,
     TableMass,
-    executor_options,
-    positive,
+    choice,
+    number,
+    with_options,
 )
+from app.cli.recover import print_interrupted_run
+from app.runs.analysis_json import quantity_document
+from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, AnalysisRequest, analyze_run
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs, build_outcome
+from app.runs.listing import resolve_run_files
 
-if TYPE_CHECKING:
-    from app.runs.analyze import Analysis, AnalysisRequest
-    from app.runs.batch.executors import ExecutorOptions
-    from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask
+_MODELS = ("auto", *(law.name for law in LAWS))
 
 
+@dataclasses.dataclass(frozen=True)
+class AddedMassOptions:
+    """Mass that was added to the table between two free decays."""
+
+    added_mass: Annotated[
+        float | None,
+        number(
+            "--added-mass",
+            above=0.0,
+            help="With --kind one-mass and two runs: mass (kg) that was added to the table in the second.",
+        ),
+    ] = None
+    added_mass_uncertainty: Annotated[
+        float,
+        number("--added-mass-uncertainty", least=0.0, help="Standard uncertainty of --added-mass (kg)."),
+    ] = 0.0
+
+    def check(self, kind: str, runs: int) -> None:
+        """Refuse an added mass that does not fit the other options. Raises CommandError."""
+        if self.added_mass is not None and (kind != "one-mass" or runs != 2):
+            raise CommandError(
+                "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with"
+                " the added mass"
+            )
+        if self.added_mass is None and self.added_mass_uncertainty:
+            raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
+
+
+@with_options
 def analyze(
+    *,
     runs: RunsOrFolders,
-    model: Annotated[
-        str, typer.Option(help="auto, coulomb, coulomb+tilt, static, static+tilt or stribeck+tilt.")
-    ] = "auto",
+    model: Annotated[str, choice("--model", *_MODELS, help="Friction law; auto chooses one.")] = "auto",
     kind: Annotated[
-        str, typer.Option(help="two-mass, or one-mass for a bare table or any free decay.")
+        str,
+        choice("--kind", "two-mass", "one-mass", help="one-mass for a bare table or any free decay."),
     ] = "two-mass",
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
@@ -42,15 +79,7 @@ def analyze(
         int | None,
         typer.Option(metavar="N", help="Check the uncertainties by 100,000 draws and N full refits."),
     ] = None,
-    added_mass: Annotated[
-        float | None,
-        typer.Option(
-            help="With --kind one-mass and two runs: mass (kg) that was added to the table in the second."
-        ),
-    ] = None,
-    added_mass_uncertainty: Annotated[
-        float, typer.Option(help="Standard uncertainty of --added-mass (kg).")
-    ] = 0.0,
+    added: AddedMassOptions,
     save: Annotated[
         bool, typer.Option("--save", help="Keep the result in the run, unless the same is kept and stands.")
     ] = False,
@@ -60,30 +89,23 @@ def analyze(
     figure: Annotated[
         Path | None, typer.Option(help="Draw record against simulation to this PNG, SVG or PDF (one run).")
     ] = None,
-    jobs: Jobs = None,
-    dask: Dask = "",
+    jobs: JobOptions,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
-    from app.cli import output as out
-    from app.runs.batch.tasks import AnalysisTask
-    from app.runs.listing import resolve_run_files
-
     request = _request(model, kind, table_mass, plate_mass, monte_carlo)
-    crew = executor_options(jobs, dask)
+    executor = jobs.executor()
     paths = resolve_run_files(runs)
-    check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(paths))
+    added.check(request.kind, len(paths))
     target = _figure_file(figure, len(paths), force)
     tasks = [AnalysisTask(str(path), request, save, anew) for path in paths]
+    outcomes = _analyze_with_figure(tasks[0], target) if target else _analyze_runs(tasks, executor)
     failed = False
-    with (
-        out.print_json_list() if as_json else nullcontext(_discard) as add,
-        closing(_analyze_with_figure(tasks[0], target) if target else _analyze_runs(tasks, crew)) as outcomes,
-    ):
+    with out.print_json_list() if as_json else nullcontext(_discard) as add, closing(outcomes):
         documents: Iterator[dict[str, Any]] = (_report_run(outcome, as_json) for outcome in outcomes)
-        if added_mass is not None:  # the mass comes of both, or nothing is said
-            documents = _with_mass(list(documents), added_mass, added_mass_uncertainty, as_json)
+        if added.added_mass is not None:  # computed from both analyses, or not at all
+            documents = _with_table_mass(list(documents), added, as_json)
         for document in documents:
             failed |= "error" in document
             add(document)
@@ -92,21 +114,20 @@ def analyze(
 
 
 def _discard(_document: object) -> None:
-    """Take what nobody asked for in JSON."""
+    """Take a JSON object that is not printed."""
 
 
-def _with_mass(
-    documents: list[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
+def _with_table_mass(
+    documents: list[dict[str, Any]], added: AddedMassOptions, as_json: bool
 ) -> Iterator[dict[str, Any]]:
-    """Add the mass of the table to the analyses of both runs, unless one failed."""
-    if not any("error" in document for document in documents):
-        documents.append(compute_table_mass(documents, added_kg, uncertainty_kg, as_json))
+    """Append the mass of the table to the analyses of both runs, unless one failed."""
+    if added.added_mass is not None and not any("error" in document for document in documents):
+        mass = Quantity.normal(added.added_mass, added.added_mass_uncertainty, "kg")
+        documents.append(_table_mass_document(documents, mass, as_json))
     return iter(documents)
 
 
 def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
-    from app.cli import output as out
-
     if figure is None:
         return None
     if runs > 1:
@@ -118,24 +139,14 @@ def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
 
 def _request(
     model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
-) -> "AnalysisRequest":
-    """What was asked for, refused before any run is read where it cannot be."""
-    from analysis.laws.catalogue import LAWS
-    from app.runs.analyze import REFITS_MAX, REFITS_MIN, AnalysisRequest
-
-    positive("--table-mass", table_mass)
-    positive("--plate-mass", plate_mass)
-    models = ("auto", *(law.name for law in LAWS))
-    if model not in models:
-        raise CommandError(f"--model {model!r} is not known. Use {', '.join(models)}")
+) -> AnalysisRequest:
+    """Build the request. Raises CommandError for options that do not fit together."""
     if kind == "one-mass":
         if model != "auto" or monte_carlo is not None:
             raise CommandError(
-                "--model and --monte-carlo are of two masses. Leave them out with --kind one-mass"
+                "--model and --monte-carlo are for two masses. Leave them out with --kind one-mass"
             )
         return AnalysisRequest(kind="one-mass", table_mass_kg=table_mass, plate_mass_kg=plate_mass)
-    if kind != "two-mass":
-        raise CommandError(f"--kind {kind!r} is not known. Use two-mass or one-mass")
     if monte_carlo is not None and monte_carlo != 0 and not REFITS_MIN <= monte_carlo <= REFITS_MAX:
         raise CommandError(
             f"--monte-carlo {monte_carlo} refits give no interval. Give {REFITS_MIN} to {REFITS_MAX}, some"
@@ -144,23 +155,14 @@ def _request(
     return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
 
 
-def _analyze_runs(tasks: "list[AnalysisTask]", options: "ExecutorOptions") -> "Generator[AnalysisOutcome]":
-    from app.cli import output as out
-    from app.runs.batch.executors import open_executor
-    from app.runs.batch.tasks import analyze_runs
-
+def _analyze_runs(tasks: list[AnalysisTask], options: ExecutorOptions) -> Generator[AnalysisOutcome]:
     description = Path(tasks[0].path).name if len(tasks) == 1 else f"{len(tasks)} runs"
-    with out.progress_bar(description, total=1.0) as update, open_executor(options, len(tasks)) as crew:
-        yield from analyze_runs(tasks, crew, update)
+    with out.progress_bar(description, total=1.0) as update, open_executor(options, len(tasks)) as executor:
+        yield from analyze_runs(tasks, executor, update)
 
 
-def _analyze_with_figure(task: "AnalysisTask", figure: Path) -> "Generator[AnalysisOutcome]":
+def _analyze_with_figure(task: AnalysisTask, figure: Path) -> Generator[AnalysisOutcome]:
     """Analyse a run here, and draw it."""
-    from app.cli import output as out
-    from app.cli.errors import error_text
-    from app.runs.analyze import analyze_run
-    from app.runs.batch.tasks import AnalysisOutcome, build_outcome
-
     path = Path(task.path)
     try:
         with out.progress_bar(path.name, total=1.0) as update:
@@ -172,12 +174,8 @@ def _analyze_with_figure(task: "AnalysisTask", figure: Path) -> "Generator[Analy
         yield build_outcome(analysis)
 
 
-def _report_run(outcome: "AnalysisOutcome", as_json: bool) -> dict[str, Any]:
+def _report_run(outcome: AnalysisOutcome, as_json: bool) -> dict[str, Any]:
     """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
-    from app.cli import output as out
-    from app.cli.analysis_text import print_analysis
-    from app.cli.recover import print_interrupted_run
-
     if outcome.document is None:
         said = outcome.error if outcome.run in outcome.error else f"{outcome.run}: {outcome.error}"
         out.print_status(f"error: {said}")
@@ -190,40 +188,21 @@ def _report_run(outcome: "AnalysisOutcome", as_json: bool) -> dict[str, Any]:
     return outcome.document
 
 
-def save_figure(analysis: "Analysis", path: Path) -> None:
+def save_figure(analysis: Analysis, path: Path) -> None:
     """Write the figure of record against simulation."""
     from app.reports.figures.record_figure import save_record_figure
 
     save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
 
 
-def check_added_mass(added_kg: float | None, uncertainty_kg: float, kind: str, runs: int) -> None:
-    """Refuse an added mass that cannot be, or does not go with what else was asked. Raises CommandError."""
-    positive("--added-mass", added_kg)
-    if not 0.0 <= uncertainty_kg < float("inf"):
-        raise CommandError(f"--added-mass-uncertainty {uncertainty_kg:g} must be a finite number, 0 or above")
-    if added_kg is not None and (kind != "one-mass" or runs != 2):
-        raise CommandError(
-            "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with the"
-            " added mass"
-        )
-    if added_kg is None and uncertainty_kg:
-        raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
-
-
-def compute_table_mass(
-    documents: Sequence[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
+def _table_mass_document(
+    documents: Sequence[dict[str, Any]], added: Quantity, as_json: bool
 ) -> dict[str, Any]:
     """JSON object of the mass of the table from the analyses of two runs, the second with the added mass.
 
     The time base is common to both runs and cancels, so that the periods count with their noise alone.
     """
-    from analysis.one_mass.identify import mass_from_added_mass
-    from analysis.quantities import Quantity
-    from app.runs.analysis_json import quantity_document
-
     alone, loaded = documents
-    added = Quantity.normal(added_kg, uncertainty_kg, "kg")
     mass = mass_from_added_mass(
         _quantity(alone, "period_s"),
         _quantity(loaded, "period_s"),
@@ -242,8 +221,6 @@ def compute_table_mass(
 
 def _quantity(document: dict[str, Any], name: str) -> Any:
     """A result with its type A uncertainty."""
-    from analysis.quantities import BudgetSource, Quantity
-
     result = document["results"][name]
     noise = [
         line["standard_uncertainty"]

@@ -1,14 +1,15 @@
 """`slipstand audit`: whether a published table agrees with itself and with the equations of motion."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from analysis.audit import AuditReport
+from analysis.audit import audit as check
+from app.cli import output as out
 from app.cli.options import Json
-
-if TYPE_CHECKING:
-    from analysis.audit import AuditReport
+from config.files import load_published_rows, load_stand, published_table
 
 
 def audit(
@@ -21,10 +22,6 @@ def audit(
 
     Each row is checked for stiffness, damping, velocity, acceleration, breakaway and residual.
     """
-    from analysis.audit import audit as check
-    from app.cli import output as out
-    from config.files import load_published_rows, load_stand, published_table
-
     rows = load_published_rows(table.expanduser()) if table else list(published_table().values())
     stand = load_stand()
     report = check(
@@ -40,9 +37,7 @@ def audit(
         _print_report(report)
 
 
-def _print_report(report: "AuditReport") -> None:
-    from app.cli import output as out
-
+def _print_report(report: AuditReport) -> None:
     rows = [
         (row.series, check.flag, f"{check.printed:.4g}", f"{check.expected:.4g}")
         for row in report.rows

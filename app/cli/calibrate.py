@@ -1,79 +1,139 @@
 """`slipstand calibrate`: counts of a gauge against a dial gauge, to a calibration file."""
 
+import dataclasses
 import datetime
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from analysis.calibration.calibrate import Calibration, DialGauge
+from analysis.calibration.calibrate import calibrate as find_calibration
+from analysis.calibration.points import CalibrationPoints
 from analysis.formatting import format_value
+from app.acquisition.messages import PortSettings
 from app.cli import output as out
 from app.cli.calibration_check import check
+from app.cli.calibration_live import measure_points
 from app.cli.errors import CommandError
 from app.cli.options import (
-    Baud,
-    DeviceRate,
-    DeviceSettings,
+    CalibrationFile,
+    FigureFile,
     Json,
-    Parity,
-    RelativePort,
-    finite,
-    port_settings,
-    positive,
+    LinkOptions,
+    calibration_file,
+    check_figure_file,
+    choice,
+    number,
+    with_options,
 )
-
-if TYPE_CHECKING:
-    from analysis.calibration.calibrate import Calibration
-    from analysis.calibration.points import CalibrationPoints
-    from app.acquisition.messages import PortSettings
-    from app.runs.calibration_points import CalibrationDetails
+from app.runs.analysis_json import quantity_document as describe_quantity
+from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, read_points
+from config.files import activate_calibration, config_directory, load_gauges, save_calibration
 
 _CHANNELS = {"table": 0, "relative": 1}
-_DATE = ["%Y-%m-%d"]
 
 
-commands = typer.Typer(invoke_without_command=True)
+@dataclasses.dataclass(frozen=True)
+class ReadingOptions:
+    """Where the readings come from: a file, or a device."""
+
+    points: Annotated[
+        Path | None,
+        typer.Option("--points", help="CSV of readings: counts, dial_mm, perhaps direction and round."),
+    ] = None
+    port: Annotated[
+        str | None, typer.Option("--port", help="Serial port or URL, to read the counts live.")
+    ] = None
+    protocol: Annotated[str | None, typer.Option("--protocol", help="Protocol name, with --port.")] = None
+    settle: Annotated[
+        float, number("--settle", above=0.0, help="Seconds over which counts are averaged.")
+    ] = 1.0
+
+    def device(self, link: LinkOptions) -> PortSettings | None:
+        """Return the device to read; None for a file. Raises CommandError unless one of them is given."""
+        if (self.points is None) == (self.port is None):
+            raise CommandError("give the readings with --points FILE, or a device with --port and --protocol")
+        if self.port is None:
+            return None
+        if self.protocol is None:
+            raise CommandError(f"--port {self.port} needs --protocol. See `slipstand device list`")
+        return link.port_settings(self.port, self.protocol)
+
+
+@dataclasses.dataclass(frozen=True)
+class CertificateOptions:
+    """What is stated of dial gauge and calibration."""
+
+    dial_resolution: Annotated[
+        float, number("--dial-resolution", least=0.0, help="Resolution of the dial readings (mm).")
+    ] = 0.01
+    dial_uncertainty: Annotated[
+        float | None,
+        number(
+            "--dial-uncertainty",
+            least=0.0,
+            help="Standard uncertainty of the dial gauge, of its certificate (mm).",
+        ),
+    ] = None
+    reference: Annotated[str | None, typer.Option("--reference", help="Which dial gauge.")] = None
+    certificate: Annotated[str, typer.Option("--certificate", help="Its certificate.")] = ""
+    serial_number: Annotated[str | None, typer.Option("--serial-number", help="Of the gauge calibrated.")] = (
+        None
+    )
+    gauge_range: Annotated[float | None, number("--range", above=0.0, help="Range of the gauge (mm).")] = None
+    by: Annotated[str, typer.Option("--by", help="Who calibrates.")] = ""
+    valid_until: Annotated[
+        datetime.datetime | None,
+        typer.Option("--valid-until", formats=["%Y-%m-%d"], help="Last day on which it holds."),
+    ] = None
+
+    def dial(self) -> DialGauge:
+        """Return the dial gauge."""
+        return DialGauge(self.dial_resolution * 1e-3, _from_mm(self.dial_uncertainty))
+
+    def details(self) -> CalibrationDetails:
+        """Return what is kept beside the calibration. Raises CommandError."""
+        today = datetime.datetime.now().astimezone().date()
+        last_day = self.valid_until.date() if self.valid_until else None
+        if last_day is not None and last_day < today:
+            raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
+        reference = f"dial gauge {self.dial_resolution:g} mm" if self.reference is None else self.reference
+        return CalibrationDetails(
+            today,
+            last_day,
+            reference,
+            self.certificate,
+            self.by,
+            self.serial_number,
+            _from_mm(self.gauge_range),
+        )
+
+
+commands = typer.Typer(invoke_without_command=True, add_completion=False, rich_markup_mode=None)
 commands.command("check")(check)
 
 
 @commands.callback()
+@with_options
 def calibrate(
+    *,
     context: typer.Context,
-    gauge: Annotated[str | None, typer.Option(help="table (gauge 1) or relative (gauge 2).")] = None,
-    points: Annotated[
-        Path | None, typer.Option(help="CSV of readings: counts, dial_mm, perhaps direction and round.")
+    gauge: Annotated[
+        str | None, choice("--gauge", *_CHANNELS, help="table (gauge 1) or relative (gauge 2).")
     ] = None,
-    port: Annotated[str | None, typer.Option(help="Serial port or URL, to read the counts live.")] = None,
-    protocol: Annotated[str | None, typer.Option(help="Protocol name, with --port.")] = None,
-    rate: DeviceRate = None,
-    baud: Baud = None,
-    parity: Parity = "N",
-    relative_port: RelativePort = "",
-    settings: DeviceSettings = None,
-    settle: Annotated[float, typer.Option(help="Seconds over which counts are averaged.")] = 1.0,
+    source: ReadingOptions,
+    link: LinkOptions,
     degree: Annotated[int, typer.Option(help="1 for a line, 2 or 3 for a polynomial.")] = 1,
-    dial_resolution: Annotated[float, typer.Option(help="To which the dial is read (mm).")] = 0.01,
-    dial_uncertainty: Annotated[
-        float | None, typer.Option(help="Standard uncertainty of the dial gauge, of its certificate (mm).")
-    ] = None,
-    reference: Annotated[str | None, typer.Option(help="Which dial gauge.")] = None,
-    certificate: Annotated[str, typer.Option(help="Its certificate.")] = "",
-    serial_number: Annotated[str | None, typer.Option(help="Of the gauge calibrated.")] = None,
-    gauge_range: Annotated[float | None, typer.Option("--range", help="Range of the gauge (mm).")] = None,
-    by: Annotated[str, typer.Option(help="Who calibrates.")] = "",
-    valid_until: Annotated[
-        datetime.datetime | None, typer.Option(formats=_DATE, help="Last day on which it holds.")
-    ] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(help="File that brings all else; gauges.toml if absent.")
-    ] = None,
+    certificate: CertificateOptions,
+    calibration: CalibrationFile = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="A new file; a dated one beside gauges.toml if absent."),
     ] = None,
     use: Annotated[bool, typer.Option("--use", help="Make it gauges.toml; the one before is kept.")] = False,
-    figure: Annotated[Path | None, typer.Option(help="Draw readings and residuals: PNG, SVG or PDF.")] = None,
+    figure: FigureFile = None,
     as_json: Json = False,
 ) -> None:
     """Calibrate a gauge against a dial: live, or from a file.
@@ -84,123 +144,58 @@ def calibrate(
     """
     if context.invoked_subcommand is not None:
         return
-    from analysis.calibration.calibrate import DialGauge
-    from analysis.calibration.calibrate import calibrate as find_calibration
-    from app.cli.recording import calibration_file
-    from app.runs.calibration_points import CalibrationDetails
-
-    for name, value in (("--settle", settle), ("--range", gauge_range)):
-        positive(name, value)
-    for name, value in (("--dial-resolution", dial_resolution), ("--dial-uncertainty", dial_uncertainty)):
-        finite(name, value, least=0.0)
-    gauge = _check_words(gauge, degree, figure)
-    live = _port_of(points, port, protocol, rate, baud, parity, relative_port, settings)
+    if gauge is None:
+        raise typer.BadParameter("it must be given: table or relative", param_hint="'--gauge'")
+    if degree not in (1, 2, 3):
+        raise CommandError(f"--degree {degree} is not offered. Use 1 for a line, 2 or 3")
+    figure = check_figure_file(figure)
+    device = source.device(link)
     base = calibration_file(calibration)
     target = _new_file(output)
-    dial = DialGauge(dial_resolution * 1e-3, None if dial_uncertainty is None else dial_uncertainty * 1e-3)
-    today = datetime.datetime.now().astimezone().date()
-    last_day = valid_until.date() if valid_until else None
-    if last_day is not None and last_day < today:
-        raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
-    about = CalibrationDetails(
-        today, last_day,
-        f"dial gauge {dial_resolution:g} mm" if reference is None else reference, certificate, by,
-        serial_number, None if gauge_range is None else gauge_range * 1e-3,
-    )  # fmt: skip
-    readings = _readings(points, live, base, gauge, settle, target)
-    found = find_calibration(readings, dial, degree)
-    file, kept = _save(gauge, found, about, base, target, use)
-    _draw(figure, found, gauge)
+    details = certificate.details()
+    points = _readings(source, device, base, gauge, target)
+    found = find_calibration(points, certificate.dial(), degree)
+    file, kept = _save(gauge, found, details, base, target, use)
+    if figure is not None:
+        from app.reports.figures.gauge_figures import save_calibration_figure  # loads matplotlib
+
+        save_calibration_figure(figure, found, f"calibration of the {gauge} gauge")
     print_calibration(gauge, found, file, kept, use=use, as_json=as_json)
 
 
-def _check_words(gauge: str | None, degree: int, figure: Path | None) -> str:
-    """Return the gauge, if all words are known. Raises CommandError."""
-    if gauge is None:
-        raise typer.BadParameter("it must be given: table or relative", param_hint="'--gauge'")
-    if gauge not in _CHANNELS:
-        raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
-    if degree not in (1, 2, 3):
-        raise CommandError(f"--degree {degree} is not offered. Use 1 for a line, 2 or 3")
-    if figure is not None and figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    if figure is not None and not figure.expanduser().absolute().parent.is_dir():
-        raise CommandError(
-            f"--figure {figure}: there is no such folder. Make it first or choose another path"
-        )
-    return gauge
-
-
-def _port_of(
-    points: Path | None,
-    port: str | None,
-    protocol: str | None,
-    rate: float | None,
-    baud: int | None,
-    parity: str,
-    relative_port: str,
-    settings: list[str] | None,
-) -> "PortSettings | None":
-    """The device to read, None for a file. Raises CommandError unless exactly one of them is given."""
-    if (points is None) == (port is None):
-        raise CommandError("give the readings with --points FILE, or a device with --port and --protocol")
-    if port is None:
-        return None
-    if protocol is None:
-        raise CommandError(f"--port {port} needs --protocol. See `slipstand device list`")
-    return port_settings(port, protocol, relative_port, rate, baud, parity, settings)
+def _from_mm(length_mm: float | None) -> float | None:
+    return None if length_mm is None else length_mm * 1e-3
 
 
 def _new_file(output: Path | None) -> Path | None:
-    from app.cli.output import output_file
-
     if output is None:
         return None
     if output.suffix != ".toml":
         raise CommandError(f"-o {output.name} has no known ending. Use .toml")
-    return output_file(output, force=False)
+    return out.output_file(output, force=False)
 
 
 def _readings(
-    points: Path | None,
-    live: "PortSettings | None",
-    base: Path,
-    gauge: str,
-    settle_s: float,
-    target: Path | None,
-) -> "CalibrationPoints":
-    from app.cli.calibration_live import measure_points
-    from app.runs.calibration_points import read_points
-    from config.files import config_directory, load_gauges
-
+    source: ReadingOptions, device: PortSettings | None, base: Path, gauge: str, target: Path | None
+) -> CalibrationPoints:
     gauges = load_gauges(base)
-    if points is not None:
-        return read_points(points.expanduser())
-    if live is None:
+    if source.points is not None:
+        return read_points(source.points.expanduser())
+    if device is None:
         raise CommandError("there is neither a file nor a device. Give --points or --port")
     folder = target.parent if target else config_directory()
     folder.mkdir(parents=True, exist_ok=True)
     stamp = datetime.datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
     kept = folder / f"readings-{gauge}-{stamp}.csv"
-    return measure_points(live, gauges, _CHANNELS[gauge], settle_s, kept)
+    return measure_points(device, gauges, _CHANNELS[gauge], source.settle, kept)
 
 
 def _save(
-    name: str, found: "Calibration", about: "CalibrationDetails", base: Path, target: Path | None, use: bool
+    name: str, found: Calibration, about: CalibrationDetails, base: Path, target: Path | None, use: bool
 ) -> tuple[Path, Path | None]:
-    from app.runs.calibration_points import calibrated_gauge
-    from config.files import activate_calibration, load_gauges, save_calibration
-
     before = getattr(load_gauges(base), name)
     file = save_calibration({name: calibrated_gauge(before, found, about)}, base, about.date, target)
     return file, activate_calibration(file, about.date) if use else None
-
-
-def _draw(figure: Path | None, found: "Calibration", gauge: str) -> None:
-    if figure is not None:
-        from app.reports.figures.gauge_figures import save_calibration_figure
-
-        save_calibration_figure(figure.expanduser(), found, f"calibration of the {gauge} gauge")
 
 
 _MERITS = (
@@ -212,7 +207,7 @@ _MERITS = (
 
 
 def print_calibration(
-    gauge: str, found: "Calibration", file: Path, kept: Path | None, *, use: bool, as_json: bool
+    gauge: str, found: Calibration, file: Path, kept: Path | None, *, use: bool, as_json: bool
 ) -> None:
     """Say what was found and where it is."""
     if as_json:
@@ -232,11 +227,9 @@ def print_calibration(
 
 
 def calibration_document(
-    gauge: str, found: "Calibration", file: Path, kept: Path | None, used: bool
+    gauge: str, found: Calibration, file: Path, kept: Path | None, used: bool
 ) -> dict[str, Any]:
     """JSON object of a calibration."""
-    from app.runs.analysis_json import quantity_document as describe_quantity
-
     readings = found.points
     rows = zip(
         readings.counts,
@@ -281,7 +274,7 @@ def calibration_document(
     }  # fmt: skip
 
 
-def _say_readings(found: "Calibration") -> None:
+def _say_readings(found: Calibration) -> None:
     readings, most_m = found.points, float(max(abs(found.residual_m))) or 1.0
     out.print_table(
         ("round", "way", "dial (mm)", "counts", "residual (µm)", _scale(most_m)),
@@ -315,7 +308,7 @@ def _mark(share: float, mark: str) -> str:
     return "".join(line)
 
 
-def _say_result(found: "Calibration") -> None:
+def _say_result(found: Calibration) -> None:
     gain, zero = found.gain_m_per_count, found.zero_count
     relative = found.gain_relative_standard_uncertainty
     out.print_line(f"gain           {gain.value:.7g} m/count, standard uncertainty {relative:.2g} of it")

@@ -2,36 +2,31 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from analysis.calibration.points import CalibrationPoints
+from app.acquisition.gauge_samples import AveragedCounts, CountAverager, NoAverageError
+from app.acquisition.messages import PortSettings
+from app.acquisition.run_setup import complete_port_settings
+from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out
 from app.cli.errors import CommandError
-
-if TYPE_CHECKING:
-    from analysis.calibration.points import CalibrationPoints
-    from app.acquisition.gauge_samples import AveragedCounts, CountAverager
-    from app.acquisition.messages import PortSettings
-    from config.schema import Gauges
+from app.runs.calibration_points import write_points
+from config.schema import Gauges
 
 _WINDOWS = 5
 
 
 def measure_points(
-    port: "PortSettings", gauges: "Gauges", channel: int, window_s: float, kept: Path
-) -> "CalibrationPoints":
+    port: PortSettings, gauges: Gauges, channel: int, window_s: float, kept: Path
+) -> CalibrationPoints:
     """Ask for dial readings on stdin and average the counts at each; `kept` is written with every one.
 
     Raises
     ------
     DriverError, AcquisitionError, CalibrationError
     """
-    import numpy as np
-
-    from analysis.calibration.points import CalibrationPoints
-    from app.acquisition.gauge_samples import CountAverager
-    from app.acquisition.run_setup import complete_port_settings
-    from app.acquisition.stream.live_stream import open_stream
-
     with (
         open_stream(complete_port_settings(port, gauges.device), gauges) as stream,
         CountAverager(stream, channel) as still,
@@ -51,7 +46,7 @@ def measure_points(
 
 
 class _Dialogue:
-    def __init__(self, still: "CountAverager", window_s: float, kept: Path) -> None:
+    def __init__(self, still: CountAverager, window_s: float, kept: Path) -> None:
         self._still = still
         self._window_s = window_s
         self._kept = kept
@@ -83,8 +78,6 @@ class _Dialogue:
             self._keep()
 
     def _take(self, dial_mm: float) -> None:
-        from app.acquisition.gauge_samples import NoAverageError
-
         try:
             average = self._still.steady_average(self._window_s, _WINDOWS, _print_moving)
         except NoAverageError as error:
@@ -98,8 +91,6 @@ class _Dialogue:
         out.print_status(f"{dial_mm:g} mm: {average.counts:.8g} counts, noise {average.noise_counts:.3g}")
 
     def _keep(self) -> None:
-        from app.runs.calibration_points import write_points
-
         try:
             write_points(self._kept, self.counts, [dial_mm * 1e-3 for dial_mm in self.dial_mm])
         except OSError as error:
@@ -109,5 +100,5 @@ class _Dialogue:
             ) from None
 
 
-def _print_moving(average: "AveragedCounts") -> None:
+def _print_moving(average: AveragedCounts) -> None:
     out.print_status(f"still moving by {average.creep_counts:.3g} counts, waiting")

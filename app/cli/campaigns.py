@@ -2,25 +2,24 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
+from analysis.campaign.campaign import Campaign
+from app.cli import output as out
 from app.cli.errors import CommandError
-
-if TYPE_CHECKING:
-    from analysis.campaign.campaign import Campaign
-    from app.runs.batch.executors import ExecutorOptions
-    from app.runs.campaign.collect import CollectedRuns
+from app.runs.batch.executors import ExecutorOptions
+from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_runs
+from app.runs.listing import resolve_run_files
 
 
 def load_campaign(
     paths: Sequence[Path],
-    crew: "ExecutorOptions",
+    crew: ExecutorOptions,
     *,
     save: bool = False,
     excluded: Mapping[str, str] | None = None,
-) -> tuple["CollectedRuns", "Campaign"]:
+) -> tuple[CollectedRuns, "Campaign"]:
     """Gather run files and folders of runs, and sum them up.
 
     Parameters
@@ -35,9 +34,6 @@ def load_campaign(
     ------
     RunError
     """
-    from app.cli import output as out
-    from app.runs.campaign.collect import CollectOptions, collect_runs
-
     with out.progress_bar("gathering", total=1.0) as update:
         gathered = collect_runs(paths, CollectOptions(crew, save=save, excluded=dict(excluded or {})), update)
     return gathered, gathered.campaign()
@@ -45,8 +41,6 @@ def load_campaign(
 
 def exit_with_failures(failures: Iterable[tuple[str, str]]) -> None:
     """Say on stderr which runs gave no result and why, and end with exit code 1 where there are any."""
-    from app.cli import output as out
-
     failed = False
     for run, reason in failures:
         out.print_status(f"error: {run}: {reason}")
@@ -63,8 +57,6 @@ def excluded_runs(paths: Sequence[Path], given: Sequence[str]) -> dict[str, str]
     CommandError
         A name that is none of a run there, or of several.
     """
-    from app.runs.listing import resolve_run_files
-
     files = resolve_run_files([path.expanduser().absolute() for path in paths]) if given else []
     reasons = {}
     for each in given:

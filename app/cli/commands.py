@@ -1,49 +1,154 @@
-"""The commands and what they are called. Each lives in a module of its own name."""
+"""The commands of `slipstand`. A command's module is imported when the command runs."""
 
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from app.cli.analyze import analyze
-from app.cli.audit import audit
-from app.cli.calibrate import commands as calibrate
-from app.cli.demo import demo
-from app.cli.device import commands as device
-from app.cli.doctor.command import doctor
-from app.cli.edit import edit
-from app.cli.export import export
-from app.cli.figures import figures
-from app.cli.health import health
-from app.cli.import_record import import_record
-from app.cli.plan import plan
-from app.cli.record import record
-from app.cli.recover import recover
-from app.cli.report import report
-from app.cli.runs import runs, trash
-from app.cli.simulate import simulate
-from app.cli.table import table
+from app.version import __version__
 
-app = typer.Typer(
+
+class CommandEntry(NamedTuple):
+    """A command before its module is imported.
+
+    Attributes
+    ----------
+    name : str
+        As on the command line.
+    target : str
+        "module:name" of its function, or of the `typer.Typer` of a group of commands.
+    summary : str
+        First line of the function's docstring, for the list of commands.
+    example : str
+        Shown below the help.
+    """
+
+    name: str
+    target: str
+    summary: str
+    example: str = ""
+
+    def load(self) -> Any:
+        """Import the module, and return the Click command."""
+        module, _, name = self.target.partition(":")
+        target = getattr(import_module(f"app.cli.{module}"), name)
+        if not isinstance(target, typer.Typer):
+            function, target = target, _typer()
+            target.command(self.name, epilog=self.example or None)(function)
+        command = typer.main.get_command(target)
+        command.name = self.name
+        return command
+
+
+class LazyGroup(TyperGroup):
+    """A group that lists its commands without importing them."""
+
+    entries: ClassVar[tuple[CommandEntry, ...]] = ()
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        groups, self.commands = self.commands, {}
+        for entry in self.entries:
+            self.add_command(TyperCommand(entry.name, help=entry.summary))
+        self.commands |= groups
+        self._entries = {entry.name: entry for entry in self.entries}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Return name, command and remaining arguments, with the command's module imported."""
+        name, command, rest = super().resolve_command(ctx, args)
+        entry = self._entries.get(name or "")
+        return name, entry.load() if entry else command, rest
+
+
+class SlipstandGroup(LazyGroup):
+    """Commands of `slipstand`."""
+
+    entries = (
+        CommandEntry("demo", "demo:demo", "Record a simulated pullback, and compare it with the truth."),
+        CommandEntry(
+            "record",
+            "record:record",
+            "Record a pullback test from a device into a run file.",
+            "Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
+        ),
+        CommandEntry(
+            "analyze", "analyze:analyze", "Identify friction, stiffness and damping of one or more runs."
+        ),
+        CommandEntry(
+            "simulate",
+            "simulate:simulate",
+            "Simulate one pullback test: numbers, a CSV file or a run.",
+            "Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv",
+        ),
+        CommandEntry(
+            "plan",
+            "plan:plan",
+            "Predict what a test will show, before it is made.",
+            "Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500",
+        ),
+        CommandEntry(
+            "import",
+            "import_record:import_record",
+            "Make a run of a CSV, .mat, .xlsx or .parquet file.",
+            "Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm --series 1FFM0"
+            " -o test.h5",
+        ),
+        CommandEntry("export", "export:export", "Write samples and coefficients of runs for other programs."),
+        CommandEntry("table", "table:table", "Pool runs to the paper's Table 1, a row a series."),
+        CommandEntry("figures", "figures:figures", "Draw the paper's figures 2 to 5 from runs, for print."),
+        CommandEntry("report", "report:report", "Write a test report of one run or a campaign, as PDF."),
+        CommandEntry("runs", "runs:runs", "List recorded runs, oldest first."),
+        CommandEntry(
+            "recover", "recover:recover", "Rebuild runs that a crash cut short, from their journals."
+        ),
+        CommandEntry("edit", "edit:edit", "Change what is known of runs, kept as history."),
+        CommandEntry("trash", "runs:trash", "Move runs to the trash, and bring them back."),
+        CommandEntry("audit", "audit:audit", "Check a published table against itself and the motion."),
+        CommandEntry(
+            "doctor", "doctor.command:doctor", "Check installation, settings, gauges, ports and clocks."
+        ),
+        CommandEntry(
+            "calibrate", "calibrate:commands", "Calibrate a gauge against a dial: live, or from a file."
+        ),
+    )
+
+
+class DeviceGroup(LazyGroup):
+    """Commands of `slipstand device`."""
+
+    entries = (
+        CommandEntry(
+            "list", "device:list_devices", "List the protocols, and what each was verified against."
+        ),
+        CommandEntry("ports", "device:list_ports", "List the serial ports of this computer."),
+        CommandEntry("probe", "device:probe", "Look at ports: what speaks on them, how to record it."),
+        CommandEntry(
+            "simulate", "simulate_device:simulate_device", "Be a simulated stand on a port until interrupted."
+        ),
+        CommandEntry("health", "health:health", "Look at both gauges at rest: noise, drift, hum, range."),
+    )
+
+
+def _typer(**settings: Any) -> typer.Typer:
+    return typer.Typer(
+        pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None, **settings
+    )
+
+
+app = _typer(
+    cls=SlipstandGroup,
     help="Measures dry friction on a shaking stand. "
     "`slipstand` alone opens the window, `slipstand --simulated` opens it on the simulated stand.",
-    pretty_exceptions_enable=False,
-    add_completion=False,
-    rich_markup_mode=None,
 )
-
-
-_RECORD = "Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0"
-_SIMULATE = "Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv"
-_PLAN = "Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500"
-_IMPORT = (
-    "Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm --series 1FFM0 -o test.h5"
+app.add_typer(
+    _typer(cls=DeviceGroup, help="Devices, ports and the simulated stand.", no_args_is_help=True),
+    name="device",
 )
 
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from app.version import __version__
-
         typer.echo(f"slipstand {__version__}")
         raise typer.Exit
 
@@ -54,25 +159,4 @@ def main_options(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Hold what stands before the commands."""
-
-
-app.command()(demo)
-app.command(epilog=_RECORD)(record)
-app.command()(analyze)
-app.command(epilog=_SIMULATE)(simulate)
-app.command(epilog=_PLAN)(plan)
-app.command("import", epilog=_IMPORT)(import_record)
-app.command()(export)
-app.command()(table)
-app.command()(figures)
-app.command()(report)
-app.command()(runs)
-app.command()(recover)
-app.command()(edit)
-app.command()(trash)
-app.command()(audit)
-app.command()(doctor)
-app.add_typer(calibrate, name="calibrate")
-device.command("health")(health)
-app.add_typer(device, name="device")
+    """Hold the options that stand before the command."""

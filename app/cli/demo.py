@@ -3,31 +3,55 @@
 import datetime
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import msgspec
 import typer
 
+from analysis.campaign.campaign import summarize
 from analysis.catalogue import Place, definition
 from analysis.formatting import format_value
+from app.acquisition.messages import EndReason, PortSettings, RunEnded, RunSettings
+from app.cli import output as out
+from app.cli.analysis_text import print_analysis
+from app.cli.analyze import save_figure
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Directory, Jobs, Json, executor_options, positive
-
-if TYPE_CHECKING:
-    from app.acquisition.messages import RunEnded
-    from app.runs.batch.executors import ExecutorOptions
-    from app.runs.campaign.collect import CollectedRuns
-    from app.simulated_stand.synthetic_campaign import CampaignOptions, Comparison, SyntheticTest
-    from app.simulated_stand.truth import StandTruth
+from app.cli.options import Directory, JobOptions, Json, calibration_file, number, with_options
+from app.cli.recording import record_with_progress
+from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.ordered_map import FailedItem
+from app.runs.batch.tasks import map_runs
+from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_runs
+from app.runs.listing import find_run_files
+from app.runs.paths import recordings_directory
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.synthetic_campaign import (
+    CampaignOptions,
+    Comparison,
+    SyntheticTest,
+    compare,
+    plan_tests,
+    record_test,
+    series_truths,
+)
+from app.simulated_stand.truth import StandTruth
+from config.files import load_gauges, load_stand
 
 _RECORD_S = 8.0
 """The demo's run ends this long after release."""
 
 
+@with_options
 def demo(
+    *,
     series: Annotated[
         str | None, typer.Option("--series", help="Series code; with --campaign several, 1FFM0,1FFM1.")
     ] = None,
-    friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
+    friction: Annotated[
+        float | None, number("--friction", above=0.0, help="True f_d; the series' if absent.")
+    ] = None,
     directory: Directory = None,
     campaign: Annotated[
         bool, typer.Option("--campaign", help="All series of Table 1, each some times, not in real time.")
@@ -37,8 +61,7 @@ def demo(
         float, typer.Option(help="With --campaign: standard deviation of f_d from run to run, as a share.")
     ] = 0.0,
     seed: Annotated[int, typer.Option(help="With --campaign: of everything that is drawn.")] = 1,
-    jobs: Jobs = None,
-    dask: Dask = "",
+    jobs: JobOptions,
     as_json: Json = False,
 ) -> None:
     """Record a simulated pullback, and compare it with the truth.
@@ -49,43 +72,19 @@ def demo(
     as runs; their table is held against the truth.
     """
     if campaign:
-        _campaign(
-            series, friction, directory, (repeats, scatter, seed), executor_options(jobs, dask), as_json
-        )
+        if friction is not None:
+            raise CommandError("--friction is for one test. In a campaign f_d is that of Table 1")
+        codes = tuple(code.strip() for code in (series or "").split(",") if code.strip())
+        try:
+            options = CampaignOptions(series=codes, repeats=repeats, friction_scatter=scatter, seed=seed)
+        except ValueError as error:
+            raise CommandError(str(error)) from None
+        demo_campaign(options, directory, jobs.executor(), as_json=as_json)
         return
     _one_test(series, friction, directory, as_json)
 
 
-def _campaign(
-    series: str | None,
-    friction: float | None,
-    directory: Path | None,
-    drawn: tuple[int, float, int],
-    crew: "ExecutorOptions",
-    as_json: bool,
-) -> None:
-    from app.simulated_stand.synthetic_campaign import CampaignOptions
-
-    if friction is not None:
-        raise CommandError("--friction is of one test. In a campaign f_d is that of Table 1")
-    repeats, scatter, seed = drawn
-    codes = tuple(code.strip() for code in (series or "").split(",") if code.strip())
-    try:
-        options = CampaignOptions(series=codes, repeats=repeats, friction_scatter=scatter, seed=seed)
-    except ValueError as error:
-        raise CommandError(str(error)) from None
-    demo_campaign(options, directory, crew, as_json=as_json)
-
-
 def _one_test(series: str | None, friction: float | None, directory: Path | None, as_json: bool) -> None:
-    from app.acquisition.messages import EndReason, PortSettings, RunSettings
-    from app.cli import output as out
-    from app.cli.recording import calibration_file, record_with_progress
-    from app.runs.paths import recordings_directory
-    from app.simulated_stand.client import SimulatedStand
-    from app.simulated_stand.options import SimulatedStandOptions
-
-    positive("--friction", friction)
     out.print_status("starting the simulated stand (a first start compiles the solver, up to a minute)")
     try:
         options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
@@ -109,14 +108,7 @@ def _one_test(series: str | None, friction: float | None, directory: Path | None
     _report(ended, truth, as_json)
 
 
-def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
-    import msgspec
-
-    from app.cli import output as out
-    from app.cli.analysis_text import print_analysis
-    from app.cli.analyze import save_figure
-    from app.runs.analyze import AnalysisRequest, analyze_run
-
+def _report(ended: RunEnded, truth: StandTruth, as_json: bool) -> None:
     path = Path(ended.path)
     with out.progress_bar("identifying", total=1.0) as update:
         analysis = analyze_run(path, AnalysisRequest(), save=True, progress=update)
@@ -138,8 +130,6 @@ _COMPARED = (
 
 def _compare(document: dict[str, Any]) -> None:
     """Write found beside true, and their difference in per cent and in standard uncertainties."""
-    from app.cli import output as out
-
     rows = []
     for row in map(definition, _COMPARED):
         found, true = document["results"].get(row.name), document["truth"][row.name]
@@ -155,14 +145,9 @@ def _compare(document: dict[str, Any]) -> None:
 
 
 def demo_campaign(
-    options: "CampaignOptions", directory: Path | None, crew: "ExecutorOptions", *, as_json: bool
+    options: CampaignOptions, directory: Path | None, executor: ExecutorOptions, *, as_json: bool
 ) -> None:
     """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
-    from analysis.campaign.campaign import summarize
-    from app.cli import output as out
-    from app.simulated_stand.synthetic_campaign import compare, plan_tests, series_truths
-    from config.files import load_gauges, load_stand
-
     stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
     folder = _new_folder(directory, now)
     tests = plan_tests(options, stand, gauges, folder, now)
@@ -170,8 +155,8 @@ def demo_campaign(
     out.print_status(
         f"{len(tests)} tests of {len({test.series for test in tests})} series are recorded in {folder}"
     )
-    _record(tests, crew)
-    gathered = _gather(tests, crew)
+    _record(tests, executor)
+    gathered = _gather(tests, executor)
     campaign = summarize(gathered.runs, known_contacts=tuple(stand.contacts))
     codes = [row.series.code for row in campaign.rows]
     compared = list(compare(campaign.rows, series_truths(options, stand, gauges, codes)))
@@ -188,9 +173,6 @@ def demo_campaign(
 
 def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
     """Where the runs go: no folder that holds runs already, whose truth would be another one."""
-    from app.runs.listing import find_run_files
-    from app.runs.paths import recordings_directory
-
     if directory is None:
         return recordings_directory() / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
     folder = directory.expanduser().resolve()
@@ -199,33 +181,22 @@ def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
     return folder
 
 
-def _record(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> None:
-    from app.cli import output as out
-    from app.runs.batch.executors import open_executor
-    from app.runs.batch.ordered_map import FailedItem
-    from app.runs.batch.tasks import map_runs
-    from app.simulated_stand.synthetic_campaign import record_test
-
-    with out.progress_bar("recording", total=1.0) as update, open_executor(crew, len(tests)) as workers:
+def _record(tests: Sequence[SyntheticTest], executor: ExecutorOptions) -> None:
+    with out.progress_bar("recording", total=1.0) as update, open_executor(executor, len(tests)) as workers:
         for came in map_runs(tests, record_test, workers, update):
             error = came.message if isinstance(came, FailedItem) else came.error
             if error:
                 raise CommandError(error)
 
 
-def _gather(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> "CollectedRuns":
-    from app.cli import output as out
-    from app.runs.campaign.collect import CollectOptions, collect_runs
-
+def _gather(tests: Sequence[SyntheticTest], executor: ExecutorOptions) -> CollectedRuns:
     with out.progress_bar("identifying", total=1.0) as update:
-        return collect_runs([Path(test.path) for test in tests], CollectOptions(crew, save=True), update)
+        return collect_runs([Path(test.path) for test in tests], CollectOptions(executor, save=True), update)
 
 
 def _document(
-    folder: Path, options: "CampaignOptions", compared: "Sequence[Comparison]", gathered: "CollectedRuns"
+    folder: Path, options: CampaignOptions, compared: Sequence[Comparison], gathered: CollectedRuns
 ) -> dict[str, Any]:
-    import msgspec
-
     rows: dict[str, dict[str, Any]] = {}
     for one in compared:
         row = rows.setdefault(one.series, {"series": one.series})
@@ -248,10 +219,8 @@ def _document(
     }
 
 
-def _show(compared: "Sequence[Comparison]") -> None:
+def _show(compared: Sequence[Comparison]) -> None:
     """Found, true, and the difference in standard uncertainties; `!` where the 95 % interval misses."""
-    from app.cli import output as out
-
     rows = [
         (
             one.series,

@@ -2,18 +2,20 @@
 
 import getpass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import msgspec
 import typer
 
+from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import PlateMass, Runs, SeriesCode, TableMass, positive
-
-if TYPE_CHECKING:
-    from app.runs.metadata import Conditions
-    from app.runs.metadata_io import Change
-    from app.runs.reader import Run
-    from config.schema import Gauges
+from app.cli.options import PlateMass, Runs, SeriesCode, TableMass, key_values, number
+from app.runs.edits import edit_run, series_fields, undo_edit
+from app.runs.metadata import Conditions
+from app.runs.metadata_io import Change
+from app.runs.reader import Run, open_run
+from config.files import load_gauges
+from config.schema import Gauges
 
 
 def edit(
@@ -21,7 +23,7 @@ def edit(
     series: SeriesCode = None,
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
-    pullback: Annotated[float | None, typer.Option(help="Nominal pullback (m).")] = None,
+    pullback: Annotated[float | None, number("--pullback", above=0.0, help="Nominal pullback (m).")] = None,
     operator: Annotated[str | None, typer.Option(help="Who recorded.")] = None,
     title: Annotated[str | None, typer.Option(help="Title of the run.")] = None,
     note: Annotated[str | None, typer.Option(help="A remark.")] = None,
@@ -45,16 +47,6 @@ def edit(
 
     What was measured is never touched, and --undo gives old values back.
     """
-    from app.cli import output as out
-    from app.runs.edits import edit_run, undo_edit
-    from app.runs.reader import open_run
-
-    for option, value in (
-        ("--table-mass", table_mass),
-        ("--plate-mass", plate_mass),
-        ("--pullback", pullback),
-    ):
-        positive(option, value)
     given: dict[str, Any] = {
         "table_mass_kg": table_mass, "plate_mass_kg": plate_mass, "pullback_m": pullback, "series": series,
         "operator": operator, "title": title, "note": note, "gauges": _gauges(calibration),
@@ -88,16 +80,12 @@ def _reason(exclude: str | None, *, include: bool) -> str | None:
     return exclude.strip()
 
 
-def _gauges(calibration: Path | None) -> "Gauges | None":
-    from config.files import load_gauges
-
+def _gauges(calibration: Path | None) -> Gauges | None:
     return None if calibration is None else load_gauges(calibration.expanduser())
 
 
-def _fields_of_run(run: "Run", given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
+def _fields_of_run(run: Run, given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
     """Fields of one run: a series brings the pullback and plate mass of the run's own stand."""
-    from app.runs.edits import series_fields
-
     fields = dict(given)
     if "series" in given:
         fields |= series_fields(run.metadata.stand, given["series"])
@@ -107,13 +95,8 @@ def _fields_of_run(run: "Run", given: dict[str, Any], condition: list[str] | Non
     return fields
 
 
-def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
+def _conditions(before: Conditions, pairs: list[str]) -> Conditions:
     """Conditions with some given anew; the others stay."""
-    import msgspec
-
-    from app.cli.options import key_values
-    from app.runs.metadata import Conditions
-
     given = Conditions.parse(key_values(pairs, "--condition"))
     new = {
         name: value for name, value in msgspec.structs.asdict(given).items() if value not in (None, "", {})
@@ -121,19 +104,15 @@ def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
     return before.replace(**new, other={**before.other, **given.other})
 
 
-def _print_history(run: "Run") -> None:
-    from app.cli import output as out
-
+def _print_history(run: Run) -> None:
     out.print_line(f"{run.path}: {len(run.changes)} {'edit' if len(run.changes) == 1 else 'edits'}")
-    for number, change in enumerate(run.changes, start=1):
+    for count, change in enumerate(run.changes, start=1):
         out.print_line(
-            f"  {number}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_change_text(change)}"
+            f"  {count}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_change_text(change)}"
         )
 
 
-def _change_text(change: "Change") -> str:
-    import msgspec
-
+def _change_text(change: Change) -> str:
     told = ", ".join(
         f"{name} = {msgspec.json.encode(value).decode()}" for name, value in change.fields.items()
     )

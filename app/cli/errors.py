@@ -1,5 +1,8 @@
 """Which exceptions are the user's or the machine's to mend, rather than faults of the program."""
 
+from app.presenters import error_reports  # only needed once something went wrong
+from app.runs.errors import internal_error
+
 
 class CommandError(Exception):
     """A command that cannot be done as asked. The message names the value, the fault and the remedy."""
@@ -7,8 +10,6 @@ class CommandError(Exception):
 
 def error_text(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
-    from app.runs.errors import internal_error
-
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}. Check the path, its rights and its disk"
     return " ".join(str(error).split()) if is_expected(error) else str(internal_error(error))
@@ -16,6 +17,4 @@ def error_text(error: Exception) -> str:
 
 def is_expected(error: Exception) -> bool:
     """Tell whether the error's own message is written for the user."""
-    from app.presenters import error_reports  # only needed once something went wrong
-
     return isinstance(error, CommandError) or error_reports.is_user_error(error)

@@ -3,22 +3,32 @@
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 
-from app.cli.errors import CommandError
-from app.cli.options import Force, Json, Runs
+from app.cli import output as out
+from app.cli.options import Force, Json, Runs, choice
+from app.runs.exchange.exporting import ExportRequest, export_runs
 
 
 def export(
     runs: Runs,
     format_name: Annotated[
-        str, typer.Option("--format", help="csv, json, parquet, mat, uff58, xlsx or latex.")
+        str,
+        choice("--format", "csv", "json", "parquet", "mat", "uff58", "xlsx", "latex", help="File format."),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="File to write; a folder for the samples of several runs.")
     ],
     content: Annotated[
-        str, typer.Option(help="samples, coefficients (one table of all runs), or both.")
+        str,
+        choice(
+            "--content",
+            "both",
+            "samples",
+            "coefficients",
+            help="samples, coefficients (one table of all runs), or both.",
+        ),
     ] = "both",
     force: Force = False,
     as_json: Json = False,
@@ -27,17 +37,7 @@ def export(
 
     The newest analysis kept in a run is taken, else it is analysed.
     """
-    import msgspec
-
-    from app.cli import output as out
-    from app.runs.exchange.exporting import ExportRequest, export_runs
-
-    try:
-        request = msgspec.convert(
-            {"format": format_name, "content": content, "replace": force}, ExportRequest
-        )
-    except msgspec.ValidationError:
-        raise CommandError(_not_allowed(format_name, content)) from None
+    request = msgspec.convert({"format": format_name, "content": content, "replace": force}, ExportRequest)
     target = output.expanduser().resolve()
     if len(runs) == 1 or request.is_one_file:
         target = target if target.is_dir() and not request.is_one_file else out.output_file(output, force)
@@ -55,9 +55,3 @@ def export(
             out.print_line(file)
     if any(outcome.error for outcome in outcomes):
         raise typer.Exit(1)
-
-
-def _not_allowed(format_name: str, content: str) -> str:
-    if content not in ("both", "samples", "coefficients"):
-        return f"--content {content!r} is not known. Use both, samples or coefficients"
-    return f"--format {format_name!r} is not known. Use csv, json, parquet, mat, uff58, xlsx or latex"

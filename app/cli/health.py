@@ -1,60 +1,53 @@
 """`slipstand device health`: how the gauges do while the stand rests."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from analysis.gauge_health import GaugeHealth, HealthGrade, measure_health
+from app.acquisition.gauge_samples import collect_samples
+from app.acquisition.messages import PortSettings
+from app.acquisition.run_setup import complete_port_settings
+from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out
-from app.cli.errors import CommandError
 from app.cli.options import (
-    Baud,
-    DeviceRate,
-    DeviceSettings,
+    CalibrationFile,
+    DeviceOptions,
+    FigureFile,
     Json,
-    Parity,
-    RelativePort,
-    port_settings,
-    positive,
+    calibration_file,
+    check_figure_file,
+    number,
+    with_options,
 )
-
-if TYPE_CHECKING:
-    from analysis.gauge_health import GaugeHealth
-    from app.acquisition.messages import PortSettings
-    from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauge_health import GAUGE_NAMES, GaugeHealthState, gauge_health_state
+from config.files import load_gauges
 
 
+@with_options
 def health(
-    port: Annotated[str, typer.Option(help="Serial port or URL of the device.")],
-    protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
-    seconds: Annotated[float, typer.Option(help="Seconds of looking; the stand rests meanwhile.")] = 5.0,
-    rate: DeviceRate = None,
-    baud: Baud = None,
-    parity: Parity = "N",
-    relative_port: RelativePort = "",
-    settings: DeviceSettings = None,
-    calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Draw the spectra: PNG, SVG or PDF.")] = None,
+    *,
+    source: DeviceOptions,
+    seconds: Annotated[
+        float, number("--seconds", above=0.0, help="Seconds of watching; the stand rests meanwhile.")
+    ] = 5.0,
+    calibration: CalibrationFile = None,
+    figure: FigureFile = None,
     as_json: Json = False,
 ) -> None:
     """Look at both gauges at rest: noise, drift, hum, range.
 
     Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
     """
-    from analysis.gauge_health import HealthGrade, measure_health
-    from app.cli.recording import calibration_file
-    from app.presenters.gauge_health import GAUGE_NAMES, gauge_health_state
-
-    positive("--seconds", seconds)
-    _check_figure(figure)
-    device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
-    title, pair = _watch_gauges(device, calibration_file(calibration), seconds)
+    figure = check_figure_file(figure)
+    title, pair = _watch_gauges(source.device(), calibration_file(calibration), seconds)
     measured = [measure_health(gauge) for gauge in pair]
     states = [gauge_health_state(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
     if figure is not None:
-        from app.reports.figures.gauge_figures import save_health_figure
+        from app.reports.figures.gauge_figures import save_health_figure  # loads matplotlib
 
-        save_health_figure(figure.expanduser(), measured, GAUGE_NAMES, title)
+        save_health_figure(figure, measured, GAUGE_NAMES, title)
     if as_json:
         out.print_json(health_document(title, seconds, measured, states))
     else:
@@ -63,23 +56,7 @@ def health(
         raise typer.Exit(1)
 
 
-def _check_figure(figure: Path | None) -> None:
-    if figure is None:
-        return
-    if figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    if not figure.expanduser().absolute().parent.is_dir():
-        raise CommandError(
-            f"--figure {figure}: there is no such folder. Make it first or choose another path"
-        )
-
-
-def _watch_gauges(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
-    from app.acquisition.gauge_samples import collect_samples
-    from app.acquisition.run_setup import complete_port_settings
-    from app.acquisition.stream.live_stream import open_stream
-    from config.files import load_gauges
-
+def _watch_gauges(port: PortSettings, gauges_file: Path, seconds: float) -> tuple[str, Any]:
     gauges = load_gauges(gauges_file)
     with open_stream(complete_port_settings(port, gauges.device), gauges) as stream:
         title = f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz"
@@ -87,7 +64,7 @@ def _watch_gauges(port: "PortSettings", gauges_file: Path, seconds: float) -> tu
         return title, collect_samples(stream, seconds, gauges)
 
 
-def _print_health(title: str, seconds: float, states: "list[GaugeHealthState]") -> None:
+def _print_health(title: str, seconds: float, states: list[GaugeHealthState]) -> None:
     out.print_line(f"{title}, {seconds:g} s at rest")
     rows = [
         (one.label, *(state.figures[line].value for state in states))
@@ -102,7 +79,7 @@ def _print_health(title: str, seconds: float, states: "list[GaugeHealthState]") 
 
 
 def health_document(
-    title: str, seconds: float, measured: "list[GaugeHealth]", states: "list[GaugeHealthState]"
+    title: str, seconds: float, measured: list[GaugeHealth], states: list[GaugeHealthState]
 ) -> dict[str, Any]:
     """JSON object of both gauges' health."""
     return {
@@ -116,7 +93,7 @@ def health_document(
     }
 
 
-def _numbers(health: "GaugeHealth") -> dict[str, Any]:
+def _numbers(health: GaugeHealth) -> dict[str, Any]:
     return {
         "samples": health.samples,
         "mean_m": health.mean_m,
@@ -134,7 +111,7 @@ def _numbers(health: "GaugeHealth") -> dict[str, Any]:
     }
 
 
-def _symptoms(state: "GaugeHealthState") -> list[dict[str, str]]:
+def _symptoms(state: GaugeHealthState) -> list[dict[str, str]]:
     return [
         {"code": one.code, "verdict": str(one.grade), "message": one.message, "remedy": one.remedy}
         for one in state.symptoms

@@ -1,72 +1,48 @@
 """`slipstand plan`: what a test will show, before it is made."""
 
-from pathlib import Path
 from typing import Annotated, Any
-
-import typer
 
 from analysis.catalogue import definition
 from analysis.formatting import format_value
-from app.cli.motion_options import (
-    N1,
-    Damping,
-    Friction,
-    Period,
-    Pullback,
-    StaticFriction,
-    Stiffness,
-    Tilt,
-    check_numbers,
-    check_samples,
-    two_mass_parameters,
-)
-from app.cli.options import Json, PlateMass, SeriesCode, TableMass
+from app.cli import output as out
+from app.cli.motion_options import MotionOptions, check_samples
+from app.cli.options import CalibrationFile, Json, number, with_options
+from app.runs.plan_json import build_planned_test, plan_document
+from config.files import load_gauges, load_stand
 
 
+@with_options
 def plan(
-    series: SeriesCode = None,
-    pullback: Pullback = None,
-    table_mass: TableMass = None,
-    plate_mass: PlateMass = None,
-    period: Period = None,
-    stiffness: Stiffness = None,
-    n1: N1 = None,
-    damping: Damping = None,
-    friction: Friction = None,
-    static_friction: StaticFriction = None,
-    tilt: Tilt = 0.0,
-    rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
+    *,
+    motion: MotionOptions,
+    rate: Annotated[float, number("--rate", above=0.0, help="Samples a second.")] = 1000.0,
     noise: Annotated[
-        float, typer.Option(help="Standard deviation of both gauges' readings (m); see `device health`.")
+        float,
+        number(
+            "--noise",
+            above=0.0,
+            help="Standard deviation of both gauges' readings (m); see `device health`.",
+        ),
     ] = 2e-5,
-    duration: Annotated[float, typer.Option(help="Seconds after release that are recorded.")] = 10.0,
-    calibration: Annotated[
-        Path | None, typer.Option(help="Calibration file; the one in use if absent.")
-    ] = None,
+    duration: Annotated[
+        float, number("--duration", above=0.0, help="Seconds after release that are recorded.")
+    ] = 10.0,
+    calibration: CalibrationFile = None,
     as_json: Json = False,
 ) -> None:
-    """Tell what a test will show, before it is made.
+    """Predict what a test will show, before it is made.
 
-    Told are motion, u_s, use of the gauges' ranges, the uncertainty of f_d, and what would halve that.
+    Shows motion, u_s, use of the gauges' ranges, the uncertainty of f_d, and what would halve it.
     Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
-    Options override what the series brings.
+    Options override the values of the series.
     """
-    from app.cli import output as out
-    from app.runs.plan_json import build_planned_test, plan_document
-    from config.files import load_gauges, load_stand
-
-    check_numbers(duration=duration, rate=rate, noise=noise)
     check_samples(duration, rate)
-    parameters = two_mass_parameters(
-        series, pullback=pullback, table_mass=table_mass, plate_mass=plate_mass, period=period,
-        stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
-        tilt=tilt,
-    )  # fmt: skip
+    parameters = motion.parameters()
     gauges = load_gauges(calibration.expanduser() if calibration else None)
     test = build_planned_test(
         parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration
     )
-    document = {"series": series} | plan_document(test)
+    document = {"series": motion.series} | plan_document(test)
     if as_json:
         out.print_json(document)
     else:
@@ -74,8 +50,6 @@ def plan(
 
 
 def _print_plan(document: dict[str, Any]) -> None:
-    from app.cli import output as out
-
     _print_motion(document)
     _print_gauges(document)
     for name, found in document["results"].items():
@@ -92,8 +66,6 @@ def _print_plan(document: dict[str, Any]) -> None:
 
 
 def _print_motion(document: dict[str, Any]) -> None:
-    from app.cli import output as out
-
     slip_end = f"{document['slip_end_s']:.2f} s after release, in {document['phases']} phases"
     out.print_line(f"residual displacement  {document['residual_displacement_m'] * 1e3:.2f} mm")
     out.print_line(f"slip ends              {slip_end if document['slip_end_s'] else 'never began'}")
@@ -108,12 +80,10 @@ def _print_motion(document: dict[str, Any]) -> None:
 
 
 def _print_gauges(document: dict[str, Any]) -> None:
-    from app.cli import output as out
-
-    for number, (name, use) in enumerate(document["gauges"].items(), start=1):
+    for channel, (name, use) in enumerate(document["gauges"].items(), start=1):
         reach = f"{use['lowest_m'] * 1e3:.2f} to {use['highest_m'] * 1e3:.2f} mm"
         share = "" if use["share"] is None else f", {100 * use['share']:.0f} % of its range"
-        out.print_line(f"gauge {number} ({name})".ljust(23) + reach + share)
+        out.print_line(f"gauge {channel} ({name})".ljust(23) + reach + share)
     tests = document["tests_without_recentring"]
     if tests is not None:
         out.print_line(f"re-centring            {_recentring_text(tests)}")
@@ -126,8 +96,6 @@ def _recentring_text(tests: int) -> str:
 
 
 def _print_budget(document: dict[str, Any]) -> None:
-    from app.cli import output as out
-
     if document["noise_part"] is None:
         return
     shares = sorted(

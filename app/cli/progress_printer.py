@@ -3,15 +3,25 @@
 import math
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
+
+import numpy as np
 
 from analysis.catalogue import Place, definition
 from analysis.formatting import format_value
+from app.acquisition.guidance import PullbackSituation, guidance_for
+from app.acquisition.messages import (
+    Connected,
+    Event,
+    LiveResult,
+    LiveValue,
+    Reconnected,
+    Reconnecting,
+    RunEnded,
+    StateChanged,
+)
+from app.acquisition.ring import RingRows
 from app.cli import output as out
-
-if TYPE_CHECKING:
-    from app.acquisition.messages import Event, LiveResult, LiveValue, RunEnded, StateChanged
-    from app.acquisition.ring import RingRows
 
 _SHOWN_S = 0.05
 """Readings are shown as means over so long a time."""
@@ -54,10 +64,8 @@ class ProgressPrinter:
         self._table_m = math.nan
         self._relative_m = math.nan
 
-    def on_event(self, event: "Event") -> None:
+    def on_event(self, event: Event) -> None:
         """Take one event of the engine."""
-        from app.acquisition.messages import Connected, Reconnected, Reconnecting, RunEnded, StateChanged
-
         match event:
             case Connected(device, firmware, rate_hz):
                 out.print_status(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
@@ -69,10 +77,8 @@ class ProgressPrinter:
                 self._on_run_ended(event)
         self._line.on_event(event)
 
-    def on_rows(self, rows: "RingRows") -> None:
+    def on_rows(self, rows: RingRows) -> None:
         """Take the latest samples."""
-        import numpy as np
-
         recent = rows.time_s >= rows.time_s[-1] - _SHOWN_S
         present = recent & np.isfinite(rows.table_m) & np.isfinite(rows.relative_m)
         if present.any():
@@ -81,7 +87,7 @@ class ProgressPrinter:
         if self._state is not None and self._state.state in _WAITING:
             self._line.update(self._sentence(self._state))
 
-    def _on_state(self, event: "StateChanged") -> None:
+    def _on_state(self, event: StateChanged) -> None:
         self._state = event
         if event.state in ("connecting", "idle"):
             return
@@ -92,16 +98,14 @@ class ProgressPrinter:
             out.print_status(sentence)
         self._last_sentence = sentence
 
-    def _on_run_ended(self, event: "RunEnded") -> None:
+    def _on_run_ended(self, event: RunEnded) -> None:
         self._done += 1
         self._last_sentence = ""
         if event.path:
             more = f". {event.message}" if event.message else ""
             out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
 
-    def _sentence(self, event: "StateChanged") -> str:
-        from app.acquisition.guidance import PullbackSituation, guidance_for
-
+    def _sentence(self, event: StateChanged) -> str:
         note = str(event.note)
         on_base_m = self._table_m if self._gauge_2_on_base else 0.0
         guidance = guidance_for(
@@ -143,10 +147,8 @@ class StatusLine:
         )
         self._told_s = float("-inf")
 
-    def on_event(self, event: "Event") -> None:
+    def on_event(self, event: Event) -> None:
         """Take one event of the engine."""
-        from app.acquisition.messages import LiveResult
-
         if not isinstance(event, LiveResult):
             return
         if event.message:
@@ -178,7 +180,7 @@ class StatusLine:
             out.print_status(text)
 
 
-def result_text(result: "LiveResult") -> str:
+def result_text(result: LiveResult) -> str:
     """Period, damping and friction so far; empty before anything is known."""
     parts = [
         _part("period_s", result.period),
@@ -189,7 +191,7 @@ def result_text(result: "LiveResult") -> str:
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
 
 
-def _part(name: str, value: "LiveValue | None") -> str:
+def _part(name: str, value: LiveValue | None) -> str:
     if value is None or not value.is_known:
         return ""
     row = definition(name)

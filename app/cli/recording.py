@@ -1,30 +1,32 @@
 """Recording from the command line: through the engine, with the operator told what to do."""
 
 import contextlib
+import datetime
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from app.acquisition.engine_client import record_runs
+from app.acquisition.messages import PortSettings, RunEnded, RunSettings
+from app.acquisition.run_setup import check_run_settings
+from app.cli import output as out
 from app.cli.errors import CommandError
-
-if TYPE_CHECKING:
-    from app.acquisition.messages import PortSettings, RunEnded, RunSettings
+from app.cli.progress_printer import ProgressPrinter, StatusLine
+from app.runs.analysis_json import calibration_warnings, gauge_check_warnings
+from app.runs.metadata import create_metadata
+from config.files import load_checks, load_gauges, load_stand, settings_file
+from drivers.registry import PROTOCOLS
 
 
 def record_with_progress(
-    port: "PortSettings",
-    run: "RunSettings",
+    port: PortSettings,
+    run: RunSettings,
     gauges_file: Path,
     count: int = 1,
     *,
     simulated: bool = False,
-) -> Iterator["RunEnded"]:
+) -> Iterator[RunEnded]:
     """Record runs over one connection, telling what goes on; yield each at its end, like `record_runs`."""
-    from app.acquisition.engine_client import record_runs
-    from app.cli.progress_printer import ProgressPrinter, StatusLine
-    from config.files import load_gauges, settings_file
-    from drivers.registry import PROTOCOLS
-
     verified = "" if simulated or port.protocol not in PROTOCOLS else PROTOCOLS[port.protocol].verified
     on_base = load_gauges(gauges_file).relative.measures == "plate"
     with StatusLine() as line:
@@ -38,28 +40,13 @@ def record_with_progress(
             yield from runs
 
 
-def calibration_file(calibration: Path | None) -> Path:
-    """The calibration file to use."""
-    from config.files import settings_file
-
-    return calibration.expanduser().resolve() if calibration else settings_file("gauges.toml")
-
-
-def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
+def check_recording(run: RunSettings, gauges_file: Path) -> None:
     """Refuse what no run can have, before any port is opened, and say which calibration has expired.
 
     Raises
     ------
     CommandError, AcquisitionError, ConfigError, RunError
     """
-    import datetime
-
-    from app.acquisition.run_setup import check_run_settings
-    from app.cli import output as out
-    from app.runs.analysis_json import calibration_warnings, gauge_check_warnings
-    from app.runs.metadata import create_metadata
-    from config.files import load_checks, load_gauges, load_stand
-
     check_run_settings(run)
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
     failed = gauge_check_warnings(load_checks().latest_checks(gauges))
@@ -79,8 +66,6 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
 
 def _check_folder(folder: Path) -> None:
     """Refuse a folder that runs cannot be written into; one that is not there yet can be made."""
-    import tempfile
-
     there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
     if not there.is_dir():
         raise CommandError(f"--directory {folder}: {there} is not a folder. Choose another one")

@@ -1,15 +1,16 @@
 """`slipstand recover`: runs from the journals that a crash has left."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import msgspec
 import typer
 
+from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.cli import output as out
 from app.cli.options import Json
-
-if TYPE_CHECKING:
-    from app.acquisition.journal.recovery import Recovery
+from app.runs.journal import unfinished_journals
+from app.runs.paths import journal_fallback_folders, recordings_directory
 
 
 def recover(
@@ -23,12 +24,6 @@ def recover(
     as_json: Json = False,
 ) -> None:
     """Rebuild runs that a crash cut short, from their journals."""
-    import msgspec
-
-    from app.acquisition.journal.recovery import RecoveryState, recover_folder
-    from app.cli import output as out
-    from app.runs.paths import journal_fallback_folders, recordings_directory
-
     folder = directory.expanduser().absolute() if directory else recordings_directory()
     folders = (
         [folder] if directory else [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
@@ -52,10 +47,8 @@ def recover(
         raise typer.Exit(1)
 
 
-def recovery_text(recovery: "Recovery") -> str:
+def recovery_text(recovery: Recovery) -> str:
     """Say in one line what became of a journal."""
-    from app.acquisition.journal.recovery import RecoveryState
-
     match recovery.state:
         case RecoveryState.WHOLE:
             return f"{recovery.run}: was whole already; its journal is removed"
@@ -69,9 +62,6 @@ def recovery_text(recovery: "Recovery") -> str:
 
 def print_unfinished_runs(folder: Path) -> None:
     """Mention journals in a folder, and where journals move to, whose engine is gone."""
-    from app.runs.journal import unfinished_journals
-    from app.runs.paths import journal_fallback_folders
-
     for place in (folder, *journal_fallback_folders()):
         left = len(unfinished_journals(place))
         if left:
@@ -83,8 +73,6 @@ def print_unfinished_runs(folder: Path) -> None:
 
 def print_interrupted_run(run: Path, ended: str) -> None:
     """Mention that a run, by why it ended, was cut short, where a journal lies beside it."""
-    from app.runs.journal import unfinished_journals
-
     if ended in ("", "interrupted", "write-error", "disk-full") and unfinished_journals(run.parent):
         out.print_status(
             f"{run} was cut short and a journal lies beside it, which may hold more of it."

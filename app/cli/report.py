@@ -2,19 +2,22 @@
 
 import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from app.cli import output as out
 from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, executor_options
+from app.cli.options import Exclude, Force, JobOptions, Json, RunsOrFolders, with_options
+from app.cli.table import table_content
+from app.reports.test_report.build import TITLE, ReportHead, build_report
+from app.reports.test_report.render import write_report
 
-if TYPE_CHECKING:
-    from app.reports.test_report.build import ReportHead
 
-
+@with_options
 def report(
+    *,
     paths: RunsOrFolders,
     output: Annotated[Path, typer.Option("-o", "--output", help="PDF file to write.")],
     date: Annotated[
@@ -23,8 +26,7 @@ def report(
     title: Annotated[str, typer.Option(help="Title of the report.")] = "",
     laboratory: Annotated[str, typer.Option(help="Who issues it.")] = "",
     exclude: Exclude = None,
-    jobs: Jobs = None,
-    dask: Dask = "",
+    jobs: JobOptions,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -33,17 +35,12 @@ def report(
     It holds results, budgets, figures, warnings and fingerprints.
     The same runs give the same file to the byte, apart from its date.
     """
-    from app.cli import output as out
-    from app.cli.table import table_content
-    from app.reports.test_report.build import build_report
-    from app.reports.test_report.render import write_report
-
     if output.suffix.lower() != ".pdf":
         raise CommandError(f"-o {output.name} has no known ending. Use .pdf")
     head = _head(date, title, laboratory)
     target = out.output_file(output, force)
-    crew, excluded = executor_options(jobs, dask), excluded_runs(paths, exclude or [])
-    gathered, campaign = load_campaign(paths, crew, excluded=excluded)
+    executor, excluded = jobs.executor(), excluded_runs(paths, exclude or [])
+    gathered, campaign = load_campaign(paths, executor, excluded=excluded)
     if not gathered.runs:
         fault = gathered.failures[0].error if gathered.failures else "all are left out"
         raise CommandError(f"none of the runs gives a result: {fault}")
@@ -59,9 +56,7 @@ def report(
     exit_with_failures(content.failures)
 
 
-def _head(date: str, title: str, laboratory: str) -> "ReportHead":
-    from app.reports.test_report.build import TITLE, ReportHead
-
+def _head(date: str, title: str, laboratory: str) -> ReportHead:
     try:
         day = datetime.date.fromisoformat(date) if date else datetime.datetime.now().astimezone().date()
     except ValueError:

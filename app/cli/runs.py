@@ -2,16 +2,21 @@
 
 import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import msgspec
 import typer
 
 from analysis.formatting import format_value
+from app.cli import output as out
 from app.cli.errors import CommandError
 from app.cli.options import Json, SeriesCode
-
-if TYPE_CHECKING:
-    from app.runs.summary import RunSummary
+from app.cli.recover import print_unfinished_runs
+from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
+from app.runs.listing import RunFilter, list_runs
+from app.runs.paths import recordings_directory
+from app.runs.summary import RunSummary
+from config.files import load_stand
 
 
 def runs(
@@ -34,14 +39,6 @@ def runs(
 
     Files that cannot be read stand last with their fault.
     """
-    import msgspec
-
-    from app.cli import output as out
-    from app.cli.recover import print_unfinished_runs
-    from app.runs.listing import RunFilter, list_runs
-    from app.runs.paths import recordings_directory
-    from config.files import load_stand
-
     series = load_stand().series(series).code if series else None
     print_unfinished_runs(directory or recordings_directory())
     wanted = RunFilter(series, _day("--since", since), _day("--until", until), operator, text, stale or None)
@@ -69,7 +66,7 @@ def _day(option: str, text: str | None) -> datetime.date | None:
         raise CommandError(f"{option} {text!r} is not a day. Write it like 2026-11-21") from None
 
 
-def _row(run: "RunSummary") -> tuple[str, ...]:
+def _row(run: RunSummary) -> tuple[str, ...]:
     if run.fault:
         return (run.path, "", "", "", "", run.fault, "")
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
@@ -78,7 +75,7 @@ def _row(run: "RunSummary") -> tuple[str, ...]:
     return (run.path, run.series or "", begun, seconds, ended, _friction_text(run), run.conditions.as_text())
 
 
-def _friction_text(run: "RunSummary") -> str:
+def _friction_text(run: RunSummary) -> str:
     """Newest f_d, with what is to be known of it in a word."""
     if run.friction_dynamic is None:
         return ""
@@ -100,10 +97,6 @@ def trash(
 
     The trash is the folder .trash beside them.
     """
-    from app.cli import output as out
-    from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
-    from app.runs.paths import recordings_directory
-
     if show and bring_back:
         raise CommandError("--list and --restore exclude each other. Give one of them")
     if show:

@@ -3,46 +3,31 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 
+from analysis.motion.paper_method import simulate as simulate_by_paper
+from analysis.motion.two_mass import Motion, TwoMassParameters
+from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.motion_options import (
-    N1,
-    Damping,
-    Friction,
-    Period,
-    Pullback,
-    StaticFriction,
-    Stiffness,
-    Tilt,
-    check_numbers,
-    check_samples,
-    two_mass_parameters,
-)
-from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass
-
-if TYPE_CHECKING:
-    from analysis.motion.two_mass import Motion, TwoMassParameters
+from app.cli.motion_options import MotionOptions, check_samples
+from app.cli.options import Force, Json, choice, number, with_options
+from app.runs.disk import atomic_write
+from app.runs.simulated import write_simulated_run
 
 
+@with_options
 def simulate(
-    series: SeriesCode = None,
-    pullback: Pullback = None,
-    table_mass: TableMass = None,
-    plate_mass: PlateMass = None,
-    period: Period = None,
-    stiffness: Stiffness = None,
-    n1: N1 = None,
-    damping: Damping = None,
-    friction: Friction = None,
-    static_friction: StaticFriction = None,
-    tilt: Tilt = 0.0,
-    duration: Annotated[float, typer.Option(help="Seconds after release.")] = 10.0,
-    rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
-    method: Annotated[str, typer.Option(help="exact, or paper for its three-state algorithm.")] = "exact",
-    step: Annotated[float, typer.Option(help="Time step of --method paper (s).")] = 1e-4,
+    *,
+    motion: MotionOptions,
+    duration: Annotated[float, number("--duration", above=0.0, help="Seconds after release.")] = 10.0,
+    rate: Annotated[float, number("--rate", above=0.0, help="Samples a second.")] = 1000.0,
+    method: Annotated[
+        str, choice("--method", "exact", "paper", help="exact, or paper for its three-state algorithm.")
+    ] = "exact",
+    step: Annotated[float, number("--step", above=0.0, help="Time step of --method paper (s).")] = 1e-4,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -55,31 +40,22 @@ def simulate(
     """Simulate one pullback test: numbers, a CSV file or a run.
 
     Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
-    Options override what the series brings.
+    Options override the values of the series.
     """
-    from app.cli import output as out
-
-    check_numbers(duration=duration, rate=rate, step=step)
     check_samples(duration, rate)
-    if method not in ("exact", "paper"):
-        raise CommandError(f"--method {method!r} is not known. Use exact or paper")
     if output is not None and output.suffix not in (".csv", ".h5"):
         raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
     target = out.output_file(output, force) if output else None
-    parameters = two_mass_parameters(
-        series, pullback=pullback, table_mass=table_mass, plate_mass=plate_mass, period=period,
-        stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
-        tilt=tilt,
-    )  # fmt: skip
+    parameters = motion.parameters()
     if target is not None and target.suffix == ".h5" and parameters.pullback_m == 0.0:
         raise CommandError("--pullback 0 makes no run: nothing moves. Give another pullback, or -o FILE.csv")
     if method == "paper":
         _check_step(step, parameters)
-    motion = _solve(parameters, duration, method, step)
+    simulated = _solve(parameters, duration, method, step)
     if target is not None:
-        _store(target, motion, parameters, series, rate, replace=force)
+        _store(target, simulated, parameters, motion.series, rate, replace=force)
         out.print_status(f"wrote {target}")
-    document = _document(motion, parameters, method, step)
+    document = _document(simulated, parameters, method, step)
     if as_json:
         out.print_json(document)
     elif target is None:
@@ -89,15 +65,14 @@ def simulate(
 _STEPS_A_PERIOD = 20
 
 
-def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step_s: float) -> "Motion":
+def _solve(parameters: TwoMassParameters, duration_s: float, method: str, step_s: float) -> Motion:
     if method == "exact":
         return parameters.simulate(duration_s)
-    from analysis.motion.paper_method import simulate as simulate_by_paper
 
     return simulate_by_paper(parameters, duration_s=duration_s, step_s=step_s)
 
 
-def _check_step(step_s: float, parameters: "TwoMassParameters") -> None:
+def _check_step(step_s: float, parameters: TwoMassParameters) -> None:
     """Refuse steps in which the table would swing through more than a twentieth of its period."""
     period_s = 2.0 * math.pi * math.sqrt(parameters.table_mass_kg / parameters.stiffness_n_per_m)
     if step_s > period_s / _STEPS_A_PERIOD:
@@ -107,9 +82,7 @@ def _check_step(step_s: float, parameters: "TwoMassParameters") -> None:
         )
 
 
-def _document(
-    motion: "Motion", parameters: "TwoMassParameters", method: str, step_s: float
-) -> dict[str, Any]:
+def _document(motion: Motion, parameters: TwoMassParameters, method: str, step_s: float) -> dict[str, Any]:
     return {
         "residual_displacement_m": motion.residual_displacement_m,
         "slip_end_s": motion.slip_end_s,
@@ -128,8 +101,8 @@ def _document(
 
 def _store(
     path: Path,
-    motion: "Motion",
-    parameters: "TwoMassParameters",
+    motion: Motion,
+    parameters: TwoMassParameters,
     series: str | None,
     rate_hz: float,
     *,
@@ -138,16 +111,11 @@ def _store(
     if path.suffix == ".csv":
         _write_csv(path, motion, rate_hz, replace=replace)
         return
-    from app.runs.simulated import write_simulated_run
 
     write_simulated_run(path, motion, parameters, series=series, rate_hz=rate_hz, replace=replace)
 
 
-def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -> None:
-    import numpy as np
-
-    from app.runs.disk import atomic_write
-
+def _write_csv(path: Path, motion: Motion, rate_hz: float, *, replace: bool) -> None:
     times_s = np.arange(math.floor(motion.duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
     columns = motion.sample(times_s).columns()
     formats = ["%d" if name == "phase" else "%.17g" for name in columns]
@@ -163,8 +131,6 @@ def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -
 
 
 def _print_motion(document: dict[str, Any]) -> None:
-    from app.cli import output as out
-
     out.print_line(f"residual displacement   {document['residual_displacement_m'] * 1e3:.4f} mm")
     out.print_line(
         f"slip ends               {document['slip_end_s']:.4f} s after {document['phases']} phases"

@@ -2,28 +2,32 @@
 
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from analysis.audit import audit
+from analysis.campaign.campaign import Campaign, compare_all_with_published
+from app.cli import output as out
 from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, executor_options
-
-if TYPE_CHECKING:
-    from analysis.campaign.campaign import Campaign
-    from app.reports.table.content import PublishedRowComparison, TableContent
-    from app.runs.campaign.collect import CollectedRuns
+from app.cli.options import Exclude, Force, JobOptions, Json, RunsOrFolders, choice, with_options
+from app.reports.table.content import PublishedRowComparison, TableContent
+from app.reports.table.files import FORMATS, as_text, write_text, write_workbook
+from app.reports.table.text import note_sections
+from app.runs.campaign.collect import CollectedRuns
+from config.files import load_stand, published_table
 
 _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 
 
+@with_options
 def table(
+    *,
     paths: RunsOrFolders,
-    format_name: Annotated[
-        str, typer.Option("--format", help="text, csv, json, markdown, latex or xlsx.")
-    ] = "text",
+    format_name: Annotated[str, choice("--format", *FORMATS, help="Format of the table.")] = "text",
     published: Annotated[
         bool, typer.Option("--published", help="Beside the paper's Table 1, with the audit's flags.")
     ] = False,
@@ -35,8 +39,7 @@ def table(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="File to write; xlsx needs one.")
     ] = None,
-    jobs: Jobs = None,
-    dask: Dask = "",
+    jobs: JobOptions,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -45,12 +48,10 @@ def table(
     Below it stands what f_d depends on. A run's newest analysis that is not stale is
     taken, else the run is analysed.
     """
-    from app.cli import output as out
-
     name = _format(format_name, output, as_json=as_json)
     target = out.output_file(output, force) if output else None
-    crew, excluded = executor_options(jobs, dask), excluded_runs(paths, exclude or [])
-    gathered, campaign = load_campaign(paths, crew, save=save, excluded=excluded)
+    executor, excluded = jobs.executor(), excluded_runs(paths, exclude or [])
+    gathered, campaign = load_campaign(paths, executor, save=save, excluded=excluded)
     content = table_content(gathered, campaign, published=published)
     _write_table(content, name, target, with_repeats=repeats, replace=force)
     if target or name in ("csv", "latex"):
@@ -59,24 +60,16 @@ def table(
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:
-    from app.reports.table.files import FORMATS
-
     if as_json and name not in ("text", "json"):
         raise CommandError(f"--json and --format {name} contradict each other. Give one of them")
     name = "json" if as_json else name
-    if name not in FORMATS:
-        raise CommandError(f"--format {name!r} is not known. Use {', '.join(FORMATS)}")
     if name == "xlsx" and output is None:
         raise CommandError("--format xlsx is a file. Say where it goes: -o TABLE.xlsx")
     return name
 
 
-def table_content(
-    gathered: "CollectedRuns", campaign: "Campaign", *, published: bool = False
-) -> "TableContent":
+def table_content(gathered: CollectedRuns, campaign: Campaign, *, published: bool = False) -> TableContent:
     """Put together all that goes into a table, or into a report; beside the paper's where `published`."""
-    from app.reports.table.content import TableContent
-
     return TableContent(
         campaign,
         gathered.warnings,
@@ -85,13 +78,8 @@ def table_content(
     )
 
 
-def _published(campaign: "Campaign") -> "dict[str, PublishedRowComparison]":
+def _published(campaign: Campaign) -> dict[str, PublishedRowComparison]:
     """The paper's rows of the series that were found, with what the audit says of them."""
-    from analysis.audit import audit
-    from analysis.campaign.campaign import compare_all_with_published
-    from app.reports.table.content import PublishedRowComparison
-    from config.files import load_stand, published_table
-
     stand, printed = load_stand(), published_table()
     beside = compare_all_with_published(campaign.rows, printed)
     report = audit(
@@ -105,11 +93,8 @@ def _published(campaign: "Campaign") -> "dict[str, PublishedRowComparison]":
 
 
 def _write_table(
-    content: "TableContent", name: str, target: Path | None, *, with_repeats: bool, replace: bool
+    content: TableContent, name: str, target: Path | None, *, with_repeats: bool, replace: bool
 ) -> None:
-    from app.cli import output as out
-    from app.reports.table.files import as_text, write_text, write_workbook
-
     if name == "xlsx" and target is not None:
         write_workbook(content, target, replace=replace)
     else:
@@ -128,13 +113,8 @@ def _width(target: Path | None) -> int:
     return max(shutil.get_terminal_size((_ENDLESS, 0)).columns, _WIDTH_MIN)
 
 
-def _print_remarks(content: "TableContent") -> None:
+def _print_remarks(content: TableContent) -> None:
     """Say on stderr what the format itself does not show; runs without a result are told at the end."""
-    from dataclasses import replace
-
-    from app.cli import output as out
-    from app.reports.table.text import note_sections
-
     for title, sentences in note_sections(replace(content, failures=())):
         for sentence in sentences:
             out.print_status(f"{title}: {sentence}")

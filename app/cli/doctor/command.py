@@ -1,14 +1,14 @@
 """`slipstand doctor`: looks the installation over, and says what to do."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from importlib import import_module
 
 import typer
 
+from app.cli import output as out
+from app.cli.doctor import Finding, FindingState, fail
 from app.cli.options import Json
-
-if TYPE_CHECKING:
-    from app.cli.doctor import Finding
 
 
 def doctor(as_json: Json = False) -> None:
@@ -16,11 +16,6 @@ def doctor(as_json: Json = False) -> None:
 
     Recordings are checked too. Ends with 1 if something fails.
     """
-    from dataclasses import asdict
-
-    from app.cli import output as out
-    from app.cli.doctor import FindingState
-
     findings = []
     for finding in _findings():
         findings.append(finding)
@@ -45,12 +40,8 @@ _CHECKS = (
 """Subject, module and function of each check."""
 
 
-def _findings() -> "Iterator[Finding]":
+def _findings() -> Iterator[Finding]:
     """Findings of all checks. A check that raises, as for a missing library, does not hide the others."""
-    from importlib import import_module
-
-    from app.cli.doctor import fail
-
     for subject, module, check in _CHECKS:
         try:
             yield from getattr(import_module(f"app.cli.doctor.{module}"), check)()

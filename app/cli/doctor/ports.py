@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from app.cli.device import install_rule
 from app.cli.doctor import Finding, ok, warn
-from app.cli.probe import install_rule
 from drivers.port import PortInfo, list_ports
 from drivers.port_users import other_port_users
 from drivers.probe.host_checks import PortHint, modem_manager_runs, port_hints, usb_chip_name

@@ -11,7 +11,7 @@ from bench_kit import GAIN, RATE_HZ, Bench, counts_of
 from cli_kit import assert_one_error_line
 
 from app.acquisition.messages import RunSettings
-from app.cli.recording import check_run_settings
+from app.cli.recording import check_recording
 from config.files import load_gauges, save_calibration, settings_file
 
 MARKS_MM = [0.0, 3.0, 6.0, 9.0, 12.0]
@@ -182,10 +182,10 @@ def test_record_says_that_a_calibration_has_expired(
     base = settings_file("gauges.toml")
     expired = load_gauges(base).relative.replace(valid_until=datetime.date(2020, 1, 31))
     path = save_calibration({"relative": expired}, base, datetime.date(2020, 1, 1))
-    check_run_settings(RunSettings(directory=str(tmp_path), series="1FFM0"), path)
+    check_recording(RunSettings(directory=str(tmp_path), series="1FFM0"), path)
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("warning: the calibration of gauge 2 (relative) was valid until 2020-01-31")
-    check_run_settings(RunSettings(directory=str(tmp_path), series="1FFM0"), base)
+    check_recording(RunSettings(directory=str(tmp_path), series="1FFM0"), base)
     assert capsys.readouterr().err == ""
 
 

@@ -12,7 +12,7 @@ from cli_kit import assert_one_error_line
 
 from app.acquisition.messages import RunSettings
 from app.acquisition.run_setup import build_metadata
-from app.cli.recording import check_run_settings
+from app.cli.recording import check_recording
 from app.runs.analysis_json import gauge_check_warnings
 from config.files import checks_path, load_checks, load_gauges, load_stand, save_calibration, settings_file
 from drivers.samples import DeviceIdentity
@@ -83,7 +83,7 @@ def test_a_gauge_that_changed_by_2_percent_fails_and_later_runs_say_so(
     assert "gauge 2 (relative) was +12" in str(caution.message)
     assert "at 6 mm" in str(caution.message)
 
-    check_run_settings(RunSettings(str(tmp_path), series="1FFM0"), gauges_file)
+    check_recording(RunSettings(str(tmp_path), series="1FFM0"), gauges_file)
     assert "warning: gauge 2 (relative) was +12" in capsys.readouterr().err
 
 

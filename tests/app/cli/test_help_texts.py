@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from app.cli.commands import DeviceGroup, SlipstandGroup
+
 LISTS = ((), ("calibrate",), ("device",))
 COMMANDS = (
     "demo", "record", "analyze", "simulate", "plan", "import", "export", "table", "figures", "report", "runs",
@@ -40,6 +42,14 @@ def test_lists_of_commands_say_in_whole_sentences_what_they_do(
 
     assert names - {"device"} == {name for name in COMMANDS if name.split()[:-1] == list(group)}
     assert [line for line in listed if not re.search(r"[^.]\.$", line)] == []
+
+
+def test_the_list_of_commands_says_the_first_line_of_their_help(slipstand: Any) -> None:
+    entries = [(entry, ()) for entry in SlipstandGroup.entries]
+    entries += [(entry, ("device",)) for entry in DeviceGroup.entries]
+    for entry, group in entries:
+        text = " ".join(slipstand(*group, entry.name, "--help").out.split())
+        assert entry.summary in text, entry.name
 
 
 @pytest.mark.parametrize("command", COMMANDS)

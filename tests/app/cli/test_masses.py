@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.cli.options import print_mass_overrides
+from app.cli.options import MassOptions
 from config.schema import ConfigError
 
 
@@ -23,11 +23,11 @@ def test_only_other_masses_are_said(
     plate_kg: float | None,
     said: list[str],
 ) -> None:
-    print_mass_overrides(series, table_kg, plate_kg)
+    MassOptions(series, plate_kg, table_kg).print_overrides()
     captured = capsys.readouterr()
     assert (captured.out, captured.err.splitlines()) == ("", said)
 
 
 def test_a_series_that_is_not_one_is_refused() -> None:
     with pytest.raises(ConfigError, match="'9XX'"):
-        print_mass_overrides("9XX", None, 40.0)
+        MassOptions("9XX", plate_mass=40.0).print_overrides()

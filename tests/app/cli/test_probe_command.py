@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from drivers import port as ports
+from app.cli import device
 from drivers.port import PortInfo
 from drivers.port_users import PortUser
-from drivers.probe import report
 from drivers.probe.host_checks import PortHint
 from drivers.probe.listening import LineSettings
 from drivers.probe.recognition import Recognition
@@ -41,8 +40,8 @@ def probe(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]
             tell("listening")
             return found
 
-        monkeypatch.setattr(report, "probe_port", look)
-        monkeypatch.setattr(ports, "list_ports", lambda: [ARDUINO])
+        monkeypatch.setattr(device, "probe_port", look)
+        monkeypatch.setattr(device, "present_ports", lambda: [ARDUINO])
         outcome = slipstand("device", "probe", *arguments)
         assert outcome.err == f"{asked[0][0]}: listening\n"
         return outcome, asked
@@ -118,6 +117,6 @@ def test_as_json(probe: Callable[..., Any]) -> None:
 
 
 def test_without_any_port(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ports, "list_ports", list)
+    monkeypatch.setattr(device, "present_ports", list)
     assert "No serial port found" in slipstand("device", "probe").out
     assert slipstand("device", "probe", "--json").json == []

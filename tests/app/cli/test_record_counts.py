@@ -24,7 +24,7 @@ def record(slipstand: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> A
             if failure is not None:
                 raise failure
 
-        monkeypatch.setattr("app.cli.recording.record_with_progress", each)
+        monkeypatch.setattr("app.cli.record.record_with_progress", each)
         place = ["--port", "/dev/none", "--protocol", "csv", "--directory", str(tmp_path)]
         return slipstand("record", *place, "--count", count, *more)
 

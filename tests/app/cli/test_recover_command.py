@@ -87,8 +87,8 @@ def test_without_a_recordings_folder_there_is_nothing_to_do(slipstand, tmp_path,
 
 
 def test_journals_that_had_to_move_are_found_without_being_asked_for(slipstand, cut_short, monkeypatch):
-    monkeypatch.setattr("app.runs.paths.recordings_directory", lambda: cut_short.parent / "none")
-    monkeypatch.setattr("app.runs.paths.journal_fallback_folders", lambda: [cut_short.parent])
+    monkeypatch.setattr("app.cli.recover.recordings_directory", lambda: cut_short.parent / "none")
+    monkeypatch.setattr("app.cli.recover.journal_fallback_folders", lambda: [cut_short.parent])
     assert f"slipstand recover {cut_short.parent}" in slipstand("runs", cut_short.parent.parent).err
     (found,) = slipstand("recover", "--json").json
     assert (found["state"], found["run"]) == ("recovered", str(cut_short))
