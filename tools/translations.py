@@ -7,6 +7,7 @@ without a translation. Each catalogue is compiled beside itself (.mo), which is 
 
 import ast
 import builtins
+import string
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -34,7 +35,8 @@ def extract(folders: Iterable[Path] = PACKAGES) -> Catalog:
             continue
         name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
         for text, line in _texts(path):
-            catalogue.add(text, locations=[(name, line)])
+            if _has_words(text):
+                catalogue.add(text, locations=[(name, line)])
     return catalogue
 
 
@@ -70,6 +72,12 @@ def _texts(path: Path) -> Iterator[tuple[str | tuple[str, str], int]]:
             many = [text for argument in plural for text in _constants(argument, path, strict)]
             for text in _constants(node.args[0], path, strict):
                 yield ((text, many[0]) if many else text), node.lineno
+
+
+def _has_words(text: str | tuple[str, str]) -> bool:
+    """Tell whether there is anything to translate beside the fields."""
+    one = text if isinstance(text, str) else text[0]
+    return any(letter.isalpha() for literal, *_ in string.Formatter().parse(one) for letter in literal)
 
 
 def _carries_text(function: ast.expr) -> bool:

@@ -16,7 +16,7 @@ from tools.translations import ROOT, extract, untranslated, update
 CATALOGUES = sorted(LOCALE.glob("*/LC_MESSAGES/*.po"))
 MUST = (
     "app/qt/window.py",
-    "app/presenters/record/guidance.py",
+    "app/acquisition/guidance.py",
     "app/presenters/results.py",
     "app/qt/settings/screen.py",
 )

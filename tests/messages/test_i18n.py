@@ -37,6 +37,9 @@ msgstr ""
 "строка "
 "\"в кавычках\""
 
+msgid "{sentence} now"
+msgstr "{sentence} сейчас"
+
 msgid "not yet"
 msgstr ""
 """
@@ -90,7 +93,7 @@ def test_texts_are_translated_with_their_values() -> None:
 @pytest.mark.usefixtures("russian")
 def test_messages_are_rendered_with_their_parts() -> None:
     part = message("Pull back to {target}", target="12 мм")
-    assert translate(message("{sentence} now", sentence=part)) == "Оттяните до 12 мм now"
+    assert translate(message("{sentence} now", sentence=part)) == "Оттяните до 12 мм сейчас"
     assert translate(message("{count} run", plural="{count} runs", count=3)) == "3 записи"
     assert translate(Message("")) == ""
 
