@@ -9,6 +9,7 @@ import numpy as np
 
 from analysis.motion.two_mass import MotionError, TwoMassMotion, TwoMassParameters
 from analysis.record import AnalysisError
+from messages.message import message
 
 KILOGRAM_FORCE_N: Final = 9.80665
 FRICTION_RANGE: Final = (0.03, 0.3)
@@ -194,13 +195,17 @@ def _audit_row(
     row: PublishedRow, table_mass_kg: float, pullbacks_m: Mapping[str, float], gravity_m_per_s2: float
 ) -> AuditedRow:
     if row.series not in pullbacks_m:
-        raise AuditError(f"series {row.series!r} has no pullback. Add it to the given pullbacks.")
+        raise AuditError(
+            "series {series!r} has no pullback. Add it to the given pullbacks.", series=row.series
+        )
     _check_figures(row)
     case = _Case(row, table_mass_kg, pullbacks_m[row.series], gravity_m_per_s2)
     try:
         return AuditedRow(row.series, tuple(check for rule in _RULES for check in rule(case)))
     except MotionError as error:
-        raise AuditError(f"series {row.series!r} describes no motion: {error}. Correct the row.") from error
+        raise AuditError(
+            "series {series!r} describes no motion: {error}. Correct the row.", series=row.series, error=error
+        ) from error
 
 
 def _check_figures(row: PublishedRow) -> None:
@@ -209,7 +214,13 @@ def _check_figures(row: PublishedRow) -> None:
         value = getattr(row, name)
         if not math.isfinite(value) or (name in _POSITIVE and value <= 0.0):
             needed = "a number above 0" if name in _POSITIVE else "a number"
-            raise AuditError(f"series {row.series!r}: {name} = {value!r} is not {needed}. Correct the row.")
+            raise AuditError(
+                "series {series!r}: {name} = {value!r} is not {needed}. Correct the row.",
+                series=row.series,
+                name=name,
+                value=value,
+                needed=message(needed),
+            )
 
 
 def _stiffness(case: _Case) -> Iterator[AuditCheck]:

@@ -1,4 +1,4 @@
-"""How a gauge does while the stand rests: noise, drift, hum of the mains, range used, clipping, life."""
+"""Health of a gauge at rest: noise, drift, mains hum, range in use, clipping; symptoms and remedies."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.preparation.noise import MAINS_HZ
 from analysis.record import AnalysisError
+from messages.message import Message, message
 
 SECONDS_MIN: Final = 1.0
 SAMPLES_MIN: Final = 20
@@ -20,17 +21,19 @@ _SEGMENT_S: Final = 1.0
 """Of the spectrum: a hertz apart, and whole cycles of both mains."""
 _BLOCKS: Final = 10
 _LINE_HZ: Final = 2.0
-"""A line is so wide to each side, by Hann's window and by what the mains stray."""
+"""Half width of a spectral line: the main lobe of Hann's window at 1 s, and the drift of the mains."""
 _BESIDE_HZ: Final = (3.5, 7.5)
-"""From there to there beside a line is what it must stand out from."""
+"""Distances from a line between which the background is measured."""
 _STANDS_OUT: Final = 3.0
+"""Power of a line over that of the background: chance exceeds it rarely in a mean over segments."""
 _MOTION_HZ: Final = 25.0
+"""Stands swing below 10 Hz; mains hum begins at 50 Hz."""
 _COARSE: Final = 20
-"""With fewer different values, a converter's steps cannot be told from clipping or repeats."""
+"""With fewer distinct values, the steps of the converter look like clipping or repeats."""
 
 
 class GaugeHealthError(AnalysisError, ValueError):
-    """Samples that tell nothing about a gauge."""
+    """Too few samples to judge a gauge by."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,7 +59,7 @@ class GaugeSamples:
 
 @dataclass(frozen=True, slots=True)
 class Hum:
-    """The mains in the readings; amplitude (m) 0 where they do not stand out, None where nobody can tell."""
+    """Mains hum; amplitude (m) 0 where it does not stand out, None where aliasing hides it."""
 
     frequency_hz: float
     amplitude_m: float | None
@@ -171,8 +174,13 @@ def _check(gauge: GaugeSamples, present: int) -> None:
     seconds = len(gauge.displacement_m) / gauge.rate_hz
     if seconds < SECONDS_MIN or present < SAMPLES_MIN:
         raise GaugeHealthError(
-            f"{present} readings in {format_number(seconds, 2)} s are too few to judge a gauge by. Take"
-            f" {SAMPLES_MIN} in {SECONDS_MIN:g} s at least, and look at cable and power if they stay away"
+            "{present} readings in {seconds} s are too few to judge a gauge by. Take"
+            " {samples_min} in {seconds_min:g} s at least, and look at cable and power if they"
+            " stay away",
+            present=present,
+            seconds=format_number(seconds, 2),
+            samples_min=SAMPLES_MIN,
+            seconds_min=SECONDS_MIN,
         )
 
 
@@ -240,23 +248,31 @@ def _clipped_fraction(x: Floats) -> float:
 
 
 NOISE_M: Final = (30e-6, 100e-6)
-"""Doubtful and bad above; releases are found within 20 ms with noise up to 20 um (docs/benchmarks.md)."""
+"""Doubtful and bad above. Releases are found within 20 ms with noise up to 20 µm (docs/benchmarks.md)."""
 DRIFT_M_PER_MIN: Final = (0.1e-3, 1e-3)
-"""A test lasts half a minute: 0.1 mm/min are half a percent of a pullback of 9 mm."""
+"""A test lasts half a minute: 0.1 mm/min moves the zero by half a percent of a pullback of 9 mm."""
 HUM_M: Final = (10e-6, 100e-6)
+"""A third of the noise that is still good, and a percent of a pullback of 9 mm."""
 _RANGE: Final = (0.4, 0.95)
-_ABSENT: Final = (1e-3, 0.05)
+"""A zero beyond 40 % of the range leaves less room on one side than a pullback needs; 95 % clips at once."""
+_MISSING: Final = (1e-3, 0.05)
+"""Set by judgement: a sound serial link loses less than one sample in a thousand."""
 _OVERLOADED: Final = (0.0, 0.01)
+"""A gauge at rest is never overloaded."""
 _CLIPPED: Final = (0.02, 0.2)
+"""Noise alone puts less than 2 % of the readings onto their extreme values with more than 20 steps."""
 _REPEATED: Final = 0.25
-_SWING_M: Final = 10e-6
+"""White noise over 20 steps or more repeats a reading in less than one of ten samples."""
+_OSCILLATION_M: Final = 10e-6
+"""The table moves; below, the line is counted as noise."""
 _DRIFT_SIGMAS: Final = 4.0
+"""Chance lets one gauge in some thousands drift by so many standard uncertainties."""
 _QUIET: Final = 1e-7
-"""Noise below this share of the range is less than the last of 24 bits."""
+"""Noise below this fraction of the range is less than the last of 24 bits."""
 
 
 class HealthGrade(StrEnum):
-    """How a gauge does; in this order, the worst symptom decides."""
+    """Condition of a gauge, from good to bad."""
 
     GOOD = "good"
     DOUBTFUL = "doubtful"
@@ -265,116 +281,154 @@ class HealthGrade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Symptom:
-    """Something that is not as it should be. `code` is stable; message and remedy are for people."""
+    """A fault of a gauge at rest.
+
+    Attributes
+    ----------
+    code : str
+        Stable name, for programs.
+    grade : HealthGrade
+    message, remedy : Message
+        What is wrong, and what to do.
+    """
 
     code: str
     grade: HealthGrade
-    message: str
-    remedy: str
+    message: Message
+    remedy: Message
 
 
 _ORDER: Final = list(HealthGrade)
 
 
 def worst_grade(symptoms: tuple[Symptom, ...]) -> HealthGrade:
-    """Return the worst of them, good without any."""
+    """Return the grade of the worst symptom; good without any."""
     return max((symptom.grade for symptom in symptoms), key=_ORDER.index, default=HealthGrade.GOOD)
 
 
 def diagnose(health: GaugeHealth) -> tuple[Symptom, ...]:
-    """What is not as it should be, the worst first.
+    """Return the symptoms, the worst first.
 
-    Noise, drift and hum of a gauge that is dead, overloaded or in motion say nothing, and are not judged.
+    Noise, drift and hum of a gauge that is dead, overloaded or in motion mean nothing and are not judged.
     """
-    found = [*_signal(health), *_liveness(health)]
-    moves = health.distinct_values > 1 and health.oscillation_amplitude_m > _SWING_M
-    if moves:
-        found.append(
-            Symptom(
-                "moves",
-                HealthGrade.DOUBTFUL,
-                f"the table swings by {format_length(health.oscillation_amplitude_m)}, so noise and drift"
-                f" cannot be told",
-                "Let the stand come to rest, and look again",
-            )
+    found = [*_signal_faults(health), *_dead_channel(health)]
+    if health.distinct_values > 1 and health.oscillation_amplitude_m > _OSCILLATION_M:
+        text = message(
+            "the table swings by {amplitude}, so noise and drift cannot be told",
+            amplitude=format_length(health.oscillation_amplitude_m),
         )
-    if not moves and not any(symptom.grade is HealthGrade.BAD for symptom in found):
+        remedy = message("Let the stand come to rest, and look again")
+        found.append(Symptom("moves", HealthGrade.DOUBTFUL, text, remedy))
+    elif not any(symptom.grade is HealthGrade.BAD for symptom in found):
         found += _disturbances(health)
     return tuple(sorted(found, key=lambda symptom: -_ORDER.index(symptom.grade)))
 
 
-def _signal(health: GaugeHealth) -> Iterator[Symptom]:
-    """What keeps readings from coming, or from being true."""
-    if health.missing_fraction > _ABSENT[0]:
+def _signal_faults(health: GaugeHealth) -> Iterator[Symptom]:
+    """Yield what keeps readings from arriving, or makes them wrong."""
+    if health.missing_fraction > _MISSING[0]:
         yield Symptom(
-            "absent", _grade(health.missing_fraction, _ABSENT),
-            f"{health.missing_fraction:.1%} of the samples are missing or damaged",
-            "Check cable and plugs, take a shorter cable, or a lower rate",
-        )  # fmt: skip
+            "absent",
+            _grade(health.missing_fraction, _MISSING),
+            message("{share:.1%} of the samples are missing or damaged", share=health.missing_fraction),
+            message("Check cable and plugs, take a shorter cable, or a lower rate"),
+        )
     if health.overload_fraction > _OVERLOADED[0]:
         yield Symptom(
-            "overloaded", _grade(health.overload_fraction, _OVERLOADED),
-            f"the amplifier is overloaded in {health.overload_fraction:.1%} of the samples",
-            "Move the gauge back into its range, or choose a wider input range; check for a broken wire",
-        )  # fmt: skip
+            "overloaded",
+            _grade(health.overload_fraction, _OVERLOADED),
+            message(
+                "the amplifier is overloaded in {share:.1%} of the samples", share=health.overload_fraction
+            ),
+            message(
+                "Move the gauge back into its range, or choose a wider input range; check for a broken wire"
+            ),
+        )
     if health.clipped_fraction > _CLIPPED[0]:
         yield Symptom(
-            "clipped", _grade(health.clipped_fraction, _CLIPPED),
-            f"{health.clipped_fraction:.0%} of the readings stand at the very same end",
-            "Move the gauge back into its range, or choose a wider input range",
-        )  # fmt: skip
+            "clipped",
+            _grade(health.clipped_fraction, _CLIPPED),
+            message("{share:.0%} of the readings stand at the very same end", share=health.clipped_fraction),
+            message("Move the gauge back into its range, or choose a wider input range"),
+        )
     if health.range_fraction is not None and health.range_fraction > _RANGE[0]:
         yield Symptom(
-            "off-centre", _grade(health.range_fraction, _RANGE),
-            f"it rests at {health.mean_m * 1e3:.2f} mm, {health.range_fraction:.0%} of the range from its"
-            f" middle",
-            "Re-centre the gauge, so that a test has room to both sides",
-        )  # fmt: skip
+            "off-centre",
+            _grade(health.range_fraction, _RANGE),
+            message(
+                "it rests at {mean_mm:.2f} mm, {share:.0%} of the range from its middle",
+                mean_mm=health.mean_m * 1e3,
+                share=health.range_fraction,
+            ),
+            message("Re-centre the gauge, so that a test has room to both sides"),
+        )
 
 
-def _liveness(health: GaugeHealth) -> Iterator[Symptom]:
-    """Whether a gauge is behind the readings at all."""
+def _dead_channel(health: GaugeHealth) -> Iterator[Symptom]:
+    """Yield signs that no gauge is connected."""
     if health.distinct_values == 1:
         yield Symptom(
-            "dead", HealthGrade.BAD,
-            f"all readings are {health.mean_m * 1e3:.4f} mm: the channel is dead or stuck",
-            "Touch the table: if nothing changes, check plug, bridge supply and the choice of channels",
-        )  # fmt: skip
+            "dead",
+            HealthGrade.BAD,
+            message(
+                "all readings are {mean_mm:.4f} mm: the channel is dead or stuck", mean_mm=health.mean_m * 1e3
+            ),
+            message(
+                "Touch the table: if nothing changes, check plug, bridge supply and the choice of channels"
+            ),
+        )
     elif health.range_m is not None and health.noise_rms_m < _QUIET * health.range_m:
         yield Symptom(
-            "too-quiet", HealthGrade.DOUBTFUL,
-            f"noise of {format_number(health.noise_rms_m * 1e9, 2)} nm is less than any strain gauge has",
-            "Touch the table: if nothing changes, the input is open, shorted or another one",
-        )  # fmt: skip
+            "too-quiet",
+            HealthGrade.DOUBTFUL,
+            message(
+                "noise of {noise_nm} nm is less than any strain gauge has",
+                noise_nm=format_number(health.noise_rms_m * 1e9, 2),
+            ),
+            message("Touch the table: if nothing changes, the input is open, shorted or another one"),
+        )
     if health.repeated_fraction > _REPEATED:
         yield Symptom(
-            "repeats", HealthGrade.DOUBTFUL,
-            f"{health.repeated_fraction:.0%} of the readings repeat the one before",
-            "The converter is slower than the device sends: ask for a lower rate",
-        )  # fmt: skip
+            "repeats",
+            HealthGrade.DOUBTFUL,
+            message("{share:.0%} of the readings repeat the one before", share=health.repeated_fraction),
+            message("The converter is slower than the device sends: ask for a lower rate"),
+        )
 
 
 def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
-    """What adds to the readings."""
+    """Yield what adds to the readings."""
     if health.noise_rms_m > NOISE_M[0]:
         yield Symptom(
-            "noisy", _grade(health.noise_rms_m, NOISE_M), f"noise of {format_length(health.noise_rms_m)} rms",
-            "Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower",
-        )  # fmt: skip
+            "noisy",
+            _grade(health.noise_rms_m, NOISE_M),
+            message("noise of {noise} rms", noise=format_length(health.noise_rms_m)),
+            message(
+                "Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower"
+            ),
+        )
     drift = abs(health.drift_m_per_min)
     if drift > max(DRIFT_M_PER_MIN[0], _DRIFT_SIGMAS * health.drift_standard_uncertainty_m_per_min):
         yield Symptom(
-            "drifts", _grade(drift, DRIFT_M_PER_MIN),
-            f"it drifts by {format_length(health.drift_m_per_min)} a minute",
-            "Let the amplifier warm up for half an hour, and keep draughts and sun off the stand",
-        )  # fmt: skip
+            "drifts",
+            _grade(drift, DRIFT_M_PER_MIN),
+            message("it drifts by {drift} a minute", drift=format_length(health.drift_m_per_min)),
+            message("Let the amplifier warm up for half an hour, and keep draughts and sun off the stand"),
+        )
     for hum in health.hum:
         if hum.amplitude_m is not None and hum.amplitude_m > HUM_M[0]:
             yield Symptom(
-                "hums", _grade(hum.amplitude_m, HUM_M),
-                f"{hum.frequency_hz:g} Hz of the mains with an amplitude of {format_length(hum.amplitude_m)}",
-                "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere",
-            )  # fmt: skip
+                "hums",
+                _grade(hum.amplitude_m, HUM_M),
+                message(
+                    "{frequency_hz:g} Hz of the mains with an amplitude of {amplitude}",
+                    frequency_hz=hum.frequency_hz,
+                    amplitude=format_length(hum.amplitude_m),
+                ),
+                message(
+                    "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere"
+                ),
+            )
 
 
 def _grade(value: float, bounds: tuple[float, float]) -> HealthGrade:

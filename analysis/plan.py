@@ -89,18 +89,24 @@ class PlannedTest:
         for name in ("rate_hz", "duration_s", "hold_s", "noise_m"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
-                raise AnalysisError(f"{name} is {value:g}: give a positive number to plan a test with")
+                raise AnalysisError(
+                    "{name} is {value:g}: give a positive number to plan a test with", name=name, value=value
+                )
         if self.parameters.friction_dynamic < _FRICTION_MIN:
             raise AnalysisError(
-                f"friction_dynamic is {self.parameters.friction_dynamic:g}: give {_FRICTION_MIN:g} or more to"
-                " plan a test with"
+                "friction_dynamic is {friction_dynamic:g}: give {friction_min:g} or more to plan a test with",
+                friction_dynamic=self.parameters.friction_dynamic,
+                friction_min=_FRICTION_MIN,
             )
         readings, periods = self.rate_hz * (self.duration_s + self.hold_s), self.duration_s / self.period_s
         for many, what, most in ((readings, "readings", _READINGS_MAX), (periods, "periods", _PERIODS_MAX)):
             if many > most:
                 raise AnalysisError(
-                    f"the test would have {many:.3g} {what}, {most:.0g} are planned at most. Check rate,"
-                    " duration, stiffness and masses"
+                    "the test would have {many:.3g} {what}, {most:.0g} are planned at most."
+                    " Check rate, duration, stiffness and masses",
+                    many=many,
+                    what=message(what),
+                    most=most,
                 )
 
     def replace(self, **changes: Any) -> Self:

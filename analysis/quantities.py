@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Self, TypeAlias
 
+from messages.i18n import N_
 from messages.message import Message, message
 
 
@@ -69,29 +70,29 @@ class BudgetSource(Enum):
         The error has a rectangular distribution instead of a normal one.
     """
 
-    NOISE = "noise", SharedBy.NONE
-    TABLE_MASS = "table mass"
-    PLATE_MASS = "plate mass"
-    MASS = "mass"
-    GRAVITY = "gravity"
-    TIME_BASE = "time base"
-    LEVELLING = "levelling of the plane", SharedBy.SERIES, True
-    GAUGE_1_GAIN = "gauge 1 gain", SharedBy.CALIBRATION
-    GAUGE_2_GAIN = "gauge 2 gain", SharedBy.CALIBRATION
-    GAUGE_1_GAIN_NOT_STATED = "gauge 1 gain (not stated)", SharedBy.CALIBRATION
-    GAUGE_2_GAIN_NOT_STATED = "gauge 2 gain (not stated)", SharedBy.CALIBRATION
-    GAUGE_1_NONLINEARITY = "gauge 1 non-linearity", SharedBy.CALIBRATION, True
-    GAUGE_2_NONLINEARITY = "gauge 2 non-linearity", SharedBy.CALIBRATION, True
-    GAUGE_2_LAG = "lag of gauge 2", SharedBy.CALIBRATION
-    UNDIVIDED = "not broken down"
+    NOISE = N_("noise"), SharedBy.NONE
+    TABLE_MASS = N_("table mass")
+    PLATE_MASS = N_("plate mass")
+    MASS = N_("mass")
+    GRAVITY = N_("gravity")
+    TIME_BASE = N_("time base")
+    LEVELLING = N_("levelling of the plane"), SharedBy.SERIES, True
+    GAUGE_1_GAIN = N_("gauge 1 gain"), SharedBy.CALIBRATION
+    GAUGE_2_GAIN = N_("gauge 2 gain"), SharedBy.CALIBRATION
+    GAUGE_1_GAIN_NOT_STATED = N_("gauge 1 gain (not stated)"), SharedBy.CALIBRATION
+    GAUGE_2_GAIN_NOT_STATED = N_("gauge 2 gain (not stated)"), SharedBy.CALIBRATION
+    GAUGE_1_NONLINEARITY = N_("gauge 1 non-linearity"), SharedBy.CALIBRATION, True
+    GAUGE_2_NONLINEARITY = N_("gauge 2 non-linearity"), SharedBy.CALIBRATION, True
+    GAUGE_2_LAG = N_("lag of gauge 2"), SharedBy.CALIBRATION
+    UNDIVIDED = N_("not broken down")
     """The whole uncertainty of a quantity that has no budget."""
-    READINGS = "readings", SharedBy.NONE
-    DIAL_GAUGE = "dial gauge"
-    ZERO_DRIFT = "zero drift"
-    NONLINEARITY = "non-linearity and hysteresis"
-    REPEATABILITY = "repeatability"
-    CALIBRATION_GAIN = "gain of the calibration"
-    KNOWN_DISPLACEMENT = "known displacement"
+    READINGS = N_("readings"), SharedBy.NONE
+    DIAL_GAUGE = N_("dial gauge")
+    ZERO_DRIFT = N_("zero drift")
+    NONLINEARITY = N_("non-linearity and hysteresis")
+    REPEATABILITY = N_("repeatability")
+    CALIBRATION_GAIN = N_("gain of the calibration")
+    KNOWN_DISPLACEMENT = N_("known displacement")
 
     shared_by: SharedBy
     is_rectangular: bool
@@ -146,7 +147,7 @@ class OtherLaw:
         return str(self.label)
 
 
-_OTHER_LAW = "law may be {law}"
+_OTHER_LAW = N_("law may be {law}")
 Source: TypeAlias = BudgetSource | OtherLaw
 
 

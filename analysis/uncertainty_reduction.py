@@ -1,7 +1,8 @@
-"""What would halve the standard uncertainty of f_d: a higher rate, repeats, a longer pull, better gauges.
+"""What halves the standard uncertainty of f_d: a higher rate, repeats, a longer pullback, better gauges.
 
-Each is tried by planning the test anew. What the noise of the readings adds falls with rate and repeats;
-what calibration, masses and gravity add does not, and is the floor below which no rate leads.
+Each measure is tried by planning the test again. The contribution of noise falls with rate and repeats. The
+contributions of calibration, masses and gravity do not: they are the floor that no rate and no number of
+tests goes below.
 """
 
 import math
@@ -15,14 +16,16 @@ from analysis.formatting import format_number
 from analysis.plan import PlannedTest, expected_budget, range_use
 from analysis.quantities import BudgetSource
 from analysis.record import GaugeUncertainty
+from messages.message import Message, message
 
 RATE_MAX_HZ = 100_000.0
 """The fastest converters of two gauges."""
 _REPEATS_MAX = 100
-_PULLBACKS = np.geomspace(1.05, 4.0, 28)
-"""Over the planned one."""
-_FINEST = 1e-3
-"""Of what a calibration leaves open, over what it leaves open now."""
+"""More tests than a campaign makes with one contact."""
+_PULLBACK_FACTORS = np.geomspace(1.05, 4.0, 28)
+"""Pullbacks tried, over the planned one: steps of 5 %, up to more than any gauge range allows."""
+_SMALLEST_SHARE = 1e-3
+"""Smallest share of today's calibration uncertainty that is looked at."""
 
 
 class Measure(Enum):
@@ -36,176 +39,188 @@ class Measure(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ReductionOption:
-    """One means, and whether it halves the standard uncertainty of f_d.
+    """One measure, and whether it halves the standard uncertainty of f_d.
 
     Attributes
     ----------
-    means : Means
+    measure : Measure
     value : float or None
-        Samples a second, number of tests, pullback (m), or the share of today's uncertainties of both
-        gauges' calibration that is allowed; None where this means does not get so far.
+        Rate (Hz), number of tests, pullback (m), or the allowed share of today's calibration uncertainties;
+        None where this measure does not suffice.
     standard_uncertainty : float
-        Of f_d there, or the least that this means reaches.
-    message : str
-        The same as a sentence.
+        Of f_d with that value, or the least that this measure reaches.
+    message : Message
     """
 
     measure: Measure
     value: float | None
     standard_uncertainty: float
-    message: str
+    message: Message
 
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyParts:
-    """Standard uncertainty of f_d by kind: type A from the readings' noise, type B from what is stated."""
+    """Standard uncertainty of f_d: from noise of the readings (type A), and from stated sources (type B)."""
 
     noise: float
     stated: float
 
     @property
     def total(self) -> float:
-        """Both together."""
+        """Combined standard uncertainty."""
         return math.hypot(self.noise, self.stated)
+
+    @property
+    def readings_to_halve(self) -> float | None:
+        """How many times as many readings halve the total; None where the stated part alone is too large."""
+        if 2.0 * self.stated >= self.total:
+            return None
+        return (self.noise / math.sqrt(0.25 * self.total**2 - self.stated**2)) ** 2
+
+    def with_readings(self, factor: float) -> float:
+        """Total with `factor` times as many readings of the same white noise."""
+        return math.hypot(self.noise / math.sqrt(factor), self.stated)
 
 
 def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
-    """Both parts of what is expected; None where the test does not tell f_d."""
-    ledger = expected_budget(test)
-    if "friction_dynamic" not in ledger.results:
+    """Both parts of the expected uncertainty; None where the test does not determine f_d."""
+    budget = expected_budget(test)
+    if "friction_dynamic" not in budget.results:
         return None
-    shares = [line for line in ledger.lines if line.contribution_to == "friction_dynamic"]
-    noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source is BudgetSource.NOISE))
-    stated = math.hypot(
-        *(line.standard_uncertainty for line in shares if line.source is not BudgetSource.NOISE)
-    )
-    return UncertaintyParts(noise, stated)
+    lines = [line for line in budget.lines if line.contribution_to == "friction_dynamic"]
+    by_kind = {
+        is_noise: math.hypot(
+            *(line.standard_uncertainty for line in lines if (line.source is BudgetSource.NOISE) is is_noise)
+        )
+        for is_noise in (True, False)
+    }
+    return UncertaintyParts(by_kind[True], by_kind[False])
 
 
 def reduction_options(test: PlannedTest) -> list[ReductionOption]:
-    """Every means with what it takes, or with the reason why it does not help; none where f_d is not told.
+    """Every measure with the value that it takes, or why it does not help; empty where f_d is undetermined.
 
-    Raises AnalysisError for a test that cannot be.
+    Raises
+    ------
+    AnalysisError
+        The test is impossible.
     """
     now = uncertainty_parts(test)
     if now is None:
         return []
-    return [
-        _by_rate(test, now),
-        _by_repeats(now),
-        _by_pullback(test, now),
-        _by_calibration(test, now),
-    ]
+    return [_by_rate(test, now), _by_repeats(now), _by_pullback(test, now), _by_calibration(test, now)]
 
 
 def _by_rate(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    """Readings k times as many of the same white noise are worth readings of noise / sqrt(k)."""
-    if 2.0 * now.stated >= now.total:
-        return ReductionOption(Measure.RATE, None, now.stated, f"No rate halves it: {_floor(now)}")
-    rate_hz = test.rate_hz * (now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2
+    factor = now.readings_to_halve
+    if factor is None:
+        text = message("No rate halves it: {floor}", floor=_floor(now))
+        return ReductionOption(Measure.RATE, None, now.stated, text)
+    rate_hz = test.rate_hz * factor
     if rate_hz > RATE_MAX_HZ:
-        message = f"It would take {format_number(rate_hz, 2)} samples a second, more than converters give."
-        reached = math.hypot(_thinned(now.noise, RATE_MAX_HZ / test.rate_hz), now.stated)
-        return ReductionOption(Measure.RATE, None, reached, message)
-    message = (
-        f"{rate_hz:.0f} samples a second instead of {format_number(test.rate_hz)} halve it, if each is as"
-        f" noisy"
-        " as now and their noise is white."
+        text = message(
+            "It would take {rate} samples a second, more than converters give.",
+            rate=format_number(rate_hz, 2),
+        )
+        return ReductionOption(Measure.RATE, None, now.with_readings(RATE_MAX_HZ / test.rate_hz), text)
+    text = message(
+        "{rate_hz:.0f} samples a second instead of {planned} halve it, if each is as noisy as now and their"
+        " noise is white.",
+        rate_hz=rate_hz,
+        planned=format_number(test.rate_hz),
     )
-    return ReductionOption(Measure.RATE, rate_hz, 0.5 * now.total, message)
+    return ReductionOption(Measure.RATE, rate_hz, 0.5 * now.total, text)
 
 
 def _by_repeats(now: UncertaintyParts) -> ReductionOption:
-    if 2.0 * now.stated >= now.total:
-        return ReductionOption(
-            Measure.REPEATS, None, now.stated, f"No number of repeats halves it: {_floor(now)}"
-        )
-    count = math.ceil((now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2)
-    reached = math.hypot(_thinned(now.noise, count), now.stated)
+    factor = now.readings_to_halve
+    if factor is None:
+        text = message("No number of repeats halves it: {floor}", floor=_floor(now))
+        return ReductionOption(Measure.REPEATS, None, now.stated, text)
+    count = math.ceil(factor)
     if count > _REPEATS_MAX:
-        return ReductionOption(Measure.REPEATS, None, reached, f"It would take {count} tests: too many.")
-    message = f"The mean of {count} tests halves it, if the contact itself scatters less than that."
-    return ReductionOption(Measure.REPEATS, float(count), reached, message)
+        text = message("It would take {count} tests: too many.", count=count)
+        return ReductionOption(Measure.REPEATS, None, now.with_readings(count), text)
+    text = message(
+        "The mean of {count} tests halves it, if the contact itself scatters less than that.", count=count
+    )
+    return ReductionOption(Measure.REPEATS, float(count), now.with_readings(count), text)
 
 
 def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    """Try longer pulls, as far as both gauges go."""
-    best, best_m = now.total, test.parameters.pullback_m
-    for factor in _PULLBACKS:
-        longer = _pulled(test, float(factor))
+    """Try longer pullbacks, as far as both gauges reach."""
+    planned_m = test.parameters.pullback_m
+    best, best_m = now.total, planned_m
+    for factor in _PULLBACK_FACTORS:
+        longer = test.replace(parameters=replace(test.parameters, pullback_m=float(factor) * planned_m))
         if not all(use.fits() for use in range_use(longer, longer.motion())):
             break
         parts = uncertainty_parts(longer)
         if parts is not None and parts.total < best:
             best, best_m = parts.total, longer.parameters.pullback_m
         if best <= 0.5 * now.total:
-            message = f"A pullback of {abs(best_m) * 1e3:.1f} mm halves it."
-            return ReductionOption(Measure.PULLBACK, best_m, best, message)
-    if best_m == test.parameters.pullback_m:
-        message = "No longer pullback within the gauges' ranges makes it smaller."
+            text = message("A pullback of {pullback_mm:.1f} mm halves it.", pullback_mm=abs(best_m) * 1e3)
+            return ReductionOption(Measure.PULLBACK, best_m, best, text)
+    if best_m == planned_m:
+        text = message("No longer pullback within the gauges' ranges makes it smaller.")
     else:
-        reached = f"{abs(best_m) * 1e3:.1f} mm gives {format_number(best, 2)}"
-        message = f"No longer pullback within the gauges' ranges halves it; {reached}."
-    return ReductionOption(Measure.PULLBACK, None, best, message)
+        text = message(
+            "No longer pullback within the gauges' ranges halves it; {pullback_mm:.1f} mm gives {best}.",
+            pullback_mm=abs(best_m) * 1e3,
+            best=format_number(best, 2),
+        )
+    return ReductionOption(Measure.PULLBACK, None, best, text)
 
 
 def _by_calibration(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    """Look for the share of today's uncertainties of both calibrations that is allowed."""
+    """Look for the share of today's calibration uncertainties that is allowed."""
 
     def total(share: float) -> float:
-        parts = uncertainty_parts(_calibrated(test, share))
+        parts = uncertainty_parts(
+            test.replace(
+                table_gauge=_improved(test.table_gauge, share),
+                relative_gauge=_improved(test.relative_gauge, share),
+            )
+        )
         return math.inf if parts is None else parts.total
 
-    if test.table_gauge.gain_relative is None and test.relative_gauge.gain_relative is None:
-        message = "What the calibration adds is not known: state the uncertainty of its gains."
-        return ReductionOption(Measure.CALIBRATION, None, now.total, message)
+    gains = [gauge.gain_relative for gauge in (test.table_gauge, test.relative_gauge)]
+    if gains == [None, None]:
+        text = message("What the calibration adds is not known: state the uncertainty of its gains.")
+        return ReductionOption(Measure.CALIBRATION, None, now.total, text)
     least = total(0.0)
     if least > 0.5 * now.total:
-        message = (
-            f"No calibration alone halves it: with perfect gauges {format_number(least, 2)} would be left."
+        text = message(
+            "No calibration alone halves it: with perfect gauges {least} would be left.",
+            least=format_number(least, 2),
         )
-        return ReductionOption(Measure.CALIBRATION, None, least, message)
+        return ReductionOption(Measure.CALIBRATION, None, least, text)
     share = _largest(lambda tried: total(tried) <= 0.5 * now.total)
-    gain = share * max(test.table_gauge.gain_relative or 0.0, test.relative_gauge.gain_relative or 0.0)
-    message = (
-        f"Gauges calibrated {1.0 / share:.1f} times as well halve it: gains known to"
-        f" {format_number(100.0 * gain, 2)} %."
+    text = message(
+        "Gauges calibrated {factor:.1f} times as well halve it: gains known to {gain} %.",
+        factor=1.0 / share,
+        gain=format_number(100.0 * share * max(gain or 0.0 for gain in gains), 2),
     )
-    return ReductionOption(Measure.CALIBRATION, share, total(share), message)
+    return ReductionOption(Measure.CALIBRATION, share, total(share), text)
 
 
-def _largest(good: Callable[[float], bool]) -> float:
-    """Largest share that is still good, where smaller ones are, to two digits."""
-    low, high = _FINEST, 1.0
+def _largest(allowed: Callable[[float], bool]) -> float:
+    """Largest allowed share, to 2 %, where all smaller ones are allowed too."""
+    low, high = _SMALLEST_SHARE, 1.0
     while high / low > 1.02:
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if good(middle) else (low, middle)
+        low, high = (middle, high) if allowed(middle) else (low, middle)
     return low
 
 
-def _floor(now: UncertaintyParts) -> str:
-    return (
-        f"without any noise {format_number(now.stated, 2)} would be left, of gauges, masses, gravity"
-        f" and levelling."
+def _floor(now: UncertaintyParts) -> Message:
+    return message(
+        "without any noise {stated} would be left, of gauges, masses, gravity and levelling.",
+        stated=format_number(now.stated, 2),
     )
 
 
-def _thinned(noise: float, count: float) -> float:
-    return noise / math.sqrt(count)
-
-
-def _pulled(test: PlannedTest, factor: float) -> PlannedTest:
-    parameters = test.parameters
-    return test.replace(parameters=replace(parameters, pullback_m=factor * parameters.pullback_m))
-
-
-def _calibrated(test: PlannedTest, share: float) -> PlannedTest:
-    return test.replace(
-        table_gauge=_better(test.table_gauge, share), relative_gauge=_better(test.relative_gauge, share)
-    )
-
-
-def _better(gauge: GaugeUncertainty, share: float) -> GaugeUncertainty:
-    """The same gauge with gain and non-linearity known as much better."""
+def _improved(gauge: GaugeUncertainty, share: float) -> GaugeUncertainty:
+    """The same gauge with `share` of its uncertainties of gain and non-linearity."""
     gain = None if gauge.gain_relative is None else share * gauge.gain_relative
     return replace(gauge, gain_relative=gain, nonlinearity_m=share * gauge.nonlinearity_m)

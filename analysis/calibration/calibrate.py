@@ -65,9 +65,10 @@ class CalibrationCurve:
         near = real[(real >= low - reach) & (real <= high + reach)]
         if not len(near):
             raise CalibrationError(
-                f"the dial's zero is too far from its readings for a polynomial of degree"
-                f" {self.polynomial.degree()}. Set the dial to 0 where the table rests and begin again,"
-                " or use degree 1"
+                "the dial's zero is too far from its readings for a polynomial of degree"
+                " {degree}. Set the dial to 0 where the table rests and begin again, or use"
+                " degree 1",
+                degree=self.polynomial.degree(),
             )
         zero = float(near[np.argmin(np.abs(near - np.clip(near, low, high)))])
         self._check_one_to_one(min(low, zero), max(high, zero))
@@ -77,9 +78,11 @@ class CalibrationCurve:
         slopes = self.polynomial.deriv()(np.linspace(low, high, 201))
         if slopes.min() * slopes.max() <= 0.0:
             raise CalibrationError(
-                f"the polynomial of degree {self.polynomial.degree()} turns back between counts"
-                f" {format_number(low, 7)} and {format_number(high, 7)}. Use a lower degree, or take more"
-                f" readings"
+                "the polynomial of degree {degree} turns back between counts {low} and {high}."
+                " Use a lower degree, or take more readings",
+                degree=self.polynomial.degree(),
+                low=format_number(low, 7),
+                high=format_number(high, 7),
             )
 
     def _rows(self, counts: Floats) -> Floats:
@@ -99,8 +102,10 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Calibratio
     """
     if len(counts) < degree + 2:
         raise CalibrationError(
-            f"{len(counts)} steps are too few for degree {degree}. Take at least {degree + 2},"
-            " better twice that"
+            "{count} steps are too few for degree {degree}. Take at least {least}, better twice that",
+            count=len(counts),
+            degree=degree,
+            least=degree + 2,
         )
     domain = np.array([counts.min(), counts.max()])
     frame = Polynomial(np.zeros(degree + 1), domain=domain)
@@ -109,8 +114,9 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Calibratio
     coefficients, _, rank, _ = np.linalg.lstsq(rows, displacement_m, rcond=None)
     if rank <= degree:
         raise CalibrationError(
-            f"the counts are too much alike for degree {degree}. Move the table further,"
-            " or use a lower degree"
+            "the counts are too much alike for degree {degree}. Move the table further, or use"
+            " a lower degree",
+            degree=degree,
         )
     left = displacement_m - rows @ coefficients
     freedom = len(counts) - degree - 1
@@ -220,7 +226,11 @@ class DialGauge:
             ("standard uncertainty", self.standard_uncertainty_m),
         ):
             if value is not None and not 0.0 <= value < math.inf:
-                raise CalibrationError(f"dial {name} {value:g} m must be a finite number, 0 or above")
+                raise CalibrationError(
+                    "dial {name} {value:g} m must be a finite number, 0 or above",
+                    name=message(name),
+                    value=value,
+                )
 
     @property
     def reading_uncertainty_m(self) -> float:
@@ -299,7 +309,7 @@ def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: 
         Too few steps, a degree that is not offered, or a polynomial that does not suit the readings.
     """
     if degree not in POLYNOMIAL_DEGREES:
-        raise CalibrationError(f"degree {degree} is not offered. Use 1 for a line, 2 or 3")
+        raise CalibrationError("degree {degree} is not offered. Use 1 for a line, 2 or 3", degree=degree)
     dial = dial or DialGauge()
     curve = fit_curve(*step_means(points), degree)
     zero = curve.zero_count()

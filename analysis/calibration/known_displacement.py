@@ -83,11 +83,14 @@ class ReferenceDisplacement:
     def __post_init__(self) -> None:
         if not math.isfinite(self.displacement_m) or self.displacement_m == 0.0:
             raise CalibrationError(
-                f"a displacement of {self.displacement_m:g} m checks nothing. Give a finite one that is not 0"
+                "a displacement of {displacement_m:g} m checks nothing. Give a finite one that is not 0",
+                displacement_m=self.displacement_m,
             )
         stated = self.standard_uncertainty_m
         if stated is not None and not 0.0 <= stated < math.inf:
-            raise CalibrationError(f"uncertainty {stated:g} m must be a finite number, 0 or above")
+            raise CalibrationError(
+                "uncertainty {stated:g} m must be a finite number, 0 or above", stated=stated
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +145,10 @@ def check_displacement(
     for reading in (rest, moved):
         if not math.isfinite(reading.displacement_m) or reading.samples < 2:
             raise CalibrationError(
-                f"a reading of {reading.displacement_m:g} m from {reading.samples} samples is none."
-                " Check cable, power and range of the gauge, and read it again"
+                "a reading of {displacement_m:g} m from {samples} samples is none. Check"
+                " cable, power and range of the gauge, and read it again",
+                displacement_m=reading.displacement_m,
+                samples=reading.samples,
             )
     budget = _budget(rest, moved, reference, claim)
     stated = [line.standard_uncertainty for line in budget if not math.isnan(line.standard_uncertainty)]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Floats
 from analysis.formatting import format_number
 from analysis.record import AnalysisError
+from messages.message import message
 
 IntArray = NDArray[np.int64]
 
@@ -72,8 +73,12 @@ class CalibrationPoints:
         rounds = np.asarray(seen_round if round_number is None else round_number, dtype=np.int64)
         if not len(counts_seen) == len(dial) == len(ways) == len(rounds):
             raise CalibrationError(
-                f"{len(counts_seen)} counts, {len(dial)} dial readings, {len(ways)} directions and"
-                f" {len(rounds)} rounds do not go together. Give one of each for every reading"
+                "{counts} counts, {dial_readings} dial readings, {directions} directions and {rounds}"
+                " rounds do not go together. Give one of each for every reading",
+                counts=len(counts_seen),
+                dial_readings=len(dial),
+                directions=len(ways),
+                rounds=len(rounds),
             )
         readings = cls(counts_seen, dial, ways, rounds)
         readings._check_branches()
@@ -100,13 +105,16 @@ class CalibrationPoints:
     def _check_branches(self) -> None:
         if len(self) < 2 or np.ptp(self.dial_m) == 0.0:
             raise CalibrationError(
-                f"{len(self)} readings of the dial gauge show one position only. Move the table in at least"
-                " three steps"
+                "{count} readings of the dial gauge show one position only. Move the table in"
+                " at least three steps",
+                count=len(self),
             )
         if np.ptp(self.counts) == 0.0:
             raise CalibrationError(
-                f"all {len(self)} counts are {format_number(self.counts[0], 10)} though the dial moves."
-                " Check that the gauge is connected and that the right one is read"
+                "all {count} counts are {counts} though the dial moves. Check that the gauge"
+                " is connected and that the right one is read",
+                count=len(self),
+                counts=format_number(self.counts[0], 10),
             )
         branches = self.branches()
         if not np.isin(self.direction, (1, -1)).all() or max(map(len, branches)) < 2:
@@ -123,16 +131,24 @@ class CalibrationPoints:
         for before, after in pairwise(branch):
             if way * (self.dial_m[after] - self.dial_m[before]) <= 0.0:
                 raise CalibrationError(
-                    f"reading {after + 1}: the dial goes from {_mm(self.dial_m[before])} to"
-                    f" {_mm(self.dial_m[after])} mm on the way {'up' if way > 0 else 'down'} of round"
-                    f" {self.round_number[after]}. Correct the reading, its direction or its round"
+                    "reading {number}: the dial goes from {before_mm} to {after_mm} mm on the way {direction}"
+                    " of round {round_number}. Correct the reading, its direction or its round",
+                    number=after + 1,
+                    before_mm=_mm(self.dial_m[before]),
+                    after_mm=_mm(self.dial_m[after]),
+                    direction=message("up") if way > 0 else message("down"),
+                    round_number=self.round_number[after],
                 )
             if sense * way * (self.counts[after] - self.counts[before]) <= 0.0:
                 raise CalibrationError(
-                    f"reading {after + 1}: counts go from {format_number(self.counts[before], 10)} to"
-                    f" {format_number(self.counts[after], 10)} while the dial goes from"
-                    f" {_mm(self.dial_m[before])} to"
-                    f" {_mm(self.dial_m[after])} mm, against all the others. Repeat or leave out this reading"
+                    "reading {number}: counts go from {before} to {after} while the dial"
+                    " goes from {before_mm} to {after_mm} mm, against all the others. Repeat or leave out"
+                    " this reading",
+                    number=after + 1,
+                    before=format_number(self.counts[before], 10),
+                    after=format_number(self.counts[after], 10),
+                    before_mm=_mm(self.dial_m[before]),
+                    after_mm=_mm(self.dial_m[after]),
                 )
 
 
@@ -141,13 +157,20 @@ def _mm(value_m: float) -> str:
 
 
 def _check_finite(counts: Floats, dial_m: Floats) -> None:
-    for name, values in (("count", counts), ("dial reading", dial_m)):
+    for what, values in ((message("count"), counts), (message("dial reading"), dial_m)):
         if values.ndim != 1:
-            raise CalibrationError(f"{name}s of shape {values.shape} are no list. Give one for every reading")
+            raise CalibrationError(
+                "{what}s of shape {shape} are no list. Give one for every reading",
+                what=what,
+                shape=values.shape,
+            )
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
             raise CalibrationError(
-                f"reading {wrong[0] + 1}: the {name} {values[wrong[0]]} is not a finite number. Leave it out"
+                "reading {number}: the {what} {value} is not a finite number. Leave it out",
+                number=wrong[0] + 1,
+                what=what,
+                value=values[wrong[0]],
             )
 
 
@@ -157,8 +180,10 @@ def _directions_and_rounds(dial_m: Floats) -> tuple[IntArray, IntArray]:
     still = np.flatnonzero(moves == 0)
     if len(still):
         raise CalibrationError(
-            f"reading {still[0] + 2}: the dial stays at {_mm(dial_m[still[0]])} mm. Leave one of the two"
-            " readings out, or say the direction and round of each"
+            "reading {number}: the dial stays at {dial_mm} mm. Leave one of the two readings out, or"
+            " say the direction and round of each",
+            number=still[0] + 2,
+            dial_mm=_mm(dial_m[still[0]]),
         )
     direction = np.concatenate((moves[:1], moves)) if len(moves) else np.ones(len(dial_m), dtype=np.int64)
     turns = np.concatenate(([0], np.cumsum(np.diff(direction) != 0))) if len(direction) else direction

@@ -22,7 +22,10 @@ from analysis.campaign.linear_model import (
     observations,
 )
 from analysis.campaign.rows import SeriesRow
+from analysis.formatting import format_signed, uncertainty_decimals
 from analysis.quantities import Quantity
+from messages.i18n import N_
+from messages.message import Message, joined, message
 
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
@@ -35,10 +38,10 @@ _LARGEST: Final = 700.0
 class Cause(StrEnum):
     """What f_d may depend on."""
 
-    MASS = "plate mass"
-    PULLBACK = "pullback"
-    VELOCITY = "velocity"
-    CONTACT = "contact"
+    MASS = N_("plate mass")
+    PULLBACK = N_("pullback")
+    VELOCITY = N_("velocity")
+    CONTACT = N_("contact")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +51,7 @@ class EffectSize:
     `step` says for what, for example "per 10 kg more" or "FF: from 6 to 12 mm".
     """
 
-    step: str
+    step: Message
     change: Quantity
 
 
@@ -61,8 +64,7 @@ class Effect:
     cause : Cause
     found : bool or None
         Whether f_d depends on it, at 5 %; None where the campaign cannot tell.
-    sentence : str
-        In plain words.
+    sentence : Message
     statistic, p_value : float or None
         Of the F test.
     degrees_of_freedom : (int, int) or None
@@ -75,7 +77,7 @@ class Effect:
 
     cause: Cause
     found: bool | None
-    sentence: str
+    sentence: Message
     statistic: float | None = None
     p_value: float | None = None
     degrees_of_freedom: tuple[int, int] | None = None
@@ -111,7 +113,7 @@ class _Hypothesis:
 
     combinations: Floats
     patterns: Floats
-    steps: tuple[tuple[str, Floats], ...]
+    steps: tuple[tuple[Message, Floats], ...]
 
 
 def find_effects(rows: Sequence[SeriesRow]) -> Effects:
@@ -125,7 +127,11 @@ def find_effects(rows: Sequence[SeriesRow]) -> Effects:
     taken = [row for row in rows if is_usable(row)]
     if not taken:
         return Effects(
-            tuple(_undetermined(cause, "no series has f_d, v_max and a pullback") for cause in Cause), None, 0
+            tuple(
+                _undetermined(cause, message("no series has f_d, v_max and a pullback")) for cause in Cause
+            ),
+            None,
+            0,
         )
     laid = build_design(taken)
     fitted = fit_linear_model(laid.matrix, observations(taken))
@@ -135,10 +141,10 @@ def find_effects(rows: Sequence[SeriesRow]) -> Effects:
 
 def _effect(cause: Cause, laid: DesignMatrix, fitted: LinearFit | None) -> Effect:
     question = _QUESTIONS[cause](laid)
-    if isinstance(question, str):
+    if isinstance(question, Message):
         return _undetermined(cause, question)
     if fitted is None:
-        return _undetermined(cause, "there are no repeats and too few series. Repeat the tests")
+        return _undetermined(cause, message("there are no repeats and too few series. Repeat the tests"))
     tested = f_test(fitted, question.combinations, question.patterns)
     sizes = tuple(EffectSize(step, _change_quantity(fitted, weights)) for step, weights in question.steps)
     found, seen = tested.p_value < LEVEL, _relative_change(tested.detectable_size)
@@ -156,8 +162,13 @@ def _effect(cause: Cause, laid: DesignMatrix, fitted: LinearFit | None) -> Effec
     )
 
 
-def _undetermined(cause: Cause, reason: str) -> Effect:
-    return Effect(cause, None, f"Whether f_d depends on the {cause} cannot be told: {reason}.")
+def _undetermined(cause: Cause, reason: Message) -> Effect:
+    text = message(
+        "Whether f_d depends on the {cause} cannot be told: {reason}.",
+        cause=message(cause.value),
+        reason=reason,
+    )
+    return Effect(cause, None, text)
 
 
 def _change_quantity(fitted: LinearFit, weights: Floats) -> Quantity:
@@ -180,88 +191,111 @@ def _most_significant(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
 
 def _sentence(
     cause: Cause, found: bool, p_value: float, told: Sequence[EffectSize], first: EffectSize, seen: float
-) -> str:
+) -> Message:
     chance = "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
-    numbers = "; ".join([*map(_size, told), chance])
-    power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if len(told) > 1 else "")
-    tells = seen < 1.0
+    numbers = joined([*map(_size, told), chance], "; ")
+    power = message("{change:.2g} %", change=100.0 * seen)
+    if len(told) > 1:
+        power = joined([power, first.step])
     would = (
-        f"A change of {power} would be found with a chance of 80 %"
-        if tells
-        else "Even twice f_d might not be found"
+        message("A change of {power} would be found with a chance of 80 %", power=power)
+        if seen < 1.0
+        else message("Even twice f_d might not be found")
     )
     if found:
-        return f"f_d depends on the {cause}: {numbers}. {would}."
-    less = ", a smaller one may be there" if tells else ""
-    return f"No effect of the {cause} on f_d is found: {numbers}. {would}{less}."
+        template = N_("f_d depends on the {cause}: {numbers}. {power}.")
+    elif seen < 1.0:
+        template = N_(
+            "No effect of the {cause} on f_d is found: {numbers}. {power}, a smaller one may be there."
+        )
+    else:
+        template = N_("No effect of the {cause} on f_d is found: {numbers}. {power}.")
+    return message(template, cause=message(cause.value), numbers=numbers, power=would)
 
 
-def _size(size: EffectSize) -> str:
+def _size(size: EffectSize) -> Message:
     value, low, high = _percents(size.change)
-    return f"{value} % {size.step} (95 %: {low} % to {high} %)"
+    return message(
+        "{value} % {step} (95 %: {low} % to {high} %)", value=value, step=size.step, low=low, high=high
+    )
 
 
 def _percents(change: Quantity) -> tuple[str, str, str]:
     """Value and ends of the interval in percent, to two digits of its half width."""
     low, high = change.interval_95
     half = 50.0 * (high - low)
-    digits = max(0, 1 - math.floor(math.log10(half))) if 0.0 < half < math.inf else 0
-    value, least, most = (f"{100.0 * share:+.{digits}f}" for share in (change.value, low, high))
+    decimals = max(0, uncertainty_decimals(half)) if 0.0 < half < math.inf else 0
+    value, least, most = (format_signed(100.0 * share, decimals) for share in (change.value, low, high))
     return value, least, most
 
 
-def _mass(laid: DesignMatrix) -> _Hypothesis | str:
+def _mass(laid: DesignMatrix) -> _Hypothesis | Message:
     if laid.mass is None:
-        return "it is the same in all series of a contact and pullback. Add tests with other masses"
+        return message("it is the same in all series of a contact and pullback. Add tests with other masses")
     weights = laid.form(mass=_MASS_STEP_KG)
-    return _Hypothesis(weights[None], np.ones((1, 1)), ((f"per {_MASS_STEP_KG:g} kg more", weights),))
+    return _Hypothesis(
+        weights[None],
+        np.ones((1, 1)),
+        ((message("per {step_kg:g} kg more", step_kg=_MASS_STEP_KG), weights),),
+    )
 
 
-def _velocity(laid: DesignMatrix) -> _Hypothesis | str:
+def _velocity(laid: DesignMatrix) -> _Hypothesis | Message:
     if laid.velocity is None and laid.velocity_follows:
-        return (
+        return message(
             "it changes only as pullback and plate mass do, so it cannot be told from them. Change the"
             " stiffness of the stand at the same pullback and mass"
         )
     if laid.velocity is None:
-        return "it is the same in all series. Add tests with other pullbacks"
+        return message("it is the same in all series. Add tests with other pullbacks")
     weights = laid.form(velocity=_VELOCITY_STEP_M_PER_S)
     low, high = laid.velocities
-    step = f"per {_VELOCITY_STEP_M_PER_S:g} m/s more, over {low:.2f} to {high:.2f} m/s"
+    step = message(
+        "per {step:g} m/s more, over {low:.2f} to {high:.2f} m/s",
+        step=_VELOCITY_STEP_M_PER_S,
+        low=low,
+        high=high,
+    )
     return _Hypothesis(weights[None], np.ones((1, 1)), ((step, weights),))
 
 
-def _pullback(laid: DesignMatrix) -> _Hypothesis | str:
+def _pullback(laid: DesignMatrix) -> _Hypothesis | Message:
     of_contact = {
         contact: [u0 for kind, u0 in sorted(laid.cells) if kind == contact] for contact in laid.contacts
     }
     several = {contact: pullbacks for contact, pullbacks in of_contact.items() if len(pullbacks) > 1}
     if not several:
-        return "there is one pullback only of each contact. Add tests with another one"
+        return message("there is one pullback only of each contact. Add tests with another one")
     tested, shares, steps = [], [], []
     for contact, (least, *others) in several.items():
         for pullback in others:
             tested.append(laid.difference((contact, pullback), (contact, least)))
             shares.append((pullback - least) / (others[-1] - least))
-        steps.append((f"from {_mm(least)} to {_mm(others[-1])} with {contact}", tested[-1]))
+        step = message(
+            "from {least} to {most} with {contact}", least=_mm(least), most=_mm(others[-1]), contact=contact
+        )
+        steps.append((step, tested[-1]))
     mean = np.mean([weights for _, weights in steps], axis=0)
     least, *_, most = laid.pullbacks_m
-    step = f"from {_mm(least)} to {_mm(most)}, on average over the contacts"
+    step = message("from {least} to {most}, on average over the contacts", least=_mm(least), most=_mm(most))
     every = ((step, mean), *steps) if len(steps) > 1 else tuple(steps)
     return _Hypothesis(np.array(tested), np.array([shares]), every)
 
 
-def _contact(laid: DesignMatrix) -> _Hypothesis | str:
+def _contact(laid: DesignMatrix) -> _Hypothesis | Message:
     if len(laid.contacts) < 2:
-        return "there is one contact only. Add tests with another one"
+        return message("there is one contact only. Add tests with another one")
     tested, marks = [], []
     for contact, pullback, base in _beside(laid):
         tested.append(laid.difference((contact, pullback), (base, pullback)))
         marks.append((contact, base))
     pairs = [pair for pair in combinations(laid.contacts, 2) if _common(laid, *pair)]
     if not pairs:
-        return "no two contacts were tested with the same pullback. Add such tests"
-    steps = tuple((f"from {one} to {other}", _mean_difference(laid, one, other)) for one, other in pairs)
+        return message("no two contacts were tested with the same pullback. Add such tests")
+    steps = tuple(
+        (message("from {one} to {other}", one=one, other=other), _mean_difference(laid, one, other))
+        for one, other in pairs
+    )
     patterns = np.array(
         [[float(mark[0] == odd) - float(mark[1] == odd) for mark in marks] for odd in laid.contacts]
     )

@@ -1,17 +1,27 @@
 """How the gauges do, in words and figures: for the window's screen of the gauges and the command line."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from analysis.formatting import MINUS, with_unit
-from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, Symptom, diagnose, worst_grade
+from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
 from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import format_fixed
 from messages.i18n import gettext, translate
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
+
+
+@dataclass(frozen=True, slots=True)
+class SymptomText:
+    """A symptom in the language of the window."""
+
+    code: str
+    grade: HealthGrade
+    message: str
+    remedy: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -22,7 +32,7 @@ class GaugeHealthState:
     ----------
     name : str
     verdict : Verdict
-    symptoms : tuple of Symptom
+    symptoms : tuple of SymptomText
         The worst first.
     figures : tuple of Fact
         The same lines for each gauge.
@@ -32,7 +42,7 @@ class GaugeHealthState:
 
     name: str
     verdict: HealthGrade
-    symptoms: tuple[Symptom, ...]
+    symptoms: tuple[SymptomText, ...]
     figures: tuple[LabelledValue, ...]
     frequency_hz: np.ndarray
     density_um: np.ndarray
@@ -40,13 +50,14 @@ class GaugeHealthState:
 
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
-    symptoms = tuple(
-        replace(one, message=translate(one.message), remedy=translate(one.remedy)) for one in diagnose(health)
-    )
+    symptoms = diagnose(health)
     return GaugeHealthState(
         name,
         worst_grade(symptoms),
-        symptoms,
+        tuple(
+            SymptomText(one.code, one.grade, translate(one.message), translate(one.remedy))
+            for one in symptoms
+        ),
         tuple(_figures(health)),
         health.spectrum.frequency_hz,
         health.spectrum.density_m_per_sqrt_hz * 1e6,

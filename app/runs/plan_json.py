@@ -77,5 +77,5 @@ def _way(way: ReductionOption) -> Document:
         "means": way.measure.value,
         "value": way.value,
         "standard_uncertainty": way.standard_uncertainty,
-        "message": way.message,
+        "message": str(way.message),
     }

@@ -169,4 +169,4 @@ def test_too_few_readings_are_refused() -> None:
 def test_a_large_drift_is_said_in_millimetres() -> None:
     x = rest(seconds=10.0) + np.arange(10_000) / RATE_HZ * 5.46e-3 / 60.0
     drifts = next(one for one in diagnose(health_of(x)) if one.code == "drifts")
-    assert drifts.message in {f"it drifts by 5.{digits} mm a minute" for digits in range(44, 49)}
+    assert str(drifts.message) in {f"it drifts by 5.{digits} mm a minute" for digits in range(44, 49)}

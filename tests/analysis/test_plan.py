@@ -145,7 +145,7 @@ def test_no_rate_is_promised_where_the_calibration_is_what_is_uncertain():
     assert ways[Measure.RATE].value is None
     assert ways[Measure.REPEATS].value is None
     assert friction(test.replace(rate_hz=20_000.0)) > 0.9 * friction(test)
-    assert "No rate halves it" in ways[Measure.RATE].message
+    assert "No rate halves it" in str(ways[Measure.RATE].message)
     share = ways[Measure.CALIBRATION].value
     better = {
         name: replace(gauge, gain_relative=share * 0.003, nonlinearity_m=share * 5e-6)

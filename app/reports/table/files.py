@@ -197,7 +197,17 @@ def table_document(content: TableContent) -> dict[str, Any]:
         {
             "schema": SCHEMA,
             "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
-            "effects": msgspec.to_builtins(campaign.effects.effects),
+            "effects": [
+                msgspec.to_builtins(effect)
+                | {
+                    "sentence": str(effect.sentence),
+                    "sizes": [
+                        {"step": str(size.step), "change": _quantity_document(size.change)}
+                        for size in effect.sizes
+                    ],
+                }
+                for effect in campaign.effects.effects
+            ],
             "scatter_beyond_effects": campaign.effects.scatter,
             "ratios": msgspec.to_builtins(campaign.ratios),
             "msk64_degrees": list(campaign.msk64_degrees),

@@ -103,7 +103,7 @@ def _flags(content: TableContent) -> list[str]:
 
 def effect_sentences(effects: Effects) -> list[str]:
     """A sentence a cause, and how far the series scatter about what they say."""
-    said = [effect.sentence for effect in effects.effects]
+    said = [str(effect.sentence) for effect in effects.effects]
     if effects.scatter:
         said.append(
             f"The {effects.series} series scatter about this by {100.0 * effects.scatter:.2g} % beyond their"

@@ -137,8 +137,8 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
         )
         for symptom in diagnose(health):
             seen.add(symptom.code)
-            assert_retold(symptom.message)
-            assert_retold(symptom.remedy)
+            assert_retold(str(symptom.message))
+            assert_retold(str(symptom.remedy))
     dead = measure_health(GaugeSamples(np.full(5000, 2e-3), np.zeros(5000, bool), 1000.0))
     (shown,) = gauge_health_state("1", dead).symptoms
     assert shown.message == "все показания равны 2.0000 mm: канал мёртв или завис"

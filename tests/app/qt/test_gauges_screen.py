@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from analysis.gauge_health import HealthGrade, Symptom
+from analysis.gauge_health import HealthGrade
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, Tone
-from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauge_health import GaugeHealthState, SymptomText
 from app.presenters.gauges.ports import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import (
@@ -59,7 +59,7 @@ PORTS = (
 
 def health(name: str, verdict: HealthGrade) -> GaugeHealthState:
     frequency = np.arange(500.0)
-    symptoms = (Symptom("noise", verdict, "noise of 45 µm rms", "Check shield and plugs"),)
+    symptoms = (SymptomText("noise", verdict, "noise of 45 µm rms", "Check shield and plugs"),)
     facts = (LabelledValue("noise, rms", "45\u202fµm"), LabelledValue("drift", "3 ± 2\u202fµm/min"))
     return GaugeHealthState(name, verdict, symptoms, facts, frequency, 1.0 / (1.0 + frequency))
 
