@@ -232,7 +232,7 @@ def wire_to_screen(app: QApplication, theme: Theme, frames: Frames, seconds: flo
         if len(frames.ended_s) > painted and record.state.traces is not shown:
             shown = record.state.traces
             seen.append((frames.ended_s[-1], record._display.live.history.end_s))
-    simulation = presenter._session.simulation
+    simulation = presenter._connection.simulation
     started_s = origin_s + simulation.truth().wire.started_s
     grown_kb = memory_kb() - before_kb
     window.close()

@@ -1,37 +1,40 @@
-"""Brings the presenters together with the real engine, simulated stand, settings and folders."""
+"""Composition root of the window: presenters with the real engine, simulated stand, settings and folders."""
 
 import datetime
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
-from app.presenters.analysis_task import analyse_run
-from app.presenters.connection import Connection
+from app.acquisition.engine_client import EngineClient
+from app.acquisition.messages import PortSettings
+from app.presenters.connection import Connection, Engine, Simulation
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.launcher import ProcessLauncher
 from app.presenters.record.state import StandContext
 from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
-from app.presenters.window import WindowPresenter
-from app.presenters.worker import Worker
+from app.presenters.window import WindowContext, WindowPresenter, Workers
 from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
+from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
 from config.files import (
     load_gauges,
     load_settings,
     load_stand,
+    published_row,
     published_table,
     save_settings,
     settings_file,
     settings_path,
 )
-from config.schema import ConfigError, Gauges, Settings
+from config.schema import ConfigError, Settings
 from messages.i18n import N_
 
 
 def read_personal() -> PersonalSettings:
-    """A person's settings as they are kept; the defaults, and why, where they cannot be read."""
+    """Read the person's settings; defaults with the reason where they cannot be read."""
     settings, fault = Settings(), ""
     try:
         settings = load_settings()
@@ -50,48 +53,40 @@ def read_personal() -> PersonalSettings:
 def make_window_presenter(
     simulation: SimulatedStandOptions | None = None,
     personal: PersonalSettings | None = None,
-    faults: ErrorReporter | None = None,
+    errors: ErrorReporter | None = None,
 ) -> WindowPresenter:
-    """Everything behind the window, connected to nothing yet. Raises ConfigError.
+    """Make the presenters of the window, not connected to a device. Raises ConfigError.
 
     Parameters
     ----------
     simulation : SimulatedStandOptions, optional
-        The simulated stand that the start page offers.
-    personal : Personal, optional
-        A person's settings; read unless given.
-    faults : Faults, optional
-        Where faults of the program come together.
+        Options of the simulated stand that Start offers.
+    personal : PersonalSettings, optional
+        Read unless given.
+    errors : ErrorReporter, optional
     """
-    simulation, personal, faults = (
-        simulation or SimulatedStandOptions(),
-        personal or read_personal(),
-        faults or ErrorReporter(),
-    )
-    gauges = load_gauges()
-    stand = load_stand()
-    bench = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
+    simulation = simulation or SimulatedStandOptions()
+    personal = personal or read_personal()
+    errors = errors or ErrorReporter()
+    stand, gauges = load_stand(), load_gauges()
+    context = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
-        Connection(ProcessLauncher(), faults.report),
-        Worker(faults.report),
-        analyse_run,
-        bench,
-        _start_state(bench, gauges, simulation),
-        list_port_choices,
-        Worker(faults.report),
-        (Worker(faults.report), Worker(faults.report)),
-        lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
-        simulation,
-        personal,
-        faults,
-        Worker(faults.report),
-        Worker(faults.report),
-        Worker(faults.report),
+        Connection(ProcessLauncher(), errors.report),
+        Workers.sharing(errors.report),
+        WindowContext(
+            context,
+            _start_state(context, simulation),
+            personal,
+            simulation,
+            list_port_choices,
+            lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(context.directory)),
+        ),
+        errors,
     )
 
 
 class _SettingsStore:
-    """Keeps settings in the person's file."""
+    """Stores settings in the person's file."""
 
     def save(self, settings: Settings) -> Path | None:
         return save_settings(settings, datetime.datetime.now().astimezone().date())
@@ -104,8 +99,8 @@ def list_port_choices() -> tuple[PortChoice, ...]:
     return tuple(PortChoice(port.device, port.description) for port in list_ports())
 
 
-def _start_state(bench: StandContext, gauges: Gauges, simulation: SimulatedStandOptions) -> StartState:
-    device = gauges.device
+def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> StartState:
+    device = context.gauges.device
     return StartState(
         all_series=tuple(published_table()),
         series=simulation.series,
@@ -115,7 +110,7 @@ def _start_state(bench: StandContext, gauges: Gauges, simulation: SimulatedStand
             baud="" if device.baud is None else str(device.baud),
             rate_hz="" if device.rate_hz is None else f"{device.rate_hz:g}",
         ),
-        recordings=str(bench.directory),
+        recordings=str(context.directory),
     )
 
 
@@ -127,3 +122,55 @@ def _protocols() -> tuple[ProtocolChoice, ...]:
         for entry in PROTOCOLS.values()
         if entry.available
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessLauncher:
+    """Starts processes of this installation."""
+
+    def engine(self, port: PortSettings) -> Engine:
+        """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
+
+        It takes the settings that are in use now: a calibration may have been made meanwhile.
+        """
+        stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
+        return EngineClient.start(port, stand, gauges, low_latency=True)
+
+    def simulation(self, options: SimulatedStandOptions) -> Simulation:
+        """Start a simulated stand. Raises SimulatedStandError, ConfigError."""
+        row = published_row(options.series)
+        friction = row.friction_dynamic if options.friction is None else options.friction
+        return RunningStand(SimulatedStand.start(options), options, friction)
+
+
+@dataclass(frozen=True, slots=True)
+class RunningStand:
+    """A simulated stand with what a reader of it must know."""
+
+    _stand: SimulatedStand
+    _options: SimulatedStandOptions
+    true_friction: float
+
+    @property
+    def port(self) -> PortSettings:
+        """How to read it."""
+        return PortSettings(
+            url=self._stand.port, protocol=self._options.protocol, device=self._options.device
+        )
+
+    @property
+    def series(self) -> str:
+        """What it runs."""
+        return self._options.series
+
+    def truth(self) -> Truth:
+        """What is true of it, as last told."""
+        return self._stand.truth()
+
+    def disturb(self, text: str) -> None:
+        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+        self._stand.disturb(text)
+
+    def stop(self) -> None:
+        """End it."""
+        self._stand.stop()

@@ -1,19 +1,17 @@
-"""The window as a whole: which screen is shown, what is connected, and who gets to know what."""
+"""Presenter of the window: shown screen, connection, and events for the screens."""
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
-from app.presenters.analysis_task import warm_up
 from app.presenters.base import Notice, Presenter, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection, SimulationStarted
-from app.presenters.error_reports import ErrorReporter
+from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
 from app.presenters.record.presenter import RecordPresenter
@@ -34,16 +32,18 @@ from app.presenters.settings.presenter import PersonalSettings, SettingsPresente
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker
+from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
 
 RECONNECT = N_("Connect again")
+ANALYSE = LazyFunction("app.presenters.analysis_task", "analyse_run")
+WARM_UP = LazyFunction("app.presenters.analysis_task", "warm_up")
 
 
 class Screen(StrEnum):
-    """The screens there are, in the order of the side bar."""
+    """All screens, in the order of the side bar."""
 
     START = "start"
     RECORD = "record"
@@ -57,98 +57,121 @@ class Screen(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Which screen is shown, a notice above it, and the theme: system, light or dark."""
+    """Shown screen, notice above it, and theme (`system`, `light` or `dark`)."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
     theme: str = "system"
 
 
+@dataclass(frozen=True, slots=True)
+class WindowContext:
+    """What the window starts with.
+
+    Attributes
+    ----------
+    start : StartState
+        First state of the Start screen.
+    simulation : SimulatedStandOptions
+        Options of the simulated stand that is offered.
+    list_ports : callable
+        Serial ports of this computer.
+    count_unfinished : callable
+        Number of runs in the folder that a crash has left unfinished.
+    """
+
+    stand: StandContext
+    start: StartState
+    personal: PersonalSettings = field(default_factory=PersonalSettings)
+    simulation: SimulatedStandOptions = field(default_factory=SimulatedStandOptions)
+    list_ports: Callable[[], tuple[PortChoice, ...]] = tuple
+    count_unfinished: Callable[[], int] = lambda: 0
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Workers of the screens: tasks of one worker are carried out in turn, those of two at the same time.
+
+    Attributes
+    ----------
+    analysis : Worker
+        Identifies recorded and opened runs, in a process of its own that has the analysis loaded.
+    record, runs, campaign, gauges : Worker
+        Tasks of these screens.
+    batch : Worker
+        Analyses of many runs.
+    ports : Worker
+        Probes ports.
+    """
+
+    analysis: Worker
+    record: Worker
+    runs: Worker
+    batch: Worker
+    campaign: Worker
+    gauges: Worker
+    ports: Worker
+    pool: WorkerPool = field(default_factory=WorkerPool)
+
+    @classmethod
+    def sharing(cls, report_error: Callable[[ErrorReport], None]) -> "Workers":
+        """Make workers that share processes, all but the analysis."""
+        pool = WorkerPool()
+        record, runs, batch, campaign, gauges, ports = (Worker(report_error, pool) for _ in range(6))
+        return cls(Worker(report_error), record, runs, batch, campaign, gauges, ports, pool)
+
+
 class WindowPresenter(Presenter[WindowState]):
-    """Owns the other presenters, the session and the worker.
+    """Owns the presenters of all screens, the connection and the workers.
 
     Parameters
     ----------
-    session : Session
-    worker : Worker
-    analyse : task
-        Reads and identifies the run at a path, in the worker.
-    bench : Bench
-    start : StartState
-    ports : callable
-        Lists the serial ports of this computer.
-    library : Worker
-        Does the work of the Runs screen.
-    gauge_workers : tuple of Worker
-        Do the work of the Gauges screen; the second one looks at ports.
-    unfinished : callable, optional
-        Counts the runs in the bench's folder that a crash has left unfinished.
-    simulation : SimulatedStandOptions, optional
-        The simulated stand that is offered.
-    personal : Personal, optional
-        A person's settings.
-    faults : Faults, optional
-        Faults of the program, which are shown.
-    files : Worker, optional
-        Does what Record does with files.
-    gatherer : Worker, optional
-        Does the work of the Campaign screen.
-    analyst : Worker, optional
-        Does the analyses of the Runs screen.
+    connection : Connection
+    workers : Workers
+    context : WindowContext
+    errors : ErrorReporter, optional
+        Its reports are shown.
     """
 
     def __init__(
         self,
-        session: Connection,
-        worker: Worker,
-        analyse: Callable[..., Any],
-        bench: StandContext,
-        start: StartState,
-        ports: Callable[[], tuple[PortChoice, ...]],
-        library: Worker,
-        gauge_workers: tuple[Worker, Worker],
-        unfinished: Callable[[], int] = lambda: 0,
-        simulation: SimulatedStandOptions | None = None,
-        personal: PersonalSettings | None = None,
-        faults: ErrorReporter | None = None,
-        files: Worker | None = None,
-        gatherer: Worker | None = None,
-        analyst: Worker | None = None,
+        connection: Connection,
+        workers: Workers,
+        context: WindowContext,
+        errors: ErrorReporter | None = None,
     ) -> None:
         super().__init__(WindowState())
-        self._faults = faults or ErrorReporter()
-        self._session = session
-        self._worker = worker
-        self._analyse = analyse
-        self._folder = str(bench.directory)
-        self._unfinished = unfinished
-        self._reconnect: Callable[[], None] | None = None
+        self._errors = errors or ErrorReporter()
+        self._connection = connection
+        self._workers = workers
+        self._count_unfinished = context.count_unfinished
+        self._folder = str(context.stand.directory)
+        self._open_again: Callable[[], None] | None = None
         self._true_friction: float | None = None
-        self._recorded: dict[str, float | None] = {}
-        self.start = StartPresenter(start, self, ports)
-        self.record = RecordPresenter(session, bench, files or Worker(), getpass.getuser())
-        self.identify = IdentifyPresenter(worker, self._poll_worker)
-        self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
-        session.add_row_listener(self.gauges.on_rows)
+        self._true_frictions: dict[str, float | None] = {}
+        stand, author = context.stand, getpass.getuser()
+        self.start = StartPresenter(context.start, self, context.list_ports)
+        self.record = RecordPresenter(connection, stand, workers.record, author)
+        self.identify = IdentifyPresenter(workers.analysis, self._poll_analysis)
+        self.gauges = GaugesPresenter(workers.gauges, workers.ports, stand.gauges, self)
+        connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
-            simulation or SimulatedStandOptions(),
-            start.all_series,
-            self.open_stand,
-            lambda: self._session.simulation,
+            context.simulation, context.start.all_series, self.open_stand, lambda: connection.simulation
         )
         self.runs = RunsPresenter(
-            library, analyst or Worker(), self._folder, bench.all_series, getpass.getuser(), self.open_run
+            workers.runs, workers.batch, self._folder, stand.all_series, author, self.open_run
         )
-        self.campaign = CampaignPresenter(
-            gatherer or Worker(), self._folder, bench.all_series, getpass.getuser(), self
-        )
-        self.settings = SettingsPresenter(personal or PersonalSettings(), self._apply_settings)
-        self._begin(personal or PersonalSettings())
+        self.campaign = CampaignPresenter(workers.campaign, self._folder, stand.all_series, author, self)
+        self.settings = SettingsPresenter(context.personal, self._apply_settings)
+        self._apply_settings(context.personal.settings)
+        if context.personal.fault:
+            text = gettext("{fault}. The usual settings are used until then", fault=context.personal.fault)
+            self._update(notice=Notice(sentence(text), Tone.WARN))
 
-    # --- what the operator does ---
+    # --- screens and notices ---
 
     def show_screen(self, screen: Screen) -> None:
-        """Show another screen; recording goes on meanwhile."""
+        """Show another screen; a recording goes on."""
         if screen is Screen.RUNS:
             self.runs.refresh()
         elif screen is Screen.CAMPAIGN:
@@ -156,21 +179,21 @@ class WindowPresenter(Presenter[WindowState]):
         self._show(screen)
 
     def dismiss_notice(self) -> None:
-        """The operator has read it."""
+        """Hide the notice."""
         self._update(notice=None)
 
     def execute_notice_action(self) -> None:
-        """Do what the notice offers."""
+        """Execute the action of the notice."""
         offered = self.state.notice.action if self.state.notice else ""
         self._update(notice=None)
         if offered == RECOVER:
             self._update(notice=recovery.recovery_progress())
-            self._worker.submit(recover_runs, RecoverFolder(self._folder))
+            self._workers.analysis.submit(recover_runs, RecoverFolder(self._folder))
         else:
             self.reconnect()
 
     def open_simulated(self, series: str) -> None:
-        """Start the simulated stand as it usually is, and record from it."""
+        """Start the simulated stand with its usual options, and record from it."""
         self.open_stand(self.stand.select_series(series))
 
     def open_stand(self, options: SimulatedStandOptions) -> None:
@@ -178,103 +201,98 @@ class WindowPresenter(Presenter[WindowState]):
         self._connect(
             gettext("Simulated stand"),
             gettext("Starting the simulated stand"),
-            lambda: self._session.open_simulated(options),
+            lambda: self._connection.open_simulated(options),
         )
 
     def open_port(self, port: PortSettings) -> None:
         """Record from an amplifier."""
         self._connect(
-            port.url, gettext("Connecting to {port}", port=port.url), lambda: self._session.open_port(port)
+            port.url, gettext("Connecting to {port}", port=port.url), lambda: self._connection.open_port(port)
         )
 
     def close_connection(self) -> None:
-        """Let go of what is connected, unless a run would be cut short."""
+        """Disconnect, unless a run is being recorded."""
         if not self._refuse_while_recording():
-            self._session.disconnect()
+            self._connection.disconnect()
             self._forget_connection()
 
     def open_run(self, path: str) -> None:
-        """Show a recording."""
+        """Show a run on Identify."""
         path = str(Path(path).absolute())
         self.identify.on_opening(path)
         self._show(Screen.IDENTIFY)
         self._update(notice=None)
-        self._worker.submit(self._analyse, path)
+        self._workers.analysis.submit(ANALYSE, path)
 
     def show_runs(self, folder: str, series: str) -> None:
-        """Show runs of a folder on the Runs screen, those of a series alone unless it is ""."""
+        """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
         if folder != self.runs.state.folder:
             self.runs.choose_folder(folder)
         self.runs.set_filter(RunFilter(series=series))
         self.show_screen(Screen.RUNS)
 
     def show_record(self) -> None:
-        """Go to Record."""
+        """Show Record."""
         self.show_screen(Screen.RECORD)
 
     def show_start(self) -> None:
-        """Go where a device is connected."""
+        """Show Start, where a device is connected."""
         self.show_screen(Screen.START)
 
     def fill_connection(self, form: ConnectForm) -> None:
-        """Go there, with all filled in."""
+        """Show Start with a form filled in."""
         self.start.set_form(form)
         self.show_screen(Screen.START)
 
     def fill_second_port(self, url: str) -> None:
-        """Go there, with a port of gauge 2's own filled in beside what is there."""
+        """Show Start with the port of gauge 2's own device filled in."""
         self.fill_connection(replace(self.start.state.form, relative_port=url))
 
     def reconnect(self) -> None:
         """Connect to the same device again."""
-        if self._reconnect is not None:
-            self._reconnect()
+        if self._open_again is not None:
+            self._open_again()
 
     def set_gauges(self, gauges: Gauges) -> None:
-        """These calibrations are in use from now on."""
+        """Use these calibrations from now on."""
         self.record.dispatch(gauges)
 
     def ask_to_recover(self) -> None:
-        """Ask what is to become of runs that a crash has left unfinished, if there are any."""
-        count = self._unfinished()
+        """Offer to recover runs that a crash has left unfinished, if there are any."""
+        count = self._count_unfinished()
         if count:
             self._update(notice=recovery.recovery_question(count))
 
     def warm_up(self) -> None:
-        """Make the first analysis as quick as all others; to be called once the window is there."""
-        self._worker.submit(warm_up, None)
+        """Load the analysis beforehand, so that the first one is as fast as the others."""
+        self._workers.analysis.submit(WARM_UP, None)
 
-    # --- what time brings ---
+    # --- events ---
 
     def tick(self) -> None:
-        """Take in what engine and worker have said, and draw new samples."""
-        if (fault := self._faults.next_report()) is not None:  # first: it may be this that fails
-            self._update(notice=Notice(sentence(fault.message), Tone.BAD, details=fault.details))
-        for event in self._session.poll():
+        """Take events of engine and workers, and new samples; to be called some 60 times a second."""
+        if (report := self._errors.next_report()) is not None:  # first: the rest may fail
+            self._update(notice=Notice(sentence(report.message), Tone.BAD, details=report.details))
+        for event in self._connection.poll():
             self._on_engine_event(event)
         self.record.tick()
         self.gauges.tick()
         self.stand.tick()
         self.runs.tick()
         self.campaign.tick()
-        self._poll_worker()
+        self._poll_analysis()
 
     def close(self) -> None:
-        """Finish what is being recorded, and end all processes."""
-        self._session.close()
-        self._worker.close()
+        """Finish a run that is being recorded, and end all processes."""
+        self._connection.close()
+        self._workers.analysis.close()
         self.record.close()
         self.runs.close()
         self.campaign.close()
         self.gauges.close()
+        self._workers.pool.close()
 
     # --- inside ---
-
-    def _begin(self, personal: PersonalSettings) -> None:
-        self._apply_settings(personal.settings)
-        if personal.fault:
-            said = gettext("{fault}. The usual settings are used until then", fault=personal.fault)
-            self._update(notice=Notice(sentence(said), Tone.WARN))
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.dispatch(settings)
@@ -285,7 +303,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
         if self._refuse_while_recording():
             return
-        self._reconnect = lambda: self._connect(device, waiting_for, open_it)
+        self._open_again = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
@@ -295,7 +313,7 @@ class WindowPresenter(Presenter[WindowState]):
         open_it()
 
     def _show(self, screen: Screen) -> None:
-        """Show a screen; the one of the gauges works only while it is seen."""
+        """Show a screen; Gauges works only while it is shown."""
         if screen is Screen.GAUGES:
             self.gauges.enter()
         else:
@@ -305,7 +323,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(screen=screen)
 
     def _refuse_while_recording(self) -> bool:
-        """Refuse, in words, what would cut a run short."""
+        """Show a notice if a run is being recorded, which another connection would cut short."""
         if self.record.is_recording:
             self._update(
                 notice=Notice(gettext("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
@@ -329,50 +347,51 @@ class WindowPresenter(Presenter[WindowState]):
             self._run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
-            self._update(notice=self._fault(event.message, RECONNECT))
+            self._update(notice=self._failure_notice(event.message, RECONNECT))
 
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
             self._update(
-                notice=self._fault(event.message, tone=Tone.WARN if event.ended.is_normal else Tone.BAD)
+                notice=self._failure_notice(
+                    event.message, tone=Tone.WARN if event.ended.is_normal else Tone.BAD
+                )
             )
         if not event.path:
             return
-        self._recorded[event.path] = self._true_friction
+        self._true_frictions[event.path] = self._true_friction
         self.identify.on_opening(event.path)
-        self._worker.submit(self._analyse, event.path)
+        self._workers.analysis.submit(ANALYSE, event.path)
 
-    def _fault(self, message: str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
-        """Say what went wrong; where it has left a run unfinished, that comes before all else."""
-        if self._unfinished():
+    def _failure_notice(self, message: str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
+        """Notice of an error; if it has left a run unfinished, recovery is offered first."""
+        if self._count_unfinished():
             return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
         return Notice(sentence(message), tone, action)
 
-    def _poll_worker(self) -> None:
-        """Take in what the worker has said."""
-        for news in self._worker.poll():
-            self._on_worker_event(news)
+    def _poll_analysis(self) -> None:
+        for event in self._workers.analysis.poll():
+            self._on_analysis_event(event)
 
-    def _on_recovery_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
-        if isinstance(news, TaskProgress):
-            self._update(notice=recovery.recovery_progress(news.progress))
-        elif isinstance(news, TaskFailed):
-            self._update(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
+    def _on_recovery_event(self, event: WorkerEvent) -> None:
+        if isinstance(event, TaskProgress):
+            self._update(notice=recovery.recovery_progress(event.progress))
+        elif isinstance(event, TaskFailed):
+            self._update(notice=Notice(sentence(event.message), Tone.BAD, RECOVER, LATER))
         else:
-            self._update(notice=recovery.recovery_outcome(news.answer))
+            self._update(notice=recovery.recovery_outcome(event.answer))
             self.record.dispatch(RunsChanged())
 
-    def _on_worker_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
-        if isinstance(news.argument, RecoverFolder):
-            self._on_recovery_event(news)
-        elif isinstance(news.argument, IdentifyTask):
-            self.identify.on_event(news)
-        elif isinstance(news, TaskProgress):
-            self.record.dispatch(IdentificationProgress(news.argument, news.progress))
-            self.identify.on_progress(news.argument, news.progress)
-        elif isinstance(news, TaskFailed):
-            self.record.dispatch(IdentificationFailed(news.argument, news.message))
-            self.identify.on_failed(news.argument, news.message)
-        elif news.answer is not None:
-            self.record.dispatch(news.answer)
-            self.identify.on_analysed(news.answer, self._recorded.get(news.argument))
+    def _on_analysis_event(self, event: WorkerEvent) -> None:
+        if isinstance(event.argument, RecoverFolder):
+            self._on_recovery_event(event)
+        elif isinstance(event.argument, IdentifyTask):
+            self.identify.on_event(event)
+        elif isinstance(event, TaskProgress):
+            self.record.dispatch(IdentificationProgress(event.argument, event.progress))
+            self.identify.on_progress(event.argument, event.progress)
+        elif isinstance(event, TaskFailed):
+            self.record.dispatch(IdentificationFailed(event.argument, event.message))
+            self.identify.on_failed(event.argument, event.message)
+        elif event.answer is not None:
+            self.record.dispatch(event.answer)
+            self.identify.on_analysed(event.answer, self._true_frictions.get(event.argument))

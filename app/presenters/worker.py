@@ -1,8 +1,9 @@
-"""Long work in a process of its own, so that the window never waits: one task after another."""
+"""Long work in child processes, so that the window never waits."""
 
 import atexit
 import contextlib
 import importlib
+import logging
 import multiprocessing
 import time
 from collections import deque
@@ -18,16 +19,19 @@ from messages.i18n import N_, language, use_language
 
 Answer = TypeVar("Answer")
 ReportProgress = Callable[[Progress], None]
+Task = Callable[[Any, ReportProgress], Any]
+"""Module-level function that takes its argument and a function to report progress with."""
 CANCELLED = N_("The analysis was given up. Open the recording to repeat it")
 _GRACE_S = 3.0
-"""A process that is given up takes leave of its crew."""
-Task = Callable[[Any, ReportProgress], Any]
-"""Module-level function of one argument; called in the other process."""
+"""An aborted process has this long to end the processes that it has started itself."""
+_END_S = 4.0
+"""A process that has not ended after this time is killed: a little more than `_GRACE_S`."""
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class LazyFunction:
-    """Module-level function that is imported where it is called: in the worker process, not in the window."""
+    """Module-level function that is imported where it is called: in the child process, not in the window."""
 
     module: str
     name: str
@@ -39,7 +43,7 @@ class LazyFunction:
 
 @dataclass(frozen=True, slots=True)
 class TaskDone(Generic[Answer]):
-    """A task has ended well."""
+    """A task has returned `answer`."""
 
     argument: Any
     answer: Answer
@@ -55,7 +59,7 @@ class TaskFailed:
 
 @dataclass(frozen=True, slots=True)
 class TaskProgress:
-    """A task reports how far it is."""
+    """A task has reported progress."""
 
     argument: Any
     progress: Progress
@@ -64,88 +68,108 @@ class TaskProgress:
 WorkerEvent = TaskDone[Any] | TaskFailed | TaskProgress
 
 
-class Worker:
-    """Runs tasks in a child process that is started when first needed and ends with its owner.
+class WorkerPool:
+    """Child processes that workers share: a worker holds one only while it has tasks.
 
-    Nothing here waits: `poll` returns what has come. `close` must be called. The process may start others,
-    which a daemon may not: a lifeline ends it in place of that.
+    `close` must be called, after the workers are closed.
+    """
+
+    def __init__(self) -> None:
+        self._idle: list[_TaskProcess] = []
+
+    def acquire(self) -> "_TaskProcess":
+        """Take an idle process, or start one."""
+        while self._idle:
+            process = self._idle.pop()
+            if process.is_alive:
+                return process
+            process.detach()
+        return _TaskProcess()
+
+    def release(self, process: "_TaskProcess") -> None:
+        """Give back a process that has no tasks."""
+        self._idle.append(process)
+
+    def close(self) -> None:
+        """End all idle processes."""
+        processes, self._idle = self._idle, []
+        for process in processes:
+            process.detach()
+        for process in processes:
+            process.join()
+
+
+class Worker:
+    """Carries out tasks in a child process, one after another.
+
+    No method but `close` waits; `poll` returns what has happened. `close` must be called.
 
     Parameters
     ----------
     report_error : callable, optional
-        Takes faults of the program itself, beside the failure of the task.
+        Takes errors of the program itself, in addition to the failure of the task.
+    pool : WorkerPool, optional
+        Processes that are shared with other workers. Without one the worker keeps a process of its own, with
+        what its tasks have loaded.
     """
 
-    _END_S = 4.0
-
-    def __init__(self, report_error: Callable[[ErrorReport], None] = lambda _fault: None) -> None:
+    def __init__(
+        self,
+        report_error: Callable[[ErrorReport], None] = lambda _error: None,
+        pool: WorkerPool | None = None,
+    ) -> None:
         self._report_error = report_error
-        self._process: BaseProcess | None = None
-        self._pipe: PipeEnd | None = None
-        self._lifeline: PipeEnd | None = None
-        self._ending: list[tuple[BaseProcess, float]] = []
+        self._pool = pool
+        self._process: _TaskProcess | None = None
+        self._ending: list[_TaskProcess] = []
         self._waiting: deque[tuple[Task, Any]] = deque()
         self._cancelled: list[WorkerEvent] = []
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether a task is being done or waits."""
+        """Tell whether a task is being carried out or waits."""
         return bool(self._waiting)
 
     def submit(self, task: Task, argument: Any) -> None:
-        """Do `task(argument, report)` after those submitted before; both must be picklable."""
+        """Call `task(argument, report)` after the tasks submitted before; both must be picklable."""
         self._waiting.append((task, argument))
-        self._send(task, argument)
+        if self._process is None:
+            self._process = _TaskProcess() if self._pool is None else self._pool.acquire()
+        self._process.send(task, argument)
 
     def poll(self) -> list[WorkerEvent]:
-        """What has happened since the last call."""
-        news, self._cancelled = self._cancelled, []
-        self._reap()
+        """Events since the last call."""
+        events, self._cancelled = self._cancelled, []
+        self._ending = [process for process in self._ending if not process.has_ended()]
         try:
-            while self._pipe is not None and self._pipe.poll():
-                news.append(self._event_of(*self._pipe.recv()))
+            while self._process is not None and (received := self._process.receive()) is not None:
+                events.append(self._event_of(*received))
         except (EOFError, OSError):
-            news += self._on_process_death()
-        return news
+            events += self._on_process_death()
+        if self._process is not None and self._pool is not None and not self._waiting:
+            self._pool.release(self._process)
+            self._process = None
+        return events
 
     def cancel(self) -> None:
-        """Give up all tasks at once, which is news too; the next one starts a new process."""
+        """Abort all tasks, which fail; the next one starts another process."""
         self._cancelled += [TaskFailed(argument, CANCELLED) for _, argument in self._waiting]
         self._waiting.clear()
-        self._abort()
+        self._end(abort=True)
 
     def close(self) -> None:
-        """End the process: an idle one by itself, one that works in the middle of it."""
-        if self._waiting:
-            self._waiting.clear()
-            self._abort()
-        else:
-            self._detach()
-        for process, until_s in self._ending:
-            process.join(max(0.0, until_s - time.monotonic()))
-        self._drop_lifeline()
-        while self._ending:
-            self._reap()
+        """End the process; a task that is under way is aborted."""
+        self._end(abort=bool(self._waiting))
+        self._waiting.clear()
+        for process in self._ending:
+            process.join()
+        self._ending.clear()
 
-    def _send(self, task: Task, argument: Any) -> None:
-        if self._pipe is None:
-            self._start()
-        if self._pipe is not None:
-            with contextlib.suppress(OSError):  # a dead process is noticed by `poll`
-                self._pipe.send((task, argument))
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        held, self._lifeline = context.Pipe(duplex=False)
-        # Without `close` too: the interpreter waits for its children in the end.
-        atexit.register(self._lifeline.close)
-        self._process = context.Process(
-            target=_serve, args=(theirs, held, language()), name="slipstand-analysis"
-        )
-        self._process.start()
-        theirs.close()
-        held.close()
+    def _end(self, *, abort: bool) -> None:
+        if self._process is not None:
+            (self._process.abort if abort else self._process.detach)()
+            self._ending.append(self._process)
+            self._process = None
 
     def _event_of(self, kind: str, content: Any) -> WorkerEvent:
         argument = self._waiting[0][1]
@@ -154,54 +178,101 @@ class Worker:
         self._waiting.popleft()
         if kind == "done":
             return TaskDone(argument, content)
-        if kind == "broken":
+        if kind == "error":
             self._report_error(content)
         return TaskFailed(argument, content.message)
 
     def _on_process_death(self) -> list[WorkerEvent]:
-        """Account for a process that died: its task has failed, the others begin in a new one."""
-        self._abort()
+        """Fail the current task, and send the others to a new process."""
+        self._end(abort=True)
         if not self._waiting:
             return []
+        _log.error("process of a worker ended unexpectedly")
         _, argument = self._waiting.popleft()
-        for task, later in self._waiting:
-            self._send(task, later)
+        waiting, self._waiting = self._waiting, deque()
+        for task, later in waiting:
+            self.submit(task, later)
         message = (
             "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
         )
         return [TaskFailed(argument, message)]
 
-    def _abort(self) -> None:
-        """Have the process end at once, and those that it has started; nobody waits for it."""
+
+class _TaskProcess:
+    """One child process that carries out tasks in the order in which they are sent.
+
+    It is no daemon, since it may start processes itself. It exits when its parent does (`exit_with_parent`).
+    """
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, child_pipe = context.Pipe()
+        child_lifeline, self._lifeline = context.Pipe(duplex=False)
+        # If nobody calls `close`: the interpreter joins its children in the end.
+        atexit.register(self._lifeline.close)
+        arguments = (child_pipe, child_lifeline, language())
+        self._process: BaseProcess = context.Process(target=_serve, args=arguments, name="slipstand-analysis")
+        self._process.start()
+        child_pipe.close()
+        child_lifeline.close()
+        self._end_s = float("inf")
+        _log.info("started process %s", self._process.pid)
+
+    @property
+    def is_alive(self) -> bool:
+        try:
+            self.receive()
+        except (EOFError, OSError):
+            return False
+        return self._process.is_alive()
+
+    def send(self, task: Task, argument: Any) -> None:
+        with contextlib.suppress(OSError):  # `receive` notices a dead process
+            self._pipe.send((task, argument))
+
+    def receive(self) -> tuple[str, Any] | None:
+        """Next message; None without any. Raises EOFError, OSError where the process has died."""
+        if not self._pipe.poll():
+            return None
+        received: tuple[str, Any] = self._pipe.recv()
+        return received
+
+    def abort(self) -> None:
+        """Let the process exit at once, with the processes that it has started."""
         self._drop_lifeline()
-        self._detach()
+        self.detach()
 
-    def _detach(self) -> None:
-        """Let the process end once it has nothing left to do."""
-        if self._pipe is not None:
-            self._pipe.close()
-        if self._process is not None:
-            self._ending.append((self._process, time.monotonic() + self._END_S))
-        self._process = self._pipe = None
+    def detach(self) -> None:
+        """Let the process exit when its task has ended."""
+        self._pipe.close()
+        self._end_s = time.monotonic() + _END_S
 
-    def _reap(self) -> None:
-        """Take leave of processes that have ended; one that hangs in foreign code is killed."""
-        for process, until_s in self._ending:
-            if process.is_alive() and time.monotonic() > until_s:
-                process.kill()
-                process.join()
-        self._ending = [each for each in self._ending if each[0].is_alive()]
+    def has_ended(self) -> bool:
+        """Tell whether the process has ended; one that hangs in foreign code is killed in time."""
+        if self._process.is_alive() and time.monotonic() > self._end_s:
+            _log.warning("killed process %s, which did not end", self._process.pid)
+            self._process.kill()
+            self._process.join()
+        if self._process.is_alive():
+            return False
+        self._drop_lifeline()
+        return True
+
+    def join(self) -> None:
+        """Wait until the process has ended."""
+        self._process.join(max(0.0, self._end_s - time.monotonic()))
+        self._drop_lifeline()
+        while not self.has_ended():
+            time.sleep(0.001)
 
     def _drop_lifeline(self) -> None:
-        if self._lifeline is not None:
-            atexit.unregister(self._lifeline.close)
-            self._lifeline.close()
-            self._lifeline = None
+        atexit.unregister(self._lifeline.close)
+        self._lifeline.close()
 
 
-def _serve(pipe: PipeEnd, lifeline: PipeEnd, code: str) -> None:
-    """Do tasks until the other end is closed; `code` is the language of the window."""
-    use_language(code)
+def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
+    """Carry out tasks until the other end of the pipe is closed."""
+    use_language(language_code)
     exit_with_parent(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):
         while True:
@@ -209,6 +280,6 @@ def _serve(pipe: PipeEnd, lifeline: PipeEnd, code: str) -> None:
             try:
                 answer = task(argument, lambda progress: pipe.send(("progress", progress)))
             except Exception as error:
-                pipe.send(("failed" if is_user_error(error) else "broken", error_report(error)))
+                pipe.send(("failed" if is_user_error(error) else "error", error_report(error)))
             else:
                 pipe.send(("done", answer))

@@ -1,4 +1,4 @@
-"""Opens the window and runs it until it is closed."""
+"""Main function of the window."""
 
 import datetime
 import os
@@ -18,7 +18,7 @@ from config.schema import ConfigError, Settings, WindowLayout
 from messages.i18n import LANGUAGE_VARIABLE, language, use_language
 
 _WARM_UP_MS = 2000
-"""Engine and simulated stand start first: an analysis is needed seconds after them."""
+"""Delay before the analysis is loaded: engine and simulated stand, needed earlier, start first."""
 _INTERRUPTED = 130
 
 
@@ -36,22 +36,22 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
-    faults, personal = ErrorReporter(log_file()), read_personal()
-    faults.install_hooks()
+    errors, personal = ErrorReporter(log_file()), read_personal()
+    errors.install_hooks()
     _use(personal.settings)
     app = QApplication(sys.argv[:1])
     app.setApplicationName("Slipstand")
     _translate_dialogs(app)
     theme = Theme(app, SCHEMES[personal.settings.theme])
     try:
-        presenter = make_window_presenter(personal=personal, faults=faults)
+        presenter = make_window_presenter(personal=personal, errors=errors)
     except ConfigError as error:
         QMessageBox.critical(None, "Slipstand", str(error))
         return _refuse(str(error))
-    window = MainWindow(theme, presenter, _last_place(faults))
-    window.closed.connect(lambda place: _keep_place(place, faults))
+    window = MainWindow(theme, presenter, _load_layout(errors))
+    window.closed.connect(lambda layout: _save_layout(layout, errors))
     code = _run(app, window, presenter, series if simulated else None)
-    _tell_what_nobody_saw(faults)
+    _print_late_errors(errors)
     return code
 
 
@@ -65,27 +65,27 @@ def _use(settings: Settings) -> None:
 
 
 def _translate_dialogs(app: QApplication) -> None:
-    """Let Qt's own dialogs speak the language of the window, as far as Qt has it."""
+    """Translate Qt's own dialogs, as far as Qt has the language."""
     translator = QTranslator(app)
     folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
     if translator.load(f"qtbase_{language()}", folder):
         app.installTranslator(translator)
 
 
-def _last_place(faults: ErrorReporter) -> WindowLayout:
+def _load_layout(errors: ErrorReporter) -> WindowLayout:
     try:
         return load_window_layout()
     except ConfigError as error:
-        faults.report(error_report(error))
+        errors.report(error_report(error))
         return WindowLayout()
 
 
-def _keep_place(place: WindowLayout, faults: ErrorReporter) -> None:
-    """Keep how the window was left; a fault can only be logged, nobody sees it any more."""
+def _save_layout(layout: WindowLayout, errors: ErrorReporter) -> None:
+    """Save the layout of the window; an error is reported when the window has closed."""
     try:
-        save_window_layout(place, datetime.datetime.now().astimezone().date())
+        save_window_layout(layout, datetime.datetime.now().astimezone().date())
     except ConfigError as error:
-        faults.report(error_report(error))
+        errors.report(error_report(error))
 
 
 def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simulated: str | None) -> int:
@@ -101,14 +101,14 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     return _INTERRUPTED if interrupts else code
 
 
-def _tell_what_nobody_saw(faults: ErrorReporter) -> None:
-    """Faults of closing come when there is no window any more; the log has them too."""
-    while (fault := faults.next_report()) is not None:
-        sys.stderr.write(f"error: {fault.message}\n")
+def _print_late_errors(errors: ErrorReporter) -> None:
+    """Print errors that received after the window had closed; the log has them too."""
+    while (report := errors.next_report()) is not None:
+        sys.stderr.write(f"error: {report.message}\n")
 
 
 def _has_display() -> bool:
-    """Tell whether Qt can open a window; without a display it would end the process without a word."""
+    """Tell whether Qt can open a window; without a display Qt ends the process without a message."""
     chosen = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"} & os.environ.keys()
     return sys.platform != "linux" or any(os.environ[name] for name in chosen)
 
@@ -119,13 +119,13 @@ def _refuse(reason: str) -> int:
 
 
 def _close_on_interrupt(window: MainWindow) -> list[int]:
-    """Let Ctrl-C and SIGTERM close the window like a click does; what came is in the list returned."""
-    came: list[int] = []
+    """Let Ctrl-C and SIGTERM close the window; the returned list takes the signals that received."""
+    received: list[int] = []
 
     def close(number: int, _frame: object) -> None:
-        came.append(number)
+        received.append(number)
         window.close()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, close)
-    return came
+    return received

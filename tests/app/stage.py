@@ -29,6 +29,7 @@ from app.acquisition.messages import (
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
 from app.presenters.record.state import StandContext
+from app.presenters.window import Workers
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -297,7 +298,7 @@ class RecordingView:
 
 
 class FakeWorker:
-    """Does nothing until a test says what came of it."""
+    """Keeps tasks; a test puts what came of them into `news`."""
 
     is_busy = False
 
@@ -319,3 +320,9 @@ class FakeWorker:
 
     def close(self) -> None:
         self.closed = True
+
+
+def fake_workers(**given: Any) -> Workers:
+    """Workers of a window: fakes, but for those given."""
+    names = ("analysis", "record", "runs", "batch", "campaign", "gauges", "ports")
+    return Workers(**{name: given.get(name) or FakeWorker() for name in names})  # type: ignore[arg-type]

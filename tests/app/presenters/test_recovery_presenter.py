@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from stage import FakeLauncher, FakeWorker, bench
+from stage import FakeLauncher, FakeWorker, bench, fake_workers
 
 from app.acquisition.messages import Failed
 from app.presenters import recovery
@@ -13,7 +13,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport, recover_runs
 from app.presenters.start.state import StartState
-from app.presenters.window import RECONNECT, WindowPresenter
+from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 
 
@@ -26,18 +26,8 @@ class Desk:
         self.worker = FakeWorker()
         self.session = Connection(self.launcher, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
-        self.window = WindowPresenter(
-            self.session,
-            self.worker,  # type: ignore[arg-type]
-            lambda *_: None,
-            bench(),
-            start,
-            tuple,
-            FakeWorker(),  # type: ignore[arg-type]
-            (FakeWorker(), FakeWorker()),  # type: ignore[arg-type]
-            lambda: self.unfinished,
-            files=FakeWorker(),  # type: ignore[arg-type]
-        )
+        context = WindowContext(bench(), start, count_unfinished=lambda: self.unfinished)
+        self.window = WindowPresenter(self.session, fake_workers(analysis=self.worker), context)
 
     @property
     def notice(self) -> Notice:

@@ -4,28 +4,23 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed, bench, ended
+from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed, bench, ended, fake_workers
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
-from app.presenters.analysis_task import warm_up
 from app.presenters.base import Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.record.state import Action
 from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.start.state import ConnectForm, StartState
-from app.presenters.window import RECONNECT, Screen, WindowPresenter
+from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, Screen, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
-
-
-def analyse(path: str, _report: object) -> None:
-    raise NotImplementedError
 
 
 class Desk:
     """A window presenter with everything around it."""
 
-    def __init__(self) -> None:
+    def __init__(self, personal: PersonalSettings | None = None) -> None:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.runs_worker = FakeWorker()
@@ -33,15 +28,9 @@ class Desk:
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
-            self.worker,
-            analyse,
-            bench(),
-            start,
-            tuple,
-            self.runs_worker,
-            (FakeWorker(), FakeWorker()),
-            files=FakeWorker(),
-        )  # type: ignore[arg-type]
+            fake_workers(analysis=self.worker, runs=self.runs_worker),
+            WindowContext(bench(), start, personal or PersonalSettings()),
+        )
 
     def tick_until_connected(self) -> None:
         deadline = time.monotonic() + 5.0
@@ -71,7 +60,7 @@ def test_from_the_start_page_to_the_result(desk: Desk) -> None:
     window.record.dispatch(Action.ARM)
     for until_s in (1.0, 3.0, 6.0, END_S + 0.1):
         desk.play(until_s)
-    assert desk.worker.submitted == [(analyse, RUN)]
+    assert desk.worker.submitted == [(ANALYSE, RUN)]
     desk.worker.news = [TaskProgress(RUN, Progress("Fitting", 0.5))]
     window.tick()
     assert window.record.state.progress == window.identify.state.progress == Progress("Fitting", 0.5)
@@ -102,7 +91,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
 def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
     desk.window.start.open_run("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
-    assert desk.worker.submitted == [(analyse, "/recordings/a.h5")]
+    assert desk.worker.submitted == [(ANALYSE, "/recordings/a.h5")]
     desk.worker.news = [TaskDone("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
     desk.window.tick()
     assert desk.window.identify.state.title == "a.h5"
@@ -142,7 +131,7 @@ def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None
     assert window.state.notice is not None
     assert window.state.notice.text == "The disk is full. Free some space"
     assert window.state.notice.action == ""
-    assert desk.worker.submitted == [(analyse, RUN)]
+    assert desk.worker.submitted == [(ANALYSE, RUN)]
     window.dismiss_notice()
     assert window.state.notice is None
 
@@ -190,7 +179,7 @@ def test_warming_up_shows_nothing(desk: Desk) -> None:
     view = RecordingView()
     desk.window.attach(view)
     desk.window.warm_up()
-    assert desk.worker.submitted == [(warm_up, None)]
+    assert desk.worker.submitted == [(WARM_UP, None)]
     desk.worker.news = [TaskDone(None, None), TaskFailed(None, "numba is broken")]
     desk.window.tick()
     assert len(view.states) == 1
@@ -202,8 +191,8 @@ def test_screens_change_when_asked(desk: Desk) -> None:
     assert desk.window.state.screen is Screen.IDENTIFY
 
 
-def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold(desk: Desk) -> None:
-    desk.window._begin(PersonalSettings(fault="/x/settings.toml: theme = 'pink': not known"))
+def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold() -> None:
+    desk = Desk(PersonalSettings(fault="/x/settings.toml: theme = 'pink': not known"))
     notice = desk.window.state.notice
     assert notice is not None
     assert notice.text.startswith("/x/settings.toml: theme = 'pink'")

@@ -16,7 +16,15 @@ import pytest
 
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport
-from app.presenters.worker import CANCELLED, ReportProgress, TaskDone, TaskFailed, TaskProgress, Worker
+from app.presenters.worker import (
+    CANCELLED,
+    ReportProgress,
+    TaskDone,
+    TaskFailed,
+    TaskProgress,
+    Worker,
+    WorkerPool,
+)
 from app.runs.batch.processes import ProcessExecutor
 from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
@@ -226,3 +234,43 @@ def test_closing_does_not_wait_for_a_long_task(worker: Worker) -> None:
     news_until(worker, 1, TaskProgress)
     worker.close()
     assert worker.poll() == []
+
+
+def test_workers_of_a_pool_share_processes_as_long_as_one_works_at_a_time() -> None:
+    pool = WorkerPool()
+    first, second = Worker(pool=pool), Worker(pool=pool)
+    try:
+        for worker in (first, second, first):
+            worker.submit(tell_process, None)
+        used = [*news_until(first, 2), *news_until(second, 1)]
+        assert len({done.answer for done in used}) == 2, "both worked at the same time"
+        first.submit(tell_process, None)
+        (done,) = news_until(first, 1)
+        second.submit(tell_process, None)
+        (other,) = news_until(second, 1)
+        assert done.answer == other.answer
+        first.submit(sleep, 600.0)
+        news_until(first, 1, TaskProgress)
+        second.submit(halve, 4)
+        first.cancel()
+        assert news_until(second, 1)[-1] == TaskDone(4, 2.0), "only the tasks of one worker are cancelled"
+    finally:
+        for worker in (first, second):
+            worker.close()
+        pool.close()
+    assert multiprocessing.active_children() == []
+
+
+def test_a_shared_process_that_died_while_idle_is_replaced() -> None:
+    pool = WorkerPool()
+    worker = Worker(pool=pool)
+    try:
+        worker.submit(tell_process, None)
+        (done,) = news_until(worker, 1)
+        os.kill(done.answer, signal.SIGTERM)
+        assert gone(done.answer)
+        worker.submit(halve, 4)
+        assert news_until(worker, 1)[-1] == TaskDone(4, 2.0)
+    finally:
+        worker.close()
+        pool.close()

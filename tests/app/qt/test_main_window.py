@@ -21,14 +21,14 @@ from PySide6.QtWidgets import (
     QPushButton,
 )
 from pytestqt.qtbot import QtBot
-from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
+from stage import RUN, FakeLauncher, FakeWorker, analysed, bench, fake_workers
 
 from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.recovery import RecoverFolder
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
-from app.presenters.window import Screen, WindowPresenter
+from app.presenters.window import Screen, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
@@ -57,16 +57,14 @@ class Desk:
         )
         self.presenter = WindowPresenter(
             Connection(self.launcher, ErrorReporter().report),
-            self.worker,
-            print,
-            bench(),
-            start,
-            lambda: (PortChoice("COM7", "FT232R"),),
-            FakeWorker(),
-            (FakeWorker(), FakeWorker()),
-            lambda: self.unfinished,
-            files=FakeWorker(),
-            faults=self.faults,
+            fake_workers(analysis=self.worker),
+            WindowContext(
+                bench(),
+                start,
+                list_ports=lambda: (PortChoice("COM7", "FT232R"),),
+                count_unfinished=lambda: self.unfinished,
+            ),
+            self.faults,
         )
         self.window = MainWindow(theme, self.presenter, place)
         qtbot.addWidget(self.window)
