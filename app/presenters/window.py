@@ -13,7 +13,8 @@ from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection, SimulationStarted
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
+from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.state import IdentifyTask
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Connecting,

@@ -1,70 +1,35 @@
-"""Two cursors on the time axis: what is read at each of them, and the differences."""
+"""Two cursors on the time axis: values at each of them, and the differences."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.formatting import MINUS, with_unit
 from app.presenters import number_text
-from messages.i18n import ngettext
+from app.presenters.identify.state import Cursor, Cursors, Curves, Floats, Motion, PlotTab
+from messages.i18n import gettext, ngettext
 
-Floats = NDArray[np.float64]
 _FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5
-"""Where on the drawn span the cursors stand at first."""
-_SURELY = 0.2
-"""A distance this near to a whole number of periods (in periods) is told as so many."""
+"""Initial places of the cursors, as shares of the visible span."""
+_PERIOD_TOLERANCE = 0.2
+"""A distance that differs from a whole number of periods by less (in periods) is shown as periods."""
 _DECIMALS = {"mm": 3, "µm": 1, "mm/s": 2, "m/s²": 3}
-
-
-class Cursor(Enum):
-    """One of both; the value is its name."""
-
-    A = "A"
-    B = "B"
-
-
-@dataclass(frozen=True, slots=True)
-class Cursors:
-    """Where the cursors stand (s), which one the keys move, and what is read there, as text.
-
-    Attributes
-    ----------
-    symbols : tuple of str
-        What is read on the tab that is shown, as rich text.
-    values : tuple of tuple of float
-        Of these, a row each for A and B; NaN where nothing is drawn.
-    cells : tuple of tuple of str
-        A row each for A, B and B − A: name, time, and the values with their units.
-    period : str
-        What the distance says of the period.
-    """
-
-    a_s: float
-    b_s: float
-    active: Cursor = Cursor.B
-    symbols: tuple[str, ...] = ()
-    values: tuple[tuple[float, ...], ...] = ()
-    cells: tuple[tuple[str, ...], ...] = ()
-    period: str = ""
-
-    def at(self, cursor: Cursor) -> float:
-        """Where one stands (s)."""
-        return self.a_s if cursor is Cursor.A else self.b_s
+_TABLE, _PLATE = "u<sub>1</sub>", "u<sub>2</sub>"
+_RELATIVE = f"{_PLATE} − {_TABLE}"
+_RELATIVE_RATE = f"{_PLATE}′ − {_TABLE}′"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlottedQuantity:
-    """A line that cursors read.
+    """A plotted line that cursors read.
 
     Attributes
     ----------
     symbol, unit : str
         The symbol as rich text.
     time_s, values : (n,) float64
-        Times as in `Curves`, rising; values in `unit`, NaN where absent.
+        Rising times as in `Curves`; values in `unit`, NaN where missing.
     """
 
     symbol: str
@@ -73,37 +38,37 @@ class PlottedQuantity:
     values: Floats
 
     def interpolate(self, at_s: float) -> float:
-        """Value at a time, between two points on the straight line drawn there; NaN beside the line."""
+        """Linearly interpolated value at a time; NaN beside the line."""
         return float(np.interp(at_s, self.time_s, self.values, left=np.nan, right=np.nan))
 
     def format(self, value: float) -> str:
-        """A value of it with its unit; a dash where there is none."""
+        """Format a value with its unit; a dash for NaN."""
         if not np.isfinite(value):
             return "–"
         return with_unit(number_text.format_fixed(value, _DECIMALS[self.unit]), self.unit)
 
 
 def first_cursors(start_s: float, end_s: float) -> Cursors:
-    """Cursors within the span that is drawn."""
+    """Cursors in their initial places in a span."""
     reach_s = end_s - start_s
     return Cursors(start_s + _FIRST_SHARE * reach_s, start_s + _SECOND_SHARE * reach_s)
 
 
 def move_cursor(cursors: Cursors, cursor: Cursor, at_s: float) -> Cursors:
-    """The same with one of them elsewhere."""
+    """Move one cursor, which becomes the active one."""
     if cursor is Cursor.A:
         return replace(cursors, a_s=at_s, active=cursor)
     return replace(cursors, b_s=at_s, active=cursor)
 
 
 def shift_cursors(cursors: Cursors, by_s: float) -> Cursors:
-    """The same moments where times are counted from another one."""
+    """Shift both cursors: the origin of time changed by `-by_s`."""
     return replace(cursors, a_s=cursors.a_s + by_s, b_s=cursors.b_s + by_s)
 
 
-def step_cursor(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
-    """The same with the active one moved by so many readings of a record at `time_s` (n,)."""
-    place = nearest_index(time_s, cursors.at(cursors.active)) + readings
+def step_cursor(cursors: Cursors, time_s: Floats, samples: int) -> Cursors:
+    """Move the active cursor by a number of samples of a record at `time_s` (n,)."""
+    place = nearest_index(time_s, cursors.at(cursors.active)) + samples
     at_s = float(time_s[min(max(place, 0), len(time_s) - 1)])
     return move_cursor(cursors, cursors.active, at_s)
 
@@ -111,7 +76,7 @@ def step_cursor(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
 def read_cursors(
     cursors: Cursors, time_s: Floats, drawn: Sequence[PlottedQuantity], period_s: float | None
 ) -> Cursors:
-    """The same on the nearest readings of a record at `time_s` (n,), with what is drawn there.
+    """Snap the cursors to the nearest samples, and read the values there.
 
     Parameters
     ----------
@@ -120,7 +85,7 @@ def read_cursors(
         Rising.
     drawn : sequence of DrawnQuantity
     period_s : float, optional
-        As it was found, to count periods by.
+        Identified period.
     """
     a_s, b_s = (float(time_s[nearest_index(time_s, cursors.at(cursor))]) for cursor in Cursor)
     first, second = ([quantity.interpolate(at_s) for quantity in drawn] for at_s in (a_s, b_s))
@@ -142,7 +107,7 @@ def read_cursors(
 
 
 def nearest_index(time_s: Floats, at_s: float) -> int:
-    """Row of the reading next to a time."""
+    """Index of the sample nearest to a time."""
     after = min(int(np.searchsorted(time_s, at_s)), len(time_s) - 1)
     before = max(after - 1, 0)
     return before if at_s - time_s[before] <= time_s[after] - at_s else after
@@ -157,12 +122,62 @@ def _written(drawn: Sequence[PlottedQuantity], values: Sequence[float]) -> Itera
 
 
 def _period(distance_s: float, period_s: float | None) -> str:
-    """`10 periods of 319.9 ms each`, or the frequency where no period is near."""
+    """`10 periods of 319.9 ms each`, or the reciprocal of the distance."""
     if distance_s == 0.0:
         return ""
     count = 0 if period_s is None else round(distance_s / period_s)
-    if period_s is not None and count and abs(distance_s / period_s - count) < _SURELY:
+    if period_s is not None and count and abs(distance_s / period_s - count) < _PERIOD_TOLERANCE:
         each = with_unit(number_text.format_fixed(distance_s / count * 1e3, 2), "ms")
         return ngettext("{count} period of {each}", "{count} periods of {each} each", count, each=each)
     frequency = with_unit(number_text.format_fixed(1.0 / distance_s, 3), "Hz")
     return f"1/(B {MINUS} A) = {frequency}"
+
+
+def plotted_quantities(tab: PlotTab, curves: Curves, motion: Motion | None) -> tuple[PlottedQuantity, ...]:
+    """Lines of a tab. Phase plane: displacement and velocity of the table, then relative ones."""
+    if tab is PlotTab.DISPLACEMENT or motion is None:
+        return _measured(curves)
+    return tuple(
+        PlottedQuantity(symbol, unit, motion.time_s, values)
+        for symbol, unit, values in _computed(tab, motion)
+    )
+
+
+def _measured(curves: Curves) -> tuple[PlottedQuantity, ...]:
+    """Records of the gauges, then the residuals."""
+    both = ((_TABLE, curves.table), (_RELATIVE, curves.relative))
+    gauges = [(symbol, channel) for symbol, channel in both if channel is not None]
+    records = [PlottedQuantity(symbol, "mm", curves.time_s, channel.record_mm) for symbol, channel in gauges]
+    residuals = [
+        PlottedQuantity(gettext("residual {symbol}", symbol=symbol), "µm", curves.time_s, channel.residual_um)
+        for symbol, channel in gauges
+        if channel.residual_um is not None
+    ]
+    return (*records, *residuals)
+
+
+def _computed(tab: PlotTab, motion: Motion) -> tuple[tuple[str, str, Floats], ...]:
+    match tab:
+        case PlotTab.VELOCITY:
+            return (
+                (f"{_TABLE}′", "mm/s", motion.table_mm_per_s),
+                (f"{_PLATE}′", "mm/s", motion.plate_mm_per_s),
+                (_RELATIVE_RATE, "mm/s", motion.relative_mm_per_s),
+            )
+        case PlotTab.ACCELERATION:
+            return (
+                (f"{_TABLE}″", "m/s²", motion.table_m_per_s2),
+                (f"{_PLATE}″", "m/s²", motion.plate_m_per_s2),
+            )
+        case PlotTab.RELATIVE:
+            return (
+                (f"{_PLATE}″ − {_TABLE}″", "m/s²", motion.relative_m_per_s2),
+                (_RELATIVE, "mm", motion.relative_mm),
+            )
+        case _:
+            return (
+                (_TABLE, "mm", motion.table_mm),
+                (f"{_TABLE}′", "mm/s", motion.table_mm_per_s),
+                (_RELATIVE, "mm", motion.relative_mm),
+                (_RELATIVE_RATE, "mm/s", motion.relative_mm_per_s),
+            )

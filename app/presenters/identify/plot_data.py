@@ -1,12 +1,20 @@
-"""An analysed run as it is drawn: curves, motion, scan, and the simulation of a hand that varies f_d."""
+"""Plot data of an analysed run: curves, motion, scan of f_d, and the simulation with f_d set by hand."""
 
 import numpy as np
 
 from analysis.formatting import typeset, with_unit
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
-from app.presenters.identify.state import ChannelCurves, Curves, ManualFit, Motion, PlotLine, Scan
-from app.presenters.identify.tasks import DecimatedLine, ManualSimulation
+from app.presenters.identify.state import (
+    ChannelCurves,
+    Curves,
+    DecimatedLine,
+    ManualFit,
+    ManualSimulation,
+    Motion,
+    PlotLine,
+    Scan,
+)
 from messages.i18n import N_, gettext
 
 _NO_RELATIVE = {
@@ -16,12 +24,12 @@ _NO_RELATIVE = {
 
 
 def time_origin_s(run: AnalysedRun) -> float:
-    """Time of the record (s) that is drawn as 0: the release, or the first reading without one."""
+    """Time of the record (s) that is drawn as 0: the release, else the first sample."""
     return float(run.time_s[0]) if run.events.release_s is None else run.events.release_s
 
 
 def time_span(run: AnalysedRun) -> tuple[float, float]:
-    """First and last time of a run (s), from its origin."""
+    """First and last time of a run (s) from its origin."""
     origin_s = time_origin_s(run)
     return float(run.time_s[0]) - origin_s, float(run.time_s[-1]) - origin_s
 
@@ -43,7 +51,7 @@ def curves(run: AnalysedRun) -> Curves:
 
 
 def motion(run: AnalysedRun) -> Motion | None:
-    """Velocities and accelerations, where a motion was fitted."""
+    """Velocities and accelerations; None without a fitted motion."""
     found = run.kinematics
     if found is None:
         return None
@@ -61,14 +69,14 @@ def motion(run: AnalysedRun) -> Motion | None:
 
 
 def scan(objective: Objective | None) -> Scan | None:
-    """What is left over against f_d."""
+    """Residual against f_d."""
     if objective is None:
         return None
     return Scan(objective.friction, objective.residual_m * 1e6, objective.fitted, objective.interval_95)
 
 
 def manual_fit(found: ManualSimulation, origin_s: float, objective: Objective) -> ManualFit:
-    """The simulation with f_d set by hand, and how far from the fit that is."""
+    """Simulation with f_d set by hand, and its difference from the fit."""
     off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
     words = gettext(
         "By hand: {friction}, {off} from the fit; residual {residual}",
@@ -85,7 +93,7 @@ def manual_fit(found: ManualSimulation, origin_s: float, objective: Objective) -
 
 
 def missing_share(run: AnalysedRun) -> float:
-    """Share of the readings of the table gauge that are absent."""
+    """Share of missing samples of the table gauge."""
     return float(np.isnan(run.table.record_m).mean())
 
 
@@ -100,7 +108,7 @@ def _channel(channel: Channel) -> ChannelCurves:
 
 
 def _slips(run: AnalysedRun) -> tuple[tuple[float, float], ...]:
-    """By the fitted motion, else from release to slip end; none where nothing slips."""
+    """Slips of the fitted motion, else from release to slip end; empty if nothing slips."""
     if run.slips or run.events.release_s is None or results.FRICTION.name not in run.results:
         return run.slips
     end_s = float(run.time_s[-1]) if run.events.slip_end_s is None else run.events.slip_end_s

@@ -1,56 +1,46 @@
-"""What the Identify screen does: an analysed run in, curves and rows out."""
+"""Presenter of the Identify screen: shows an analysed run, and varies f_d by hand."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Final
 
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask, run_analysis
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.identify import plot_data, result_tables
-from app.presenters.identify.cursor_quantities import plotted_quantities
 from app.presenters.identify.cursors import (
-    Cursor,
-    Cursors,
     first_cursors,
     move_cursor,
+    plotted_quantities,
     read_cursors,
     shift_cursors,
     step_cursor,
 )
-from app.presenters.identify.state import IdentifyState, PlotTab
-from app.presenters.identify.tasks import (
+from app.presenters.identify.state import (
     ClassicalFigures,
+    Cursor,
+    Cursors,
     EstimateClassical,
+    IdentifyState,
     ManualSimulation,
+    PlotTab,
     SimulateFriction,
     Span,
-    estimate_classical,
-    simulate_friction,
 )
-from app.presenters.worker import Task, TaskDone, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.worker import LazyFunction, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
-IdentifyTask = SimulateFriction | EstimateClassical | AnalysisTask
+SIMULATE_FRICTION: Final = LazyFunction("app.presenters.identify.tasks", "simulate_friction")
+ESTIMATE_CLASSICAL: Final = LazyFunction("app.presenters.identify.tasks", "estimate_classical")
 _PIXELS = 1000
-"""Width of the curves until the view has told it."""
-
-
-class TaskQueue(Protocol):
-    """The worker, as far as this screen needs it."""
-
-    def submit(self, task: Task, argument: Any) -> None:
-        """Have something done elsewhere; the answer comes to `IdentifyPresenter.hear`."""
-
-    def cancel(self) -> None:
-        """Give up all that is being done."""
+"""Width of the curves before the view reports it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Shown:
-    """The run on the screen: as it was first analysed, and in the shape that is drawn now."""
+    """The run on the screen: its first analysis, and the variant that is shown."""
 
     first_analysis: AnalysedRun
     run: AnalysedRun
@@ -68,16 +58,16 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     Parameters
     ----------
-    work : Work
-        Simulates and analyses elsewhere.
-    listen : callable
-        Has the answers that have come handed out.
+    worker : Worker
+        Shared with the window, which closes it and passes its events to `on_event`.
+    poll_worker : callable
+        Lets the window pass the events that are there.
     """
 
-    def __init__(self, work: TaskQueue, listen: Callable[[], None]) -> None:
+    def __init__(self, worker: Worker, poll_worker: Callable[[], None]) -> None:
         super().__init__(IdentifyState())
-        self._work = work
-        self._listen = listen
+        self._worker = worker
+        self._poll_worker = poll_worker
         self._path = ""
         self._shown: _Shown | None = None
         self._span: tuple[float, float, int] | None = None
@@ -85,61 +75,57 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._next_friction: float | None = None
         self._classical: ClassicalFigures | None = None
 
-    # --- a run comes ---
-
     def on_opening(self, path: str) -> None:
-        """A run is being read and identified; what was shown before goes."""
+        """A run is being analysed; clear the screen."""
         self._path = path
         self._shown = self._pending = self._next_friction = self._classical = self._span = None
         self.state = IdentifyState(tab=self.state.tab)
         self._update(title=Path(path).name, progress=Progress(gettext("Reading the run")))
 
     def on_progress(self, path: str, progress: Progress) -> None:
-        """The identification goes on."""
+        """Show the progress of the analysis."""
         if path == self._path and self.state.progress is not None:
             self._update(progress=progress)
 
     def on_failed(self, path: str, message: str) -> None:
-        """The run could not be read or identified; as one mass it may be."""
+        """Show why the analysis failed; offer the analysis as one mass."""
         if path == self._path:
             self._update(progress=None, failure=message, alternative_kind=None if self._shown else "one-mass")
 
     def on_analysed(self, run: AnalysedRun, true_friction: float | None = None) -> None:
-        """Show an analysed run, unless another is awaited."""
+        """Show an analysed run, unless another is being opened."""
         if str(run.path) == self._path:
             self._show(_Shown(run, run, AnalysisTask(self._path, kind=run.kind), true_friction))
 
-    def on_event(self, news: WorkerEvent) -> None:
-        """Take in what came of a task of this screen."""
-        asked = news.argument
-        if asked.path != self._path:
+    def on_event(self, event: WorkerEvent) -> None:
+        """Process an event of a task of this screen."""
+        task = event.argument
+        if task.path != self._path:
             return
-        if isinstance(asked, SimulateFriction):
-            if not isinstance(news, TaskProgress):
-                self._on_simulated(asked, news.answer if isinstance(news, TaskDone) else None)
-        elif isinstance(asked, EstimateClassical):
-            if isinstance(news, TaskDone):
-                self._on_classical(asked, news.answer)
-        elif isinstance(news, TaskProgress):
-            self.on_progress(asked.path, news.progress)
-        elif isinstance(news, TaskFailed):
-            self._on_variant_failed(asked, news.message)
+        if isinstance(task, SimulateFriction):
+            if not isinstance(event, TaskProgress):
+                self._on_simulated(task, event.answer if isinstance(event, TaskDone) else None)
+        elif isinstance(task, EstimateClassical):
+            if isinstance(event, TaskDone):
+                self._on_classical(task, event.answer)
+        elif isinstance(event, TaskProgress):
+            self.on_progress(task.path, event.progress)
+        elif isinstance(event, TaskFailed):
+            self._on_variant_failed(task, event.message)
         else:
-            self._on_variant(asked, news.answer)
-
-    # --- what the operator does ---
+            self._on_variant(task, event.answer)
 
     def cancel(self) -> None:
-        """Give up the analysis that is going on."""
+        """Cancel the analysis in progress."""
         if self.state.progress is not None:
-            self._work.cancel()
+            self._worker.cancel()
 
     def set_tab(self, side: PlotTab) -> None:
-        """Show displacements, velocities, accelerations or the phase plane; cursors keep their times."""
+        """Show another tab; cursors keep their times."""
         self._update(tab=side, cursors=self._cursors_on_tab(self.state.cursors, side))
 
     def select_model(self, name: str) -> None:
-        """Show curves and results of one of the laws that were tried."""
+        """Show curves and results of another fitted law."""
         shown = self._shown
         if shown is None or self.state.progress is not None or name == _model_of(shown.run):
             return
@@ -151,23 +137,23 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             )
         else:
             self._update(progress=Progress(gettext("Fitting {law}", law=name)))
-            self._work.submit(run_analysis, AnalysisTask(self._path, name))
+            self._worker.submit(run_analysis, AnalysisTask(self._path, name))
 
     def analyse_as_alternative(self) -> None:
-        """Analyse as one mass what was analysed as two, or the other way round."""
+        """Analyse as one mass instead of two, or as two instead of one."""
         if self.state.alternative_kind is not None and self.state.progress is None:
-            asked = AnalysisTask(self._path, kind=self.state.alternative_kind)
+            task = AnalysisTask(self._path, kind=self.state.alternative_kind)
             self._update(progress=Progress(gettext("Reading the run")), failure="")
-            self._work.submit(run_analysis, asked)
+            self._worker.submit(run_analysis, task)
 
     def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
-        """The curves are drawn from here to there, so wide: a simulation by hand is made anew for that."""
+        """Set the visible span and its width in pixels; repeat the simulation by hand for it."""
         self._span = start_s, end_s, pixels
         if self.state.manual_fit is not None:
             self.set_friction(self.state.manual_fit.friction)
 
     def set_friction(self, friction: float) -> None:
-        """The handle was drawn to this f_d: simulate it, the newest one alone where several wait."""
+        """Simulate with this f_d; while a simulation runs, only the newest value waits."""
         scan, shown = self.state.scan, self._shown
         if scan is None or shown is None:
             return
@@ -176,44 +162,42 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._next_friction = friction
             return
         self._pending = SimulateFriction(self._path, friction, self._drawn_span(shown), shown.task.model)
-        self._work.submit(simulate_friction, self._pending)
+        self._worker.submit(SIMULATE_FRICTION, self._pending)
 
     def poll(self) -> bool:
-        """Take in what has been simulated; tells whether more is awaited."""
-        self._listen()
+        """Process events; True while a simulation is pending."""
+        self._poll_worker()
         return self._pending is not None
 
     def reset_friction(self) -> None:
-        """Take the handle back to the fitted f_d."""
+        """Move the handle back to the fitted f_d."""
         self._pending = self._next_friction = None
         self._update(manual_fit=None)
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
-        """Show two cursors within the times that are in sight, or take them away."""
+        """Show two cursors within a span, or hide them."""
         if self._shown is None or self.state.cursors is not None:
             self._update(cursors=None)
         else:
             self._set_cursors(first_cursors(*(span or plot_data.time_span(self._shown.run))))
 
     def move_cursor(self, cursor: Cursor, at_s: float) -> None:
-        """A cursor was drawn to this time."""
+        """Move a cursor to a time."""
         if self.state.cursors is not None:
             self._set_cursors(move_cursor(self.state.cursors, cursor, at_s))
 
     def activate_cursor(self, cursor: Cursor) -> None:
-        """The keys move this cursor from now on."""
+        """Select the cursor that the keys move."""
         if self.state.cursors is not None:
             self._set_cursors(move_cursor(self.state.cursors, cursor, self.state.cursors.at(cursor)))
 
-    def step_cursor(self, readings: int) -> None:
-        """Move the cursor that was moved last by so many readings."""
+    def step_cursor(self, samples: int) -> None:
+        """Move the active cursor by a number of samples."""
         if self.state.cursors is not None and self.state.curves is not None:
-            self._set_cursors(step_cursor(self.state.cursors, self.state.curves.time_s, readings))
-
-    # --- inside ---
+            self._set_cursors(step_cursor(self.state.cursors, self.state.curves.time_s, samples))
 
     def _show(self, shown: _Shown) -> None:
-        """Draw a run in one of its shapes; cursors stay at their moments."""
+        """Show a variant of a run; cursors keep their moments."""
         run, cursors, before = shown.run, self.state.cursors, self._shown
         self._shown = shown
         self._pending = self._next_friction = None
@@ -242,27 +226,27 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if cursors is not None and before is not None:
             self._set_cursors(shift_cursors(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
-            self._work.submit(estimate_classical, EstimateClassical(self._path, shown.task.model))
+            self._worker.submit(ESTIMATE_CLASSICAL, EstimateClassical(self._path, shown.task.model))
 
-    def _on_variant(self, asked: AnalysisTask, run: AnalysedRun) -> None:
-        """Another law, or another kind: beside the laws of the first analysis if that was of two masses."""
+    def _on_variant(self, task: AnalysisTask, run: AnalysedRun) -> None:
+        """Show another law beside those of the first analysis, or another kind of analysis."""
         if self.state.progress is None:
             return
         before = self._shown
-        first = before.first_analysis if before is not None and asked.model != AUTO_MODEL else run
-        self._show(_Shown(first, run, asked, before.true_friction if before is not None else None))
+        first = before.first_analysis if before is not None and task.model != AUTO_MODEL else run
+        self._show(_Shown(first, run, task, before.true_friction if before is not None else None))
 
-    def _on_variant_failed(self, asked: AnalysisTask, message: str) -> None:
-        """What was shown stays, with the reason; without anything shown the reason is all there is."""
+    def _on_variant_failed(self, task: AnalysisTask, message: str) -> None:
+        """Show why a variant failed; a run that is shown stays."""
         if self._shown is None:
             self._update(progress=None, failure=message)
             return
-        what = asked.model if asked.model != AUTO_MODEL else asked.kind
+        what = task.model if task.model != AUTO_MODEL else task.kind
         words = Chip(gettext("{what}: {reason}", what=what, reason=message), Tone.WARN)
         self._update(progress=None, model_note=words)
 
-    def _on_simulated(self, asked: SimulateFriction, hand: ManualSimulation | None) -> None:
-        if asked != self._pending or self._shown is None:
+    def _on_simulated(self, task: SimulateFriction, hand: ManualSimulation | None) -> None:
+        if task != self._pending or self._shown is None:
             return
         self._pending = None
         objective = self._shown.run.objective
@@ -272,13 +256,13 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if following is not None:
             self.set_friction(following)
 
-    def _on_classical(self, asked: EstimateClassical, found: ClassicalFigures) -> None:
+    def _on_classical(self, task: EstimateClassical, found: ClassicalFigures) -> None:
         shown = self._shown
-        if shown is not None and asked.model == shown.task.model and shown.run.kind == "two-mass":
+        if shown is not None and task.model == shown.task.model and shown.run.kind == "two-mass":
             self._update(classical=result_tables.classical_rows(shown.run, found))
 
     def _drawn_span(self, shown: _Shown) -> Span:
-        """What is drawn, in the time of the record."""
+        """Visible span in times of the record."""
         time_s, origin_s = shown.run.time_s, shown.origin_s
         if self._span is None:
             return Span(float(time_s[0]), float(time_s[-1]), _PIXELS)
@@ -289,7 +273,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._update(cursors=self._cursors_on_tab(cursors, self.state.tab))
 
     def _cursors_on_tab(self, cursors: Cursors | None, side: PlotTab) -> Cursors | None:
-        """The same with what a tab draws at them."""
+        """Cursors with the values of a tab."""
         curves, shown = self.state.curves, self._shown
         if cursors is None or curves is None or shown is None:
             return None
@@ -303,7 +287,7 @@ def _model_of(run: AnalysedRun) -> str:
 
 
 def _model_note(shown: _Shown) -> Chip:
-    """Say so where another law than the likeliest is drawn."""
+    """Note if another law than the likeliest is shown."""
     likeliest = _model_of(shown.first_analysis)
     if shown.run is shown.first_analysis or not likeliest:
         return EMPTY_CHIP

@@ -1,4 +1,4 @@
-"""What stands in the right column of Identify, as text: models, classical figures, budget, and notes."""
+"""Rows of the results column: models, classical estimates, budget and notes."""
 
 import math
 
@@ -9,20 +9,19 @@ from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.identify.plot_data import missing_share
-from app.presenters.identify.state import BudgetRow, ClassicalRow, ModelRow
-from app.presenters.identify.tasks import ClassicalFigures
+from app.presenters.identify.state import BudgetRow, ClassicalFigures, ClassicalRow, ModelRow
 from messages.i18n import gettext, translate
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
-"""Differences of BIC: up to the first nothing speaks against a law, above the second everything does."""
+"""Differences of BIC after Kass and Raftery (1995): below 2 not worth mentioning, above 10 very strong."""
 _NO_BETTER = 1.001
-"""A law that leaves up to so many times as much over explains the record as well."""
+"""Ratio of residuals up to which the record does not distinguish two laws."""
 _RESIDUALS_SHOWN = 4
 _PAPER_DECIMALS = 3
 
 
 def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
-    """Every law that was tried, the likeliest first.
+    """Every fitted law, the likeliest first.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tu
 
 
 def classical_rows(run: AnalysedRun, found: ClassicalFigures) -> tuple[ClassicalRow, ...]:
-    """The paper's own figures beside the fitted ones."""
+    """Classical estimates beside the fitted values."""
     rows = [
         _check(run, "period_s", found.period_s, gettext("from turning points of the tail")),
         _check(run, "log_decrement", found.log_decrement, gettext("from turning points of the tail")),
@@ -99,7 +98,7 @@ def _contribution(standard_uncertainty: float, largest: float, row: QuantityDefi
 
 
 def missing_data(run: AnalysedRun) -> Chip:
-    """How much of the record is missing; empty where nothing is."""
+    """Share of missing samples; empty if none are missing."""
     share = missing_share(run)
     if share == 0.0:
         return EMPTY_CHIP
@@ -110,7 +109,7 @@ def missing_data(run: AnalysedRun) -> Chip:
 
 
 def no_scan_reason(run: AnalysedRun) -> str:
-    """Why there is no f_d to vary."""
+    """Why f_d cannot be varied."""
     if run.objective is not None:
         return ""
     if run.kind == "one-mass":
@@ -124,7 +123,7 @@ def no_scan_reason(run: AnalysedRun) -> str:
 
 
 def _judged(tried: FittedModel, above_best: float, model: ModelSelection) -> Chip:
-    """Whether the chosen law fits, and how likely the others are beside it."""
+    """Whether the selected law fits, and how likely the others are."""
     if tried.name == model.name:
         return Chip(gettext("fits"), Tone.OK) if model.adequate else Chip(gettext("does not fit"), Tone.BAD)
     if not math.isfinite(above_best):
@@ -171,7 +170,7 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> Classi
 
 
 def _of_paper(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
-    """f_d by the paper's own procedure, no finer than its steps."""
+    """f_d by the procedure of the paper, to the resolution of its steps."""
     fitted = run.results.get(results.FRICTION.name)
     if found.friction_of_paper is None or fitted is None:
         return None
@@ -182,7 +181,7 @@ def _of_paper(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
 
 
 def _of_residual(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
-    """Which f_d the residual displacement alone allows."""
+    """Values of f_d that the residual displacement allows."""
     if "residual_displacement_m" not in run.results or results.FRICTION.name not in run.results:
         return None
     fitted = run.results[results.FRICTION.name].value

@@ -1,15 +1,14 @@
-"""What the Identify screen shows, as values."""
+"""State of the Identify screen, and its tasks."""
 
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Protocol
+from enum import Enum, StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.analysed_run import AnalysisKind
+from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
-from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
 from messages.i18n import N_
 
@@ -27,21 +26,21 @@ class ChannelCurves:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curves:
-    """A run as it is drawn.
+    """A run for drawing.
 
     Attributes
     ----------
     time_s : (n,) float64
-        From release; from the start of the record where no release was found.
+        From the release; without one, from the start of the record.
     time_title : str
     table : ChannelCurves
     relative : ChannelCurves or None
     no_relative : str
-        Why there is no second gauge, where there is none.
+        Why there is no second gauge; empty if there is one.
     slips : tuple of (float, float)
-        Spans of sliding on `time_s`.
+        Start and end of each slip, in the times of `time_s`.
     noise_um : float or None
-        Standard deviation of the gauges' noise; the band drawn is twice as high, both ways.
+        Standard deviation of the noise of the gauges. The drawn band is ± 2 standard deviations.
     """
 
     time_s: Floats
@@ -54,7 +53,7 @@ class Curves:
 
 
 class PlotTab(StrEnum):
-    """What the left side shows; the value is the title of the tab."""
+    """Tabs of plots; the value is the title."""
 
     DISPLACEMENT = N_("Displacement")
     VELOCITY = N_("Velocity")
@@ -87,7 +86,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Scan:
-    """What is left over (µm) against f_d, all else as fitted; the handle can be drawn along `friction`."""
+    """Residual rms (µm) against f_d, all other parameters as fitted. The handle moves along `friction`."""
 
     friction: Floats
     residual_um: Floats
@@ -97,7 +96,7 @@ class Scan:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlotLine:
-    """Points of a line, (n,) each, with times as in `Curves`."""
+    """Points of a line, (n,) each; times as in `Curves`."""
 
     time_s: Floats
     value: Floats
@@ -105,9 +104,9 @@ class PlotLine:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ManualFit:
-    """The simulation with f_d set by hand, as finely as it is drawn, and that in words.
+    """Simulation with f_d set by hand, decimated for drawing.
 
-    `simulations_mm` and `residuals_um` are those of the table, and of the second gauge if there is one.
+    `simulations_mm` and `residuals_um` hold the table, then gauge 2 if there is one.
     """
 
     friction: float
@@ -116,9 +115,45 @@ class ManualFit:
     residuals_um: tuple[PlotLine, ...]
 
 
+class Cursor(Enum):
+    """The two cursors; the value is the name."""
+
+    A = "A"
+    B = "B"
+
+
+@dataclass(frozen=True, slots=True)
+class Cursors:
+    """Times of the cursors (s), the one that the keys move, and the values there, as text.
+
+    Attributes
+    ----------
+    symbols : tuple of str
+        Symbols of the values on the current tab, as rich text.
+    values : tuple of tuple of float
+        A row each for A and B; NaN beside a line.
+    cells : tuple of tuple of str
+        A row each for A, B and B − A: name, time, and the values with their units.
+    period : str
+        Distance in periods, or its reciprocal.
+    """
+
+    a_s: float
+    b_s: float
+    active: Cursor = Cursor.B
+    symbols: tuple[str, ...] = ()
+    values: tuple[tuple[float, ...], ...] = ()
+    cells: tuple[tuple[str, ...], ...] = ()
+    period: str = ""
+
+    def at(self, cursor: Cursor) -> float:
+        """Time of a cursor (s)."""
+        return self.a_s if cursor is Cursor.A else self.b_s
+
+
 @dataclass(frozen=True, slots=True)
 class BudgetRow:
-    """One source of the standard uncertainty of f_d; `share` of the largest one, 0 to 1."""
+    """One contribution to the standard uncertainty of f_d; `share` of the largest one, 0 to 1."""
 
     source: str
     value: str
@@ -127,16 +162,16 @@ class BudgetRow:
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """One friction law that was tried, as text.
+    """One fitted friction law, as text.
 
     Attributes
     ----------
     name, friction : str
     ratio : str
-        Residual over noise.
-    verdict : Chip
-    shown : bool
-        Whether its curves and results are those on the screen.
+        Residual rms over noise rms.
+    status : Chip
+    is_shown : bool
+        Whether its curves and results are shown.
     """
 
     name: str
@@ -148,7 +183,7 @@ class ModelRow:
 
 @dataclass(frozen=True, slots=True)
 class ClassicalRow:
-    """A classical figure beside the fitted one, as text."""
+    """A classical estimate beside the fitted value, as text."""
 
     symbol: str
     name: str
@@ -159,16 +194,16 @@ class ClassicalRow:
 
 @dataclass(frozen=True, slots=True)
 class IdentifyState:
-    """The whole screen. With neither curves nor progress nor failure it is empty and says how to fill it.
+    """State of the screen. It is empty without curves, progress and failure.
 
     Attributes
     ----------
-    gaps : Chip
-        How much of the record is missing.
-    no_scan : str
-        Why there is no f_d to vary, where there is none.
-    other_kind : Kind or None
-        As what else the run can be analysed.
+    missing_data : Chip
+        Share of missing samples.
+    no_scan_reason : str
+        Why f_d cannot be varied.
+    alternative_kind : AnalysisKind or None
+        The other kind of analysis that is possible.
     """
 
     title: str = ""
@@ -191,41 +226,67 @@ class IdentifyState:
     failure: str = ""
 
 
-class IdentifyEvents(Protocol):
-    """What the Identify screen tells its presenter."""
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Visible part of a run: times of the record, and width in pixels."""
 
-    def cancel(self) -> None:
-        """Give up the analysis that is going on."""
+    start_s: float
+    end_s: float
+    pixels: int
 
-    def set_tab(self, side: PlotTab) -> None:
-        """Show displacements, velocities, accelerations or the phase plane."""
 
-    def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
-        """The curves are drawn from here to there (as in `Curves`), so wide."""
+@dataclass(frozen=True, slots=True)
+class SimulateFriction:
+    """Simulate a run with another f_d, decimated for a span."""
 
-    def set_friction(self, friction: float) -> None:
-        """The handle was drawn to this f_d."""
+    path: str
+    friction: float
+    span: Span
+    model: str = AUTO_MODEL
 
-    def poll(self) -> bool:
-        """Take in what has been simulated; tells whether more is awaited."""
 
-    def reset_friction(self) -> None:
-        """Take the handle back to the fitted f_d."""
+@dataclass(frozen=True, slots=True)
+class EstimateClassical:
+    """Estimate the parameters of a run by the methods of the paper."""
 
-    def select_model(self, name: str) -> None:
-        """Show curves and results of one of the laws that were tried."""
+    path: str
+    model: str = AUTO_MODEL
 
-    def analyse_as_alternative(self) -> None:
-        """Analyse as one mass what was analysed as two, or the other way round."""
 
-    def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
-        """Show two cursors within the times that are in sight, or of the whole run; or take them away."""
+@dataclass(frozen=True, eq=False, slots=True)
+class DecimatedLine:
+    """A line decimated to a few points a pixel, (n,) each; times of the record."""
 
-    def move_cursor(self, cursor: Cursor, at_s: float) -> None:
-        """A cursor was drawn to this time."""
+    time_s: Floats
+    value_m: Floats
 
-    def step_cursor(self, readings: int) -> None:
-        """Move the cursor that was moved last by so many readings."""
 
-    def activate_cursor(self, cursor: Cursor) -> None:
-        """The keys move this cursor from now on."""
+@dataclass(frozen=True, eq=False, slots=True)
+class ManualSimulation:
+    """Simulation with an f_d set by hand, and its residual.
+
+    Attributes
+    ----------
+    friction : float
+    simulations, residuals : tuple of DecimatedLine
+        Table, then relative displacement if there is a second gauge.
+    """
+
+    friction: float
+    simulations: tuple[DecimatedLine, ...]
+    residuals: tuple[DecimatedLine, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ClassicalFigures:
+    """Estimates by the methods of the paper; None if a record does not allow one."""
+
+    period_s: float | None
+    log_decrement: float | None
+    log_decrement_uncertainty: float | None
+    cycles: int
+    frictions_of_residual: tuple[float, ...]
+    friction_of_paper: float | None
+
+
+IdentifyTask = SimulateFriction | EstimateClassical | AnalysisTask

@@ -3,7 +3,7 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from app.presenters.identify.cursors import Cursors
+from app.presenters.identify.state import Cursors
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label
 from messages.i18n import gettext

@@ -6,7 +6,7 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtCore import QObject, Signal
 
-from app.presenters.identify.cursors import Cursor, Cursors
+from app.presenters.identify.state import Cursor, Cursors
 from app.qt.theme import Tokens
 from app.qt.widgets.plots import Plot, pen
 

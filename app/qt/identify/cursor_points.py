@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 
-from app.presenters.identify.cursors import Cursor, Cursors
+from app.presenters.identify.state import Cursor, Cursors
 from app.qt.theme import Tokens
 from app.qt.widgets.plots import Plot, pen, shade
 

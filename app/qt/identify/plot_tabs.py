@@ -4,8 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget
 
-from app.presenters.identify.cursors import Cursor, Cursors
-from app.presenters.identify.state import PlotTab
+from app.presenters.identify.state import Cursor, Cursors, PlotTab
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.motion_plots import MotionTabs, TimePlots
 from app.qt.theme import Theme

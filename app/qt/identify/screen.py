@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
-from app.presenters.identify.cursors import Cursors
-from app.presenters.identify.state import IdentifyEvents, IdentifyState, PlotTab
+from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.state import Cursors, IdentifyState, PlotTab
 from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.results_panel import ResultsPanel
@@ -44,24 +44,23 @@ class IdentifyScreen(QWidget):
     Parameters
     ----------
     theme : Theme
-    events : IdentifyEvents
-        Told what the operator does.
+    presenter : IdentifyPresenter
     ask_for_run : callable
         Lets the operator choose a recording.
     """
 
-    def __init__(self, theme: Theme, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
+    def __init__(self, theme: Theme, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self._title = label(role=TextRole.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._open = QPushButton(gettext("Open another recording"))
         self._open.clicked.connect(ask_for_run)
         self._kind = QPushButton()
-        self._kind.clicked.connect(events.analyse_as_alternative)
+        self._kind.clicked.connect(presenter.analyse_as_alternative)
         self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
         bind_button(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
-        self._events = events
+        self._presenter = presenter
         self._shown: IdentifyState | None = None
         self._side: tuple[PlotTab, Cursors | None] | None = None
         self._tabs = QTabBar()
@@ -69,16 +68,16 @@ class IdentifyScreen(QWidget):
         self._no_motion.setContentsMargins(16, 0, 16, 0)
         self._sides = PlotTabs(theme)
         self._readings = CursorBar()
-        self._scan = ScanPlot(theme, events.poll)
+        self._scan = ScanPlot(theme, presenter.poll)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
         self._column = make_scroll_area(name=gettext("What was found"))
-        self._waiting = _Waiting(events, ask_for_run)
+        self._waiting = _Waiting(presenter, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
         self._stack.addWidget(self._filled())
         self._lay_out()
-        self._connect(events)
+        self._connect(presenter)
 
     def show_state(self, state: IdentifyState) -> None:
         """Draw a run, or say why there is none."""
@@ -98,7 +97,7 @@ class IdentifyScreen(QWidget):
             self._sides.curves.show_manual_fit(state.manual_fit)
             self._scan.show_manual_fit(state.manual_fit)
         elif state.model_note != old.model_note:
-            self._column.setWidget(ResultsPanel(state, self._events.select_model))
+            self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
         elif state.classical != old.classical:
             self._findings().show_classical(state.classical)
         if (state.tab, state.cursors) != self._side:
@@ -120,7 +119,7 @@ class IdentifyScreen(QWidget):
         self._scan.show_scan(state.scan)
         self._no_scan.setText(state.no_scan_reason)
         self._no_scan.setVisible(bool(state.no_scan_reason))
-        self._column.setWidget(ResultsPanel(state, self._events.select_model))
+        self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
 
     def _show_side_of(self, state: IdentifyState) -> None:
         """Draw what changes with the tab or the cursors; while the handle is drawn neither does."""
@@ -137,22 +136,22 @@ class IdentifyScreen(QWidget):
         return found
 
     def _show_side(self, index: int) -> None:
-        self._events.set_tab(list(PlotTab)[index])
+        self._presenter.set_tab(list(PlotTab)[index])
 
     def _toggle_cursors(self) -> None:
-        self._events.toggle_cursors(self._sides.span())
+        self._presenter.toggle_cursors(self._sides.span())
         if self._cursors.isChecked():
             self._sides.setFocus()
 
-    def _connect(self, events: IdentifyEvents) -> None:
+    def _connect(self, presenter: IdentifyPresenter) -> None:
         self._tabs.currentChanged.connect(self._show_side)
         self._cursors.clicked.connect(self._toggle_cursors)
-        self._sides.curves.span_changed.connect(events.set_visible_span)
-        self._sides.cursor_moved.connect(events.move_cursor)
-        self._sides.cursor_stepped.connect(events.step_cursor)
-        self._sides.cursor_activated.connect(events.activate_cursor)
-        self._scan.friction_set.connect(events.set_friction)
-        self._scan.reset_requested.connect(events.reset_friction)
+        self._sides.curves.span_changed.connect(presenter.set_visible_span)
+        self._sides.cursor_moved.connect(presenter.move_cursor)
+        self._sides.cursor_stepped.connect(presenter.step_cursor)
+        self._sides.cursor_activated.connect(presenter.activate_cursor)
+        self._scan.friction_set.connect(presenter.set_friction)
+        self._scan.reset_requested.connect(presenter.reset_friction)
 
     def _filled(self) -> QWidget:
         card, side, page = QFrame(), QFrame(), QSplitter(Qt.Orientation.Horizontal)
@@ -200,7 +199,7 @@ class IdentifyScreen(QWidget):
 class _Waiting(QFrame):
     """In place of the curves: what goes on, what went wrong, or what will be here."""
 
-    def __init__(self, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
+    def __init__(self, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._words = label(role=TextRole.HEADING, wrap=True)
@@ -209,9 +208,9 @@ class _Waiting(QFrame):
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(320)
         self._cancel = QPushButton(gettext("Cancel"))
-        self._cancel.clicked.connect(events.cancel)
+        self._cancel.clicked.connect(presenter.cancel)
         self._kind = QPushButton()
-        self._kind.clicked.connect(events.analyse_as_alternative)
+        self._kind.clicked.connect(presenter.analyse_as_alternative)
         self._open = QPushButton(gettext("Open a recording"))
         self._open.clicked.connect(ask_for_run)
         layout = QVBoxLayout(self)

@@ -12,10 +12,10 @@ from analysis.quantities import ResultWarning
 from app.presenters.analysed_run import Channel, Objective
 from app.presenters.analysis_task import AnalysisTask
 from app.presenters.base import Progress, Tone
-from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.tasks import (
+from app.presenters.identify.state import (
     ClassicalFigures,
+    Cursor,
     DecimatedLine,
     EstimateClassical,
     ManualSimulation,

@@ -6,13 +6,8 @@ import pytest
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import AnalysisTask, analyse_run, run_analysis
 from app.presenters.base import Progress
-from app.presenters.identify.tasks import (
-    EstimateClassical,
-    SimulateFriction,
-    Span,
-    estimate_classical,
-    simulate_friction,
-)
+from app.presenters.identify.state import EstimateClassical, SimulateFriction, Span
+from app.presenters.identify.tasks import estimate_classical, simulate_friction
 from app.runs.simulated import write_simulated_run
 
 RATE_HZ, HELD_S, DURATION_S = 1000.0, 1.0, 8.0

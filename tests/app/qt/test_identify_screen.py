@@ -12,14 +12,14 @@ from analysis.identification import Events
 from analysis.quantities import BudgetLine, BudgetSource
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
-from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import PlotTab
-from app.presenters.identify.tasks import (
+from app.presenters.identify.state import (
     ClassicalFigures,
+    Cursor,
     DecimatedLine,
     EstimateClassical,
     ManualSimulation,
+    PlotTab,
     SimulateFriction,
 )
 from app.presenters.worker import TaskDone
