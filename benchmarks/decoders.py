@@ -15,22 +15,22 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import serial
 
-from drivers.csv_lines.codec import LineDecoder, compile_decoder, encode_lines
-from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.openscale import DEFAULT_FORMAT
+from drivers.devices.csv_lines.codec import LineDecoder, compile_decoder, encode_lines
+from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT
+from drivers.devices.gsv.codec import FrameDecoder as GsvDecoder
+from drivers.devices.gsv.codec import FrameLayout, ValueKind
+from drivers.devices.gsv.codec import encode_frames as encode_gsv
+from drivers.devices.harp.codec import EventDecoder, encode_events
+from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.devices.modbus.frames import encode_read_response
+from drivers.devices.modbus.maps import read_map
+from drivers.devices.modbus.registers import Poll, plan_poll
+from drivers.devices.slipstand_binary.codec import FrameDecoder, encode_frames
 from drivers.envelope import wrap
-from drivers.gsv.codec import FrameDecoder as GsvDecoder
-from drivers.gsv.codec import FrameLayout, ValueKind
-from drivers.gsv.codec import encode_frames as encode_gsv
-from drivers.harp.codec import EventDecoder, encode_events
-from drivers.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.modbus.frames import encode_read_response
-from drivers.modbus.maps import read_map
-from drivers.modbus.registers import Poll, plan_poll
 from drivers.pair.source import make_pair
-from drivers.registry import find_protocol
+from drivers.registry import find_driver
 from drivers.samples import SampleBlock
-from drivers.slipstand_binary.codec import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
 RATE_HZ = 2000.0
@@ -81,7 +81,7 @@ def report_lines(counts: np.ndarray) -> None:
         "time, two values, CRC": lines_per_s(CHECKED, checked),
         "time, two values, CRC, 2 % damaged": lines_per_s(CHECKED, with_damage(checked, 32)),
         "OpenScale, time in ms": lines_per_s(
-            DEFAULT_FORMAT, b"".join(encode_lines(DEFAULT_FORMAT, times_s, counts))
+            OPENSCALE_FORMAT, b"".join(encode_lines(OPENSCALE_FORMAT, times_s, counts))
         ),
         "readline loop in memory": PLAIN_SAMPLES / best_s(lambda: readline_loop(io.BytesIO(few))),
     }
@@ -121,7 +121,7 @@ class PairDecoding:
 
     def __init__(self) -> None:
         rates = {f"{gauge}.rate_hz": "1000.0" for gauge in ("table", "relative")}
-        self._source = make_pair(find_protocol("csv"), {}, None, rates)
+        self._source = make_pair(find_driver("csv"), {}, None, rates)
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Rows of both devices that `data` completes."""

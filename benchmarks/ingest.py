@@ -24,7 +24,7 @@ import tty
 
 import numpy as np
 
-from drivers.slipstand_binary.codec import encode_frames
+from drivers.devices.slipstand_binary.codec import encode_frames
 
 N = 32
 RATES_HZ = (10_000, 20_000, 50_000, 100_000, 200_000, 400_000, 800_000, 1_600_000)
@@ -36,8 +36,9 @@ STEP_S = 0.0005
 
 OURS = """
 import json, queue, resource, sys, time
-from drivers.port import PortReader, open_port
-from drivers.slipstand_binary.codec import FrameDecoder, compile_decoder
+from drivers.port import open_port
+from drivers.port_reader import PortReader
+from drivers.devices.slipstand_binary.codec import FrameDecoder, compile_decoder
 
 port_name, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
 compile_decoder()

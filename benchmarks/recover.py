@@ -24,8 +24,8 @@ from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
 from app.runs.metadata import create_metadata
 from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
-from drivers.registry import find_protocol
-from drivers.slipstand_binary.codec import encode_frames
+from drivers.devices.slipstand_binary.codec import encode_frames
+from drivers.registry import find_driver
 
 PER_FRAME = 10
 READ_S = 0.02
@@ -88,7 +88,7 @@ def frame_bytes() -> int:
 def floor(journal: Path, counts: np.ndarray, rate_hz: float) -> list[tuple[str, float, float]]:
     """What the parts take alone."""
     data = b"".join(record.data for record in read_journal(journal) if record.kind is RecordKind.WIRE)
-    source = find_protocol("slipstand-binary").make_source({}, rate_hz)
+    source = find_driver("slipstand-binary").make_source({}, rate_hz)
     source.prepare()
     return [
         ("reading and checking the records once", *timed(lambda: sum(1 for _ in read_journal(journal)))),

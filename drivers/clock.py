@@ -1,36 +1,43 @@
-"""What the rate of a stream is: by the device's own times, and by the host's clock."""
+"""Rate of a stream by the device's own times and by the host's clock, and the skew between two gauges."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from messages.message import Message, message
+
 MIN_STEPS = 5
 MIN_SPAN_S = 0.5
-"""Fewer steps, or less time, do not tell a rate."""
+"""Fewer steps, or a shorter time, do not tell a rate: a clock of 1 ms gives it to 0.2 % over 0.5 s."""
 _ROUNDING = 1e-6
-_FIRST_STRETCH_S = 0.1
-_MIN_STRETCHES = 8
-_MAX_STRETCHES = 512
-_REJECTIONS = 10
-_REJECT_BEYOND = 4.0
-_ALIKE_MAX = 0.995
+_FIRST_WINDOW_S = 0.1
+_MIN_WINDOWS = 8
+_MAX_WINDOWS = 512
+"""Windows of arrivals: at first so short that a rate is known after 0.8 s; their number bounds the memory."""
+_MAX_REJECTIONS = 10
+_REJECT_SIGMAS = 4.0
+"""Late arrivals are one-sided outliers: beyond 4 sigma of the others they do not belong to the line."""
+_MAX_CORRELATION = 0.995
 _SIGMA_PER_MAD = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
 _CLOCK_STEP_S = 1e-6
 _DELIVERY_STEP_S = 1e-3
-"""USB brings bytes once a millisecond of the host's clock. A beat of the device's clock against that
-can pass for drift: a delay anywhere in the step at both ends, sqrt(1/6) of it as standard uncertainty."""
+"""USB delivers bytes once a millisecond (USB 2.0, 8.4.3: frames of 1 ms) of the host's clock. A beat between
+that and the device's clock looks like drift: the delay is anywhere in the step at both ends."""
 DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
-"""Standard uncertainty of the difference of two arrivals by it (s)."""
+"""Standard uncertainty of the difference of two evenly distributed delays (s)."""
 
 
 def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
-    Steps up to half as long again as the median, or to the median and the step of the clock, are
-    one period each; the rate is that of their mean. Longer ones span a gap, negative ones a new
-    start of the device, either may be a wrong digit: they are left out.
+    Steps of up to 1.5 times the median, or up to the median and the step of the clock, are one period each;
+    the rate is that of their mean. Longer steps span a gap, negative ones a restart of the device; either
+    may be a damaged digit. They are left out.
 
     Parameters
     ----------
@@ -52,24 +59,24 @@ def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> 
     span_s = float(single_s.sum())
     if len(single_s) < MIN_STEPS or span_s < MIN_SPAN_S:
         return None
-    return float(f"{len(single_s) / span_s:.9g}")  # what is beyond is rounding
+    return float(f"{len(single_s) / span_s:.9g}")  # further digits are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
 class ClockEstimate:
-    """How the device's clock goes by the host's.
+    """The device's clock compared with the host's.
 
     Attributes
     ----------
     rate_hz : float
         Samples a second of the host's clock.
     scale : float
-        True over nominal time: multiply index / nominal rate by it.
+        True over nominal time: index / nominal rate is to be multiplied by it.
     scale_standard_uncertainty : float
-        Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The host's own clock, some 1e-5
-        where nothing disciplines it, is not in it.
+        Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The error of the host's own clock, some
+        1e-5 where nothing disciplines it, is not included.
     span_s : float
-        Time that the fit rests on.
+        Time covered by the fit.
     """
 
     rate_hz: float
@@ -81,11 +88,10 @@ class ClockEstimate:
 class ClockFit:
     """Rate of a stream against the host's arrival times.
 
-    A block arrives late by what system and wire add, never early. So of each stretch of time only
-    the most punctual block counts, and a line is fitted through these by least squares, leaving
-    out stretches that were late as a whole. On a busy host lateness comes and goes slowly, so that
-    stretches tell less than they are many: the uncertainty allows for how alike neighbours are.
-    Stretches grow as the stream does: memory is bounded.
+    A block arrives late by what system and wire add, never early. So only the earliest arrival of each
+    window of time counts, and a line is fitted through these by least squares without windows that were late
+    as a whole. Neighbouring windows of a busy host are late alike, so the uncertainty allows for their
+    correlation. Windows grow with the stream, which bounds the memory.
 
     Parameters
     ----------
@@ -95,17 +101,17 @@ class ClockFit:
 
     def __init__(self, nominal_rate_hz: float) -> None:
         self._period_s = 1 / nominal_rate_hz
-        self._stretch_s = _FIRST_STRETCH_S
+        self._window_s = _FIRST_WINDOW_S
         self._start_ns: int | None = None
-        self._punctual: dict[int, tuple[float, float]] = {}
+        self._earliest: dict[int, tuple[float, float]] = {}
 
     @property
     def windows(self) -> int:
-        """Stretches of time that are remembered, at most 512."""
-        return len(self._punctual)
+        """Number of windows in memory, at most 512."""
+        return len(self._earliest)
 
     def add(self, index: int, arrival_ns: int) -> None:
-        """A sample that arrived: the last of its block.
+        """Add the last sample of a block.
 
         Parameters
         ----------
@@ -118,50 +124,49 @@ class ClockFit:
             self._start_ns = arrival_ns
         nominal_s = index * self._period_s
         self._keep(nominal_s, (arrival_ns - self._start_ns) * 1e-9 - nominal_s)
-        if len(self._punctual) > _MAX_STRETCHES:
-            self._grow()
+        if len(self._earliest) > _MAX_WINDOWS:
+            self._join_windows()
 
     def estimate(self) -> ClockEstimate | None:
-        """Rate until now; None before there are 8 stretches of 0.1 s."""
-        if len(self._punctual) < _MIN_STRETCHES:
+        """Rate until now; None before there are 8 windows of 0.1 s."""
+        if len(self._earliest) < _MIN_WINDOWS:
             return None
-        line = fit_robust_line(*np.array(list(self._punctual.values())).T)
-        uncertainty = math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span)
+        line = fit_robust_line(*np.array(list(self._earliest.values())).T)
         return ClockEstimate(
             rate_hz=1 / (self._period_s * (1 + line.slope)),
             scale=1 + line.slope,
-            scale_standard_uncertainty=uncertainty,
+            scale_standard_uncertainty=math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span),
             span_s=line.span,
         )
 
     def _keep(self, nominal_s: float, late_s: float) -> None:
-        stretch = int(nominal_s / self._stretch_s)
-        before = self._punctual.get(stretch)
+        window = int(nominal_s / self._window_s)
+        before = self._earliest.get(window)
         if before is None or late_s < before[1]:
-            self._punctual[stretch] = (nominal_s, late_s)
+            self._earliest[window] = (nominal_s, late_s)
 
-    def _grow(self) -> None:
-        """Join neighbouring stretches."""
-        kept = list(self._punctual.values())
-        self._stretch_s *= 2
-        self._punctual = {}
+    def _join_windows(self) -> None:
+        kept = list(self._earliest.values())
+        self._window_s *= 2
+        self._earliest = {}
         for nominal_s, late_s in kept:
             self._keep(nominal_s, late_s)
 
 
 @dataclass(frozen=True, slots=True)
 class RobustLine:
-    """A straight line through the punctual ones of some points.
+    """A straight line through points, outliers left out.
 
     Attributes
     ----------
     centre, level : float
         A point of the line.
     slope, slope_uncertainty : float
+        The uncertainty is a standard uncertainty and allows for correlated residuals.
     scatter : float
-        Root mean square distance of these points from it.
+        Root mean square of the residuals.
     span : float
-        From the first of them to the last.
+        From the first to the last point.
     """
 
     centre: float
@@ -176,17 +181,17 @@ class RobustLine:
         return self.level + self.slope * (x - self.centre)
 
 
-def fit_robust_line(x: NDArray[np.float64], late: NDArray[np.float64]) -> RobustLine:
-    """Line by least squares through points (n,), n >= 3, without those that are far off, as late ones are."""
-    for _ in range(_REJECTIONS):
-        slope, uncertainty, residual = _fit_line(x, late)
+def fit_robust_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> RobustLine:
+    """Line by least squares through points (n,), n >= 3, repeated without outliers until none is left."""
+    for _ in range(_MAX_REJECTIONS):
+        slope, uncertainty, residual = _fit_line(x, y)
         spread = float(np.median(np.abs(residual))) * _SIGMA_PER_MAD
-        kept = np.abs(residual) <= max(_REJECT_BEYOND * spread, _CLOCK_STEP_S)
+        kept = np.abs(residual) <= max(_REJECT_SIGMAS * spread, _CLOCK_STEP_S)
         if kept.all():
             break
-        x, late = x[kept], late[kept]
+        x, y = x[kept], y[kept]
     scatter = math.sqrt(float(residual @ residual) / len(residual))
-    return RobustLine(float(x.mean()), float(late.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
+    return RobustLine(float(x.mean()), float(y.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
 
 
 def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
@@ -200,14 +205,114 @@ def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, fl
 
 
 def _variance_inflation(residual: NDArray[np.float64]) -> float:
-    """How many neighbours tell as much as one, if each follows the one before (AR(1)).
+    """Variance of the slope relative to independent residuals, for first-order autoregressive ones.
 
-    What delivery in steps explains counts by itself: its beat is stated apart.
+    Residuals within the steps of delivery count as independent: their effect is added separately.
     """
     power = float(residual @ residual)
     if power <= len(residual) * _DELIVERY_STEP_S**2 / 4:
         return 1.0
-    alike = float(residual[1:] @ residual[:-1]) / power
-    alike += (1.0 + 4.0 * alike) / len(residual)  # Kendall: a fitted line hides some of it
-    alike = min(max(alike, 0.0), _ALIKE_MAX)
-    return (1.0 + alike) / (1.0 - alike)
+    correlation = float(residual[1:] @ residual[:-1]) / power
+    correlation += (1.0 + 4.0 * correlation) / len(residual)  # bias after a fit (Kendall 1954)
+    correlation = min(max(correlation, 0.0), _MAX_CORRELATION)
+    return (1.0 + correlation) / (1.0 - correlation)
+
+
+_SKEW_WINDOW_S = 0.25
+"""Lags that change within it average out over a period of the stand; slower changes do not."""
+_MAX_SKEW_WINDOWS = 4 * 3600 * 4
+"""Four hours, the longest run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Skew:
+    """Time between the readings of both gauges, over the rows of a run.
+
+    Attributes
+    ----------
+    mean_s : float
+        Gauge 2 was read so much later than gauge 1 on average (s).
+    standard_uncertainty_s : float
+        For each period of the stand (s): drift of the lag, scatter of arrivals of both devices, and delays
+        by ports that cannot be seen (1 ms each, evenly distributed).
+    """
+
+    mean_s: float
+    standard_uncertainty_s: float
+
+    @property
+    def description(self) -> Message:
+        """Sentence that is stored with the run."""
+        skew_ms, uncertainty_ms = 1e3 * abs(self.mean_s), 1e3 * self.standard_uncertainty_s
+        if self.mean_s >= 0:
+            return message(
+                "gauge 2 was read {skew_ms:.2f} ms later than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
+                " the analysis allows for it",
+                skew_ms=skew_ms,
+                uncertainty_ms=uncertainty_ms,
+            )
+        return message(
+            "gauge 2 was read {skew_ms:.2f} ms earlier than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
+            " the analysis allows for it",
+            skew_ms=skew_ms,
+            uncertainty_ms=uncertainty_ms,
+        )
+
+
+@runtime_checkable
+class HasSkew(Protocol):
+    """A source whose gauges are read one after the other, not by one converter at the same time."""
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """Skew of the samples first_index <= index < end_index; None where there is none."""
+
+
+class SkewStatistics:
+    """Lags of rows, averaged over windows of 0.25 s; the latest 4 hours are kept.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Rows a second.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rows = max(1, round(_SKEW_WINDOW_S * rate_hz))
+        self._windows: deque[_Window] = deque(maxlen=_MAX_SKEW_WINDOWS)
+
+    def add(self, first_index: int, lag_s: NDArray[np.float64], scatter_s: float) -> None:
+        """Add the lags of consecutive rows (n,), NaN where a reading is missing.
+
+        `scatter_s` is the scatter of the arrivals of both devices (s).
+        """
+        numbers = (first_index + np.arange(len(lag_s))) // self._rows
+        is_known = np.isfinite(lag_s)
+        for number in np.unique(numbers[is_known]).tolist():
+            inside = lag_s[is_known & (numbers == number)]
+            if not self._windows or self._windows[-1].number != number:
+                self._windows.append(_Window(number))
+            window = self._windows[-1]
+            window.sum_s += float(inside.sum())
+            window.rows += len(inside)
+            window.scatter_s = max(window.scatter_s, scatter_s)
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """Skew of rows first_index <= row < end_index, to a window; None where none has both readings."""
+        first, last = first_index // self._rows, (end_index - 1) // self._rows
+        windows = [window for window in self._windows if first <= window.number <= last]
+        if not windows:
+            return None
+        weights = np.array([window.rows for window in windows], dtype=np.float64)
+        means_s = np.array([window.sum_s for window in windows]) / weights
+        mean_s = float(np.average(means_s, weights=weights))
+        drift_s = math.sqrt(float(np.average((means_s - mean_s) ** 2, weights=weights)))
+        scatter_s = float(np.average([window.scatter_s for window in windows], weights=weights))
+        return Skew(mean_s, math.hypot(drift_s, scatter_s, DELIVERY_UNCERTAINTY_S))
+
+
+@dataclass(slots=True)
+class _Window:
+    number: int
+    sum_s: float = 0.0
+    rows: int = 0
+    scatter_s: float = 0.0

@@ -1,4 +1,4 @@
-"""How the inner loops of the decoders are compiled."""
+"""Compilation of the inner loops of decoders."""
 
 from collections.abc import Callable
 from typing import TypeVar, cast
@@ -11,15 +11,15 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 def compiled(function: _Function) -> _Function:
     """Compile a loop that Python calls: cached on disk, without the interpreter lock.
 
-    Reference counting inside compiled code is switched off (`_nrt`), since counting at each call
-    of a small helper halves the speed of a decoder. So such a function fills arrays that it is
-    given and makes none. Division follows numpy: no exception is raised in the loops.
+    Reference counting inside compiled code is off (`_nrt`), because counting at each call of a small helper
+    halves the speed of a decoder. So such a function must not make arrays; it fills those that it is given.
+    Division follows numpy and raises no exception.
     """
     return _compile(function, inline=False)
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a part of such a loop, copied to where it is used."""
+    """Compile a part of such a loop, inlined where it is called."""
     return _compile(function, inline=True)
 
 

@@ -1,4 +1,4 @@
-"""CRC-16/CCITT-FALSE: of a few bytes at once, and of stretches of a buffer in compiled code."""
+"""CRC-16/CCITT-FALSE, for a few bytes and for slices of a buffer in compiled code."""
 
 import binascii
 
@@ -25,7 +25,7 @@ def crc16(data: bytes) -> int:
 
 
 def _tables() -> NDArray[np.uint16]:
-    """(8, 256) remainders: row k is that of a byte with k zero bytes after it (slicing by 8)."""
+    """(8, 256) remainders: row k is that of a byte followed by k zero bytes (slicing by 8)."""
     rows = np.zeros((_SLICES, 256), dtype=np.uint16)
     for byte in range(256):
         remainder = byte << 8

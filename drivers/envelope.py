@@ -1,7 +1,7 @@
-"""Reads stamped by the host: envelopes around bytes that do not tell themselves when they came, or whence.
+"""Envelopes: received bytes with the host's arrival time and the number of the port.
 
-A polled device's answers, and two ports read as one, are wrapped before anything stores or decodes them.
-So what a run keeps as the received bytes holds all that its decoder needs to make the same samples again.
+Answers of a polled device, and reads of two ports, are wrapped before they are stored or decoded. So the
+stored bytes of a run hold all that its decoder needs to make the same samples again.
 """
 
 import struct
@@ -24,16 +24,16 @@ _MAX_PORT = 0xFF
 
 @dataclass(frozen=True, slots=True)
 class StampedRead:
-    """What one read of one port brought.
+    """One read of one port.
 
     Attributes
     ----------
     port : int
-        Which port, from 0.
+        Number of the port, from 0.
     arrival_ns : int
         Host's monotonic time (ns, `drivers.host_time.host_ns`) after the read.
     data : bytes
-        As they came; none at all says that the link of this port was broken here.
+        As received; b"" says that the connection of this port broke here.
     """
 
     port: int
@@ -42,7 +42,7 @@ class StampedRead:
 
 
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
-    """Envelope of a read, or several one after the other where it is longer than 65,535 bytes.
+    """Envelope of a read; several of them where it is longer than 65,535 bytes.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
     arrival_ns : int
         Host's monotonic time (ns) after the read.
     data : bytes
-        b"" for a broken link.
+        b"" for a broken connection.
 
     Raises
     ------
     ValueError
-        If there is no such port.
+        If the number of the port is out of range.
     """
     if not 0 <= port <= _MAX_PORT:
         raise ValueError(f"port {port} has no place in an envelope: give 0 to {_MAX_PORT}")
@@ -70,26 +70,26 @@ def _envelope(port: int, arrival_ns: int, data: bytes) -> bytes:
 
 
 class Unwrapper:
-    """Takes envelopes apart again, wherever the bytes are cut; what fits no envelope is left out and counted.
+    """Decodes envelopes from bytes in any cut; bytes outside an envelope are discarded and counted.
 
-    After a candidate that turns out to be none it goes on one byte further, so that neither rubbish nor a
-    cut envelope takes a whole one with it. Of a candidate it believes the length only if the header's own
-    checksum agrees; at most one envelope, 64 KiB, is kept unfinished.
+    After a bad candidate it goes on one byte further, so that neither garbage nor a cut envelope hides a
+    whole one. The length is used only if the checksum of the header is right. At most one envelope, 64 KiB,
+    is kept unfinished.
     """
 
     def __init__(self) -> None:
         self.discarded_bytes = 0
-        """Bytes that belonged to no whole envelope."""
-        self._rest = b""
+        """Bytes outside whole envelopes."""
+        self._unfinished = b""
 
     @property
     def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, fewer than an envelope of the largest size has."""
-        return len(self._rest)
+        """Bytes kept for the next call, fewer than the longest envelope."""
+        return len(self._unfinished)
 
     def feed(self, data: bytes) -> Iterator[StampedRead]:
-        """Reads that `data` completes; exhaust it."""
-        data = self._rest + data
+        """Reads that `data` completes. Exhaust it."""
+        data = self._unfinished + data
         at = 0
         while True:
             start = _candidate(data, at)
@@ -99,18 +99,18 @@ class Unwrapper:
             end = body if header is None else body + header.length
             if end > len(data):
                 break
-            held = data[body:end]
-            if header is None or zlib.crc32(held) != header.data_check:
+            content = data[body:end]
+            if header is None or zlib.crc32(content) != header.data_check:
                 self.discarded_bytes += 1
                 at += 1
             else:
-                yield StampedRead(header.port, header.arrival_ns, held)
+                yield StampedRead(header.port, header.arrival_ns, content)
                 at = end
-        self._rest = data[at:]
+        self._unfinished = data[at:]
 
 
 def _candidate(data: bytes, at: int) -> int:
-    """Place from `at` on of the magic, or of its beginning where the data end in it; else their end."""
+    """Position of the magic from `at` on, or of its beginning at the end of the data; else their end."""
     found = data.find(MAGIC, at)
     if found >= 0:
         return found
@@ -126,7 +126,7 @@ class _Header(NamedTuple):
 
 
 def _header(data: bytes, start: int) -> _Header | None:
-    """What the fields say that begin with the magic; None where the header's own checksum disagrees."""
+    """Fields of the header; None where its checksum is wrong."""
     fields = data[start : start + _FIELDS.size]
     if _CHECK.unpack_from(data, start + _FIELDS.size) != (crc16(fields),):
         return None

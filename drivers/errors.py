@@ -1,7 +1,9 @@
-"""Everything that can go wrong between the plug and the sample block."""
+"""Errors of drivers: what can go wrong between the port and the sample block."""
+
+from messages.message import MessageError
 
 
-class DriverError(Exception):
+class DriverError(MessageError):
     """Root of all driver errors. The message names the value, the fault and the remedy."""
 
 
@@ -10,16 +12,20 @@ class PortUnavailableError(DriverError):
 
 
 class DeviceLostError(DriverError):
-    """The port was there and is gone: unplugged, or the other end closed."""
+    """The port was open and is gone: unplugged, or closed by the other end."""
 
 
 class NoDataError(DriverError):
-    """The port is open but no good frame came; says what came instead."""
+    """The port is open and no good frame arrived. The message says what arrived instead."""
 
 
 class ProtocolError(DriverError):
-    """The device answered, but not what its protocol allows."""
+    """The device answered in a way that its protocol does not allow."""
 
 
 class SettingsError(DriverError, ValueError):
-    """A device setting that its driver does not know or cannot use."""
+    """A device setting that the driver does not know or cannot use."""
+
+
+class QueueFullError(DriverError):
+    """The receiver of reads cannot take more. The reader ends, because it may not skip bytes."""

@@ -1,12 +1,14 @@
-"""Clocks of this computer: the one that stamps what arrives, and what can go wrong with them."""
+"""Clocks of this computer: the one that stamps arrivals, and what can disturb it."""
 
 import sys
 import time
 
+from messages.message import Message, message
+
 if sys.platform == "win32":
 
     def _clocks() -> tuple[int, int]:
-        now_ns = time.perf_counter_ns()  # `monotonic` is as coarse as 16 ms before Python 3.13
+        now_ns = time.perf_counter_ns()  # `monotonic` has steps of up to 16 ms before Python 3.13
         return now_ns, now_ns
 
 elif sys.platform == "darwin":
@@ -21,75 +23,97 @@ else:
 
 
 def host_ns() -> int:
-    """Nanoseconds that never leap, and go on while this computer sleeps: what stamps arrivals."""
+    """Monotonic time (ns) that stamps arrivals; it goes on while this computer is suspended."""
     return _clocks()[0]
 
 
 def suspended_ns() -> int:
-    """Nanoseconds of `host_ns` during which this computer slept; always 0 where it does not tell."""
+    """How long of `host_ns` this computer was suspended (ns); 0 where the system does not tell."""
     host, awake = _clocks()
     return host - awake
 
 
 class ActiveTimer:
-    """Time in which somebody could listen: while this computer stands still nobody does.
+    """Time during which this process was running; time in which it stood still is left out.
 
     Parameters
     ----------
-    stood_s : float
-        Who asks again only after so long stood still (s).
+    longest_step_s : float
+        A longer time between two calls means that the process stood still (s).
     """
 
     def __init__(self, longest_step_s: float) -> None:
-        self._stood_ns = longest_step_s * 1e9
+        self._longest_step_ns = longest_step_s * 1e9
         self.restart()
 
     def restart(self) -> None:
         """Count from now on."""
-        self._asked_ns, self._passed_ns = host_ns(), 0
+        self._called_ns, self._elapsed_ns = host_ns(), 0
 
     def elapsed_s(self) -> float:
-        """Seconds since it began, but for those in which nobody listened; ask often."""
-        before_ns, self._asked_ns = self._asked_ns, host_ns()
-        since_ns = self._asked_ns - before_ns
-        if since_ns <= self._stood_ns:
-            self._passed_ns += since_ns
-        return self._passed_ns * 1e-9
+        """Seconds since the start, time in which the process stood still left out; to be called often."""
+        before_ns, self._called_ns = self._called_ns, host_ns()
+        step_ns = self._called_ns - before_ns
+        if step_ns <= self._longest_step_ns:
+            self._elapsed_ns += step_ns
+        return self._elapsed_ns * 1e-9
 
 
 class HostMonitor:
-    """Notices when this computer slept, stood still, or had its clock set; `look` often, it costs little."""
+    """Detects that this computer was suspended, stood still, or had its clock set; to be checked often."""
 
-    _EVERY_NS = 100_000_000
+    _INTERVAL_NS = 100_000_000
 
-    _SLEPT_S = 0.5
-    _STOOD_S = 3.0
-    _LEAP_S = 0.5
+    _SUSPENDED_S = 0.5
+    _STALLED_S = 3.0
+    """Longer than a busy computer stops any process, shorter than a stall that loses bytes unseen."""
+    _CLOCK_STEP_S = 0.5
+    """More than a time server slews in 0.1 s."""
 
     def __init__(self) -> None:
-        self._host_ns = host_ns()
-        self._asleep_ns = suspended_ns()
-        self._wall_ns = time.time_ns()
+        self._times_ns = self._read_clocks()
 
-    def check(self) -> list[str]:
-        """What has happened since it was last told, in sentences; looked at ten times a second at most."""
-        if host_ns() - self._host_ns < self._EVERY_NS:
+    def check(self) -> list[Message]:
+        """What happened since the last call; the clocks are read ten times a second at most."""
+        if host_ns() - self._times_ns[0] < self._INTERVAL_NS:
             return []
-        before_ns = (self._host_ns, self._asleep_ns, self._wall_ns)
-        self._host_ns, self._asleep_ns, self._wall_ns = host_ns(), suspended_ns(), time.time_ns()
-        passed_s, slept_s, wall_s = (
-            (now - before) * 1e-9
-            for now, before in zip((self._host_ns, self._asleep_ns, self._wall_ns), before_ns, strict=True)
+        before_ns, self._times_ns = self._times_ns, self._read_clocks()
+        passed_s, suspended_s, wall_s = (
+            (now - before) * 1e-9 for now, before in zip(self._times_ns, before_ns, strict=True)
         )
-        notes = []
-        if slept_s > self._SLEPT_S:
-            notes.append(f"this computer slept for {slept_s:.1f} s: switch its energy saving off to record")
-        elif passed_s > self._STOOD_S:
-            notes.append(f"this computer or Slipstand stood still for {passed_s:.1f} s: close other programs")
-        if abs(wall_s - passed_s) > self._LEAP_S:
-            way = "forward" if wall_s > passed_s else "back"
-            notes.append(
-                f"the clock of this computer was set {way} by {abs(wall_s - passed_s):.1f} s:"
-                " times of day before and after do not fit together, those within a run do"
+        found = []
+        if suspended_s > self._SUSPENDED_S:
+            found.append(
+                message(
+                    "this computer slept for {duration_s:.1f} s: switch its energy saving off to record",
+                    duration_s=suspended_s,
+                )
             )
-        return notes
+        elif passed_s > self._STALLED_S:
+            found.append(
+                message(
+                    "this computer or Slipstand stood still for {duration_s:.1f} s: close other programs",
+                    duration_s=passed_s,
+                )
+            )
+        if abs(wall_s - passed_s) > self._CLOCK_STEP_S:
+            found.append(_clock_step(wall_s - passed_s))
+        return found
+
+    @staticmethod
+    def _read_clocks() -> tuple[int, int, int]:
+        return host_ns(), suspended_ns(), time.time_ns()
+
+
+def _clock_step(step_s: float) -> Message:
+    if step_s > 0:
+        return message(
+            "the clock of this computer was set forward by {step_s:.1f} s:"
+            " times of day before and after do not fit together, those within a run do",
+            step_s=step_s,
+        )
+    return message(
+        "the clock of this computer was set back by {step_s:.1f} s:"
+        " times of day before and after do not fit together, those within a run do",
+        step_s=-step_s,
+    )

@@ -1,4 +1,4 @@
-"""Compiled loop that says, of readings that carry a time or a number each, what was lost before them.
+"""Compiled loop that counts what was lost before each reading, from the reading's time or sequence number.
 
 A reading is called a line here, whatever its bytes look like: a record with the fields start, end, good,
 time, sequence, table and relative.
@@ -14,15 +14,15 @@ from drivers.packets import LOSS_FIELDS, MAX_GAP_S, Record, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
-"""What tells the place of a line: its sequence, else its time, else that it came."""
+"""What tells the place of a line among the others: its sequence, its time, or only its arrival."""
 
-STREAM = np.dtype(
+STATE = np.dtype(
     [
         *LOSS_FIELDS,
         ("started", np.int64),
-        ("restarting", np.int64),  # the link was broken, and the device may have begun anew
+        ("restarting", np.int64),  # the connection broke, and the device may have restarted
         ("period_s", np.float64),  # nominal, between lines
-        ("restart_rows", np.int64),  # rows that stand for the time until it, by the host's clock
+        ("restart_rows", np.int64),  # rows for the time of a restart, by the host's clock
         ("broken", np.int64),  # lines since the last good one
         ("last_sequence", np.float64),
         ("last_time", np.float64),
@@ -30,7 +30,7 @@ STREAM = np.dtype(
     ],
     align=True,
 )
-"""What the decoder remembers between calls."""
+"""What the decoder keeps between calls."""
 
 RULES = np.dtype(
     [
@@ -45,7 +45,7 @@ RULES = np.dtype(
     ],
     align=True,
 )
-"""What stays the same through a stream."""
+"""What does not change during a stream."""
 
 _NEW_START = -1
 _CORRUPT = -2
@@ -83,15 +83,14 @@ def count_lines(
     hold_from: int,
     state: NDArray[np.void],
     rules: NDArray[np.void],
-    units: NDArray[np.void],
+    packets: NDArray[np.void],
     counts: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Units (lines,) and counts (lines, 2) of good lines; returns how many, and how many lines are done.
+    """Fill packets (lines,) and counts (lines, 2) of good lines; returns numbers of good and used lines.
 
-    A line whose place is not the next one is believed only if the line after it agrees, since a
-    digit that was damaged in a time or sequence would otherwise invent a gap. With none after it
-    yet, such a line waits if it starts at `hold_from` or later: it comes again with the next call.
-    `memory` (1,) is brought up to date.
+    A line out of sequence is believed only if the next line confirms it, because a damaged digit in a time
+    or sequence would otherwise invent a gap. Where the next line has not come yet, and the line starts at
+    `hold_from` or later, it waits: the caller passes it again with the next data. `state` (1,) is updated.
     """
     stream = state[0]
     rule = rules[0]
@@ -110,7 +109,7 @@ def count_lines(
         if step == _CORRUPT or step == 0:
             _discard(stream, line, step)
             continue
-        _fill_packet(stream, rule, line, step, units[found])
+        _fill_packet(stream, rule, line, step, packets[found])
         counts[found, 0] = line.table
         counts[found, 1] = line.relative
         found += 1
@@ -119,7 +118,7 @@ def count_lines(
 
 @inlined
 def _step(stream: Record, rule: Record, line: Record) -> int:
-    """Rows from the last good line to this one; 0: the same again."""
+    """Rows from the last good line to this one; 0 where it is the same line again."""
     if not stream.started:
         return 1
     if rule.place == BY_COUNT:
@@ -137,7 +136,7 @@ def _sequence_step(stream: Record, rule: Record, line: Record) -> int:
 
 @inlined
 def _time_step(stream: Record, rule: Record, line: Record) -> int:
-    """As the time says: a line that is late by half a period and more than the clock's step."""
+    """Rows by time; a line that is late by less than half a period or the clock's step is on time."""
     elapsed_s = _advance(line.time - stream.last_time, rule.time_wrap) * rule.unit_s
     periods = elapsed_s / rule.period_s
     if not 0 <= periods <= rule.max_gap + 1:
@@ -149,7 +148,7 @@ def _time_step(stream: Record, rule: Record, line: Record) -> int:
 
 @inlined
 def _advance(difference: float, wrap: float) -> float:
-    """Difference of two counts of a counter that wraps, within half its range."""
+    """Difference of two readings of a counter that wraps, within half its range."""
     if wrap == 0:
         return difference
     forward = difference - wrap * np.floor(difference / wrap)
@@ -158,7 +157,7 @@ def _advance(difference: float, wrap: float) -> float:
 
 @inlined
 def _confirmed_step(stream: Record, rule: Record, line: Record, step: int, after: Record) -> int:
-    """`step` of `line` as the good line `after` it bears it out."""
+    """`step` of `line`, corrected by the good line `after` it."""
     to_after = _step(stream, rule, after)
     if to_after < 1 or to_after > step > 0:
         return step
@@ -166,7 +165,7 @@ def _confirmed_step(stream: Record, rule: Record, line: Record, step: int, after
         return _CORRUPT
     if _advance(after.time - line.time, rule.time_wrap) < 0:
         return _CORRUPT
-    return max(1, to_after - 1)  # it was only late
+    return max(1, to_after - 1)  # the line was only late
 
 
 @inlined
@@ -179,41 +178,41 @@ def _discard(stream: Record, line: Record, step: int) -> None:
 
 
 @inlined
-def _fill_packet(stream: Record, rule: Record, line: Record, step: int, unit: Record) -> None:
-    """Write the unit of a good line and remember it."""
+def _fill_packet(stream: Record, rule: Record, line: Record, step: int, packet: Record) -> None:
+    """Write the packet of a good line and update the state."""
     new_start = step == _NEW_START
     gap = int(stream.restart_rows) if new_start else step - 1
-    unit.damaged = min(gap, stream.broken)
-    unit.missing = gap - unit.damaged
-    unit.samples = 1
-    unit.status = 0
+    packet.damaged = min(gap, stream.broken)
+    packet.missing = gap - packet.damaged
+    packet.samples = 1
+    packet.status = 0
     if abs(line.table) >= rule.overload_count:
-        unit.status |= _TABLE
+        packet.status |= _TABLE
     if abs(line.relative) >= rule.overload_count:
-        unit.status |= _RELATIVE
+        packet.status |= _RELATIVE
     if new_start:
         stream.row_time_s += (gap + 1) * rule.period_s
     elif stream.started:
         stream.row_time_s += _advance(line.time - stream.last_time, rule.time_wrap) * rule.unit_s
-    unit.time_s = stream.row_time_s
-    _count(stream, unit, new_start or rule.place != BY_SEQUENCE, new_start)
+    packet.time_s = stream.row_time_s
+    _count(stream, packet, new_start or rule.place != BY_SEQUENCE, new_start)
     stream.last_time = line.time
     stream.last_sequence = line.sequence
 
 
 @inlined
-def _count(stream: Record, unit: Record, estimated: bool, new_start: bool) -> None:
-    stream.samples += 1 + unit.damaged + unit.missing
-    stream.damaged += unit.damaged
+def _count(stream: Record, packet: Record, estimated: bool, new_start: bool) -> None:
+    stream.samples += 1 + packet.damaged + packet.missing
+    stream.damaged += packet.damaged
     if estimated:
-        stream.missing_estimated += unit.missing
+        stream.missing_estimated += packet.missing
     else:
-        stream.missing += unit.missing
-    if unit.status:
+        stream.missing += packet.missing
+    if packet.status:
         stream.overloaded += 1
     if new_start:
         stream.restarts += 1
-        stream.restart_rows = 0  # the time of a second one in the same read is not known apart
+        stream.restart_rows = 0  # two restarts in one read share their time
     stream.started = 1
     stream.restarting = 0
     stream.broken = 0

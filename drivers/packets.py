@@ -1,7 +1,7 @@
-"""From units (frames or lines) and the gaps before them to rows without a hole.
+"""From packets and the gaps before them to sample blocks without a hole.
 
-Every decoder reduces its bytes to units: a run of good samples, and how many samples were lost
-before it. What a unit becomes in a `SampleBlock` is the same for all devices and stands here.
+A packet is a run of good samples (a frame or a line) and the number of samples lost before it. Every decoder
+reduces its bytes to packets; how packets become rows is the same for all devices.
 """
 
 from abc import ABC, abstractmethod
@@ -16,16 +16,16 @@ from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
 MAX_BLOCK_ROWS = 65536
-"""A long gap becomes several blocks, so that no single one is large."""
+"""A long gap becomes several blocks, so that no block is large."""
 
 MAX_GAP_S = 600.0
-"""A longer gap is not believed: the device began anew."""
+"""Longest gap that is believed. A sequence or time that leaps further is a new start of the device."""
 
 PACKET = np.dtype(
     [
-        ("damaged", np.int64),  # rows before the unit that came broken
-        ("missing", np.int64),  # rows before the unit that never came, proven or estimated
-        ("time_s", np.float64),  # device time of the unit's first sample
+        ("damaged", np.int64),  # rows before the packet that came broken
+        ("missing", np.int64),  # rows before the packet that never came, proven or estimated
+        ("time_s", np.float64),  # device time of the packet's first sample
         ("samples", np.int32),
         ("status", np.int32),
     ],
@@ -34,25 +34,26 @@ PACKET = np.dtype(
 
 CURSOR = np.dtype(
     [
-        ("unit", np.int64),
-        ("lost", np.int64),  # rows of its gap that are laid out
-        ("sample", np.int64),  # first sample of the unit
+        ("packet", np.int64),
+        ("lost", np.int64),  # rows of its gap that are filled
+        ("sample", np.int64),  # first sample of the packet
         ("time_s", np.float64),  # of the row before
     ],
     align=True,
 )
-"""How far the units are laid out."""
+"""Progress of `fill_rows`."""
 
-LOSS_FIELDS = [(account.name, np.int64) for account in fields(Losses)]
-"""Members that a decoder's memory shares with `Losses`."""
+LOSS_FIELDS = [(field.name, np.int64) for field in fields(Losses)]
+"""Members that a decoder's state shares with `Losses`."""
 
 Record: TypeAlias = Any
 """One element of a structured array inside compiled code, its fields as attributes."""
 
 _SLACK_S = 1.0
 _SLACK = 0.02
-"""A busy computer takes bytes so late, and a device's clock is wrong by so much at most. A device that
-counts anew is further off unless it was unplugged within its first second."""
+"""How far a device's count may be from the host's estimate of a gap: a busy computer reads bytes late by up
+to a second, and the clocks of devices are wrong by up to 2 %. A device that restarted is further off,
+unless it was unplugged within its first second."""
 
 _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)
@@ -64,22 +65,22 @@ class Packets:
 
     Attributes
     ----------
-    units : (u,) UNIT
-        Good units in order of arrival.
+    packets : (p,) PACKET
+        In order of arrival.
     counts : (s, 2) int32 or float64
-        Samples of all units, one after the other.
+        Samples of all packets, one after the other.
     first_index : int
-        Row of the first lost or good sample of the first unit.
+        Row of the first lost or good sample of the first packet.
     rows : int
         Good and lost samples together.
     last_time_s : float
         Device time of the row before `first_index`.
     period_s : float
-        Nominal time between the samples of a unit.
-    timed : bool
+        Nominal time between the samples of a packet.
+    has_time : bool
         Whether the device sends its time.
     arrival_ns : int
-        Host's time of the read that completed the units.
+        Host's time of the read that completed the packets.
     """
 
     packets: NDArray[np.void]
@@ -88,18 +89,102 @@ class Packets:
     rows: int
     last_time_s: float
     period_s: float
-    timed: bool
+    has_time: bool
     arrival_ns: int
 
 
-def losses_from_state(memory: NDArray[np.void]) -> Losses:
-    """The account that a decoder's memory (1,) holds in its `LOSS_FIELDS`."""
-    stream = memory[0]
-    return Losses(**{name: int(stream[name]) for name, _ in LOSS_FIELDS})
+class PacketDecoder(ABC):
+    """A `drivers.stream.Decoder` for devices that send by themselves; a device adds `_find_packets`.
+
+    Parameters
+    ----------
+    state : (1,) structured
+        What the compiled loops keep between calls, with the fields `LOSS_FIELDS` and `restarting`.
+    rate_hz : float
+        Nominal rate, > 0.
+    max_gap_s : float
+        Longest gap that rows stand for.
+    """
+
+    _piece_bytes = 1 << 16
+    """Long data are decoded in pieces that fit a processor's cache."""
+
+    def __init__(self, state: NDArray[np.void], rate_hz: float, max_gap_s: float) -> None:
+        self._state = state
+        self._rate_hz = rate_hz
+        self._max_gap = round(max_gap_s * rate_hz)
+        self._unfinished = b""
+        self._arrival_ns: int | None = None
+        """Of the last good packet."""
+
+    @property
+    def losses(self) -> Losses:
+        """Counts until now."""
+        state = self._state[0]
+        return Losses(**{name: int(state[name]) for name, _ in LOSS_FIELDS})
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes kept for the next call; a frame of most devices, 3 kB at most."""
+        return len(self._unfinished)
+
+    def expect_restart(self) -> None:
+        """The connection broke: the device goes on if the host's clock agrees with it, else it restarted."""
+        self._state["restarting"] = self._arrival_ns is not None
+        self._state["discarded_bytes"] += len(self._unfinished)
+        self._unfinished = b""
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Blocks that `data` completes; unfinished bytes are kept. Exhaust it."""
+        for start in range(0, len(data), self._piece_bytes):
+            piece = self._unfinished + data[start : start + self._piece_bytes]
+            found = self._find_packets(piece, arrival_ns)
+            if found is not None:
+                self._arrival_ns = arrival_ns
+                yield from sample_blocks(found)
+
+    @abstractmethod
+    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+        """Packets in `data`, which begin with the unfinished bytes; keeps the new ones."""
+
+    def _packets(
+        self,
+        packets: NDArray[np.void],
+        counts: NDArray[np.int32] | NDArray[np.float64],
+        before: tuple[int, float],
+        arrival_ns: int,
+        *,
+        has_time: bool = True,
+    ) -> Packets | None:
+        """Packets found in one call; `before` are index and device time before them. None without any."""
+        if not len(packets):
+            return None
+        first_index, last_time_s = before
+        return Packets(
+            packets,
+            counts,
+            first_index,
+            rows=int(self._state["samples"][0]) - first_index,
+            last_time_s=last_time_s,
+            period_s=1 / self._rate_hz,
+            has_time=has_time,
+            arrival_ns=arrival_ns,
+        )
+
+    def _position(self) -> tuple[int, float]:
+        """Index of the next row, and device time of the last one."""
+        return int(self._state["samples"][0]), float(self._state["row_time_s"][0])
+
+    def _rows_since(self, arrival_ns: int, samples: int) -> int:
+        """Rows for which there was time since the last good packet, less `samples` that came."""
+        if self._arrival_ns is None:
+            return 0
+        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
+        return min(max(elapsed - samples, 0), self._max_gap)
 
 
 def sample_blocks(found: Packets) -> Iterator[SampleBlock]:
-    """Rows of `found`, absent ones included, in blocks of at most `MAX_BLOCK_ROWS`."""
+    """Rows of `found`, lost ones included, in blocks of at most `MAX_BLOCK_ROWS`."""
     cursor = np.zeros(1, dtype=CURSOR)
     cursor["time_s"] = found.last_time_s
     done = 0
@@ -114,24 +199,24 @@ def sample_blocks(found: Packets) -> Iterator[SampleBlock]:
             counts=counts[:rows],
             status=status[:rows],
             arrival_ns=found.arrival_ns,
-            device_time_s=times_s[:rows] if found.timed else None,
+            device_time_s=times_s[:rows] if found.has_time else None,
         )
         done += rows
 
 
 @inlined
-def is_plausible_gap(stream: Record, gap: int) -> bool:
-    """Whether the host's clock has room for the `gap` that a device tells after the link was broken.
+def is_plausible_gap(state: Record, gap: int) -> bool:
+    """Whether the host's clock agrees with the `gap` that a device tells after the connection broke.
 
-    A device that lost its power counts anew, and its numbers are as good as random then.
+    A device that lost its power starts counting anew, and its numbers are arbitrary then.
     """
-    slack = _SLACK_S / stream.period_s + _SLACK * stream.restart_rows
-    return bool(abs(gap - stream.restart_rows) <= slack)
+    slack = _SLACK_S / state.period_s + _SLACK * state.restart_rows
+    return bool(abs(gap - state.restart_rows) <= slack)
 
 
 @compiled
 def fill_rows(
-    units: NDArray[np.void],
+    packets: NDArray[np.void],
     samples: NDArray[np.int32] | NDArray[np.float64],
     period_s: float,
     cursor: NDArray[np.void],
@@ -139,104 +224,101 @@ def fill_rows(
     status: NDArray[np.uint8],
     times_s: NDArray[np.float64],
 ) -> int:
-    """Fill one block (counts, status, times) from `cursor` on; returns how many rows it took."""
+    """Fill one block (counts, status, times) from `cursor` on; returns the number of rows."""
     place = cursor[0]
     row = 0
-    while place.unit < len(units):
-        unit = units[place.unit]
-        row = _fill_gap(unit, place, row, counts, status, times_s)
-        if place.lost < unit.damaged + unit.missing or row + unit.samples > len(status):
+    while place.packet < len(packets):
+        packet = packets[place.packet]
+        row = _fill_gap(packet, place, row, counts, status, times_s)
+        if place.lost < packet.damaged + packet.missing or row + packet.samples > len(status):
             break
-        for k in range(unit.samples):
+        for k in range(packet.samples):
             counts[row, 0] = samples[place.sample, 0]
             counts[row, 1] = samples[place.sample, 1]
-            status[row] = unit.status
-            times_s[row] = unit.time_s + k * period_s
+            status[row] = packet.status
+            times_s[row] = packet.time_s + k * period_s
             place.sample += 1
             row += 1
         place.time_s = times_s[row - 1]
         place.lost = 0
-        place.unit += 1
+        place.packet += 1
     return row
 
 
 @inlined
 def _fill_gap(
-    unit: Record,
+    packet: Record,
     place: Record,
     row: int,
     counts: NDArray[np.int32] | NDArray[np.float64],
     status: NDArray[np.uint8],
     times_s: NDArray[np.float64],
 ) -> int:
-    """Rows before a unit, as far as the block has room; their times lie evenly between the neighbours'."""
-    left = unit.damaged + unit.missing - place.lost
-    step_s = (unit.time_s - place.time_s) / (left + 1)
+    """Rows lost before a packet, as far as the block has room; their times are interpolated."""
+    left = packet.damaged + packet.missing - place.lost
+    step_s = (packet.time_s - place.time_s) / (left + 1)
     for _ in range(min(left, len(status) - row)):
         place.time_s += step_s
         counts[row, 0] = counts[row, 1] = 0
-        status[row] = _DAMAGED if place.lost < unit.damaged else _MISSING
+        status[row] = _DAMAGED if place.lost < packet.damaged else _MISSING
         times_s[row] = place.time_s
         place.lost += 1
         row += 1
     return row
 
 
-class PacketDecoder(ABC):
-    """A `drivers.stream.Decoder` to which a device adds how its units are read (`_read`).
+_WINDOW_NS = 1_000_000_000
+_JITTER_S = 0.1
+"""A count that lags behind the host's clock by less proves no loss: reads are late by up to so much."""
+_RECOVERED_FACTOR = 1.5
+"""Nor does a lag below so many times the longest one that was made up before: this computer is that busy."""
+_CLOCK_ERROR = 5e-4
+"""Nor does one that a wrong clock of the device, or a rate that it rounded, explains."""
+
+
+class LossEstimator:
+    """Estimates lost samples from the host's clock, where nothing in the stream proves them.
+
+    A busy computer reads samples late and makes up for it; lost samples stay lost. So the lag is the least of
+    the last one to two seconds, minus the least of the whole stream.
 
     Parameters
     ----------
-    memory : (1,) structured
-        What the device's loops remember, with the fields `LOSS_FIELDS` and `restarting`.
     rate_hz : float
         Nominal rate, > 0.
-    max_gap_s : float
-        Longest time that rows stand for.
     """
 
-    _piece_bytes = 1 << 16
-    """Long stretches are decoded in pieces that fit a processor's cache."""
-
-    def __init__(self, state: NDArray[np.void], rate_hz: float, max_gap_s: float) -> None:
-        self._state = state
+    def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._max_gap = round(max_gap_s * rate_hz)
-        self._unfinished = b""
-        self._arrival_ns: int | None = None
-        """When the last good unit came."""
+        self._first: tuple[int, int] | None = None
+        self._window = 0
+        self._elapsed_s = 0.0
+        self._least = self._before = self._now = 0.0
+        self._worst = self._recovered = 0.0
 
     @property
-    def losses(self) -> Losses:
-        """The account until now."""
-        return losses_from_state(self._state)
+    def lost(self) -> int:
+        """Samples that should have come and did not."""
+        jitter = max(_JITTER_S * self._rate_hz, _RECOVERED_FACTOR * self._recovered)
+        unproven = jitter + _CLOCK_ERROR * self._elapsed_s * self._rate_hz
+        return int(self._lag) if self._lag > max(1.0, unproven) else 0
 
     @property
-    def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, at most 3 kB and of most devices a frame."""
-        return len(self._unfinished)
+    def _lag(self) -> float:
+        return min(self._before, self._now) - self._least
 
-    def expect_restart(self) -> None:
-        """The link was broken: the device goes on if the host's clock bears it out, else it began anew."""
-        self._state["restarting"] = self._arrival_ns is not None
-        self._state["discarded_bytes"] += len(self._unfinished)
-        self._unfinished = b""
-
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; what is unfinished is kept. Exhaust it."""
-        for start in range(0, len(data), self._piece_bytes):
-            found = self._read(self._unfinished + data[start : start + self._piece_bytes], arrival_ns)
-            if found is not None:
-                self._arrival_ns = arrival_ns
-                yield from sample_blocks(found)
-
-    @abstractmethod
-    def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
-        """Units in `data`, which begins with the rest of before; keeps the new rest."""
-
-    def _rows_since(self, arrival_ns: int, samples: int) -> int:
-        """Rows that the host's clock has room for since the last good unit, less those that came."""
-        if self._arrival_ns is None:
-            return 0
-        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
-        return min(max(elapsed - samples, 0), self._max_gap)
+    def add(self, samples: int, arrival_ns: int) -> None:
+        """Add a read: samples until then, lost rows included, and its arrival (ns)."""
+        if self._first is None:
+            self._first = (samples, arrival_ns)
+        passed_ns = arrival_ns - self._first[1]
+        self._elapsed_s = passed_ns * 1e-9
+        lag = self._elapsed_s * self._rate_hz - (samples - self._first[0])
+        self._least = min(self._least, lag)
+        if passed_ns // _WINDOW_NS == self._window:
+            self._now = min(self._now, lag)
+        else:
+            self._window = passed_ns // _WINDOW_NS
+            self._before, self._now = self._now, lag
+            self._worst = max(self._worst, self._lag)
+            self._recovered = max(self._recovered, self._worst - self._lag)

@@ -1,14 +1,14 @@
-"""The serial port: opened, read by a thread of its own, and listed. The only user of pyserial."""
+"""Serial ports: opened, read, listed, and which programs use them. The only user of pyserial."""
 
 import contextlib
 import errno
+import logging
 import os
 import select
 import sys
-import threading
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -16,24 +16,39 @@ import serial
 from serial.tools import list_ports as serial_list_ports
 
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
-from drivers.host_time import host_ns
-from drivers.port_users import PortUser, other_port_users, port_users
-from drivers.source import Link
+from drivers.source import LineSettings, Link
+
+_log = logging.getLogger(__name__)
 
 PARITIES = ("N", "E", "O")
-_WAIT_S = 0.05
+PROCESSES = Path("/proc")
+_READ_TIMEOUT_S = 0.05
+"""How long a read waits for its first byte: threads that read are stopped within this time."""
 _WRITE_TIMEOUT_S = 2.0
-_DRAIN_BYTES = 1 << 16
-_SOCKET_BYTES = _DRAIN_BYTES
+"""Commands are a few bytes: a device that takes none for so long hangs."""
+_MAX_READ_BYTES = 1 << 16
 _TERMINAL_BYTES = 1024
-"""Where a terminal gives so many at once, it may hold more."""
-_TERMINAL_READS = 16
+"""A terminal that returns so many bytes at once may hold more."""
+_MAX_TERMINAL_READS = 16
 _WINDOWS_BUFFER_BYTES = 1 << 18
+"""Receive buffer asked for on Windows, whose default of 4 kB lasts 90 ms at 460800 baud."""
+
+if sys.platform == "win32":
+    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError)
+else:
+    from termios import error as _termios_error
+
+    # pyserial lets these through beside its own exception, which is an OSError.
+    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
+
+_BUSY = (errno.EBUSY, errno.EAGAIN)
+_ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
+_DENIED = (errno.EACCES, errno.EPERM)
 
 
 @dataclass(frozen=True, slots=True)
 class PortInfo:
-    """A port that is there. The numbers are those of USB, None or empty for others."""
+    """A port that exists. The numbers are those of USB, None or "" for others."""
 
     device: str
     description: str = ""
@@ -52,34 +67,55 @@ class PortInfo:
 
     def is_same_device(self, other: "PortInfo") -> bool:
         """Whether both are one USB device, whatever the names of their ports."""
-        mine = (self.vendor_id, self.product_id, self.serial_number)
-        return self.vendor_id is not None and mine == (
-            other.vendor_id,
-            other.product_id,
-            other.serial_number,
-        )
+        return self.vendor_id is not None and self._usb_numbers == other._usb_numbers
+
+    @property
+    def _usb_numbers(self) -> tuple[int | None, int | None, str]:
+        return self.vendor_id, self.product_id, self.serial_number
 
 
 class OpenPort(Link, Protocol):
-    """What is needed of an open port; `Port` is one, tests use a fake."""
+    """An open port: a `Port`, or the two ports of a `drivers.pair.link.PairLink`."""
 
     @property
     def info(self) -> PortInfo:
-        """What is known of it, to find the device again or to name it in a run."""
+        """What is known of it, to find the device again and to name it in a run."""
 
     @property
     def url(self) -> str:
         """As it was opened."""
 
     def close(self) -> None:
-        """Give it up; may be called twice, and when the device is gone."""
+        """Close it; may be called twice, and when the device is gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortConfig:
+    """How to open a port."""
+
+    url: str
+    baud: int
+    parity: str = "N"
+
+    def open(self) -> OpenPort:
+        """Open it. Raises DriverError."""
+        return open_port(self.url, self.baud, self.parity)
+
+    def reopen(self, lost: PortInfo) -> OpenPort:
+        """Open the port of the same device, wherever it is now. Raises DriverError while it is gone."""
+        url = find_replugged(lost)
+        if url is None:
+            raise PortUnavailableError(
+                "the device of {port} is not there: plug it in again, into the same socket", port=lost.device
+            )
+        return open_port(url, self.baud, self.parity)
 
 
 def list_ports() -> list[PortInfo]:
-    """Serial ports of this machine, by name; none where it cannot tell, as while one comes or goes."""
+    """Serial ports of this computer, by name; none where the system cannot tell."""
     try:
         ports = list(serial_list_ports.comports())
-    except PLATFORM_ERRORS:  # Windows refuses to tell of a device that has just been unplugged
+    except PLATFORM_ERRORS:  # Windows raises while a device is being unplugged
         return []
     found = (
         PortInfo(
@@ -95,15 +131,20 @@ def list_ports() -> list[PortInfo]:
     return sorted(found, key=lambda port: port.device)
 
 
-def find_replugged(lost: PortInfo) -> str | None:
-    """What to open to have a lost device again; None while it is not there.
+def port_info(url: str) -> PortInfo:
+    """What is known of the port that `url` opens, or leads to as a symbolic link."""
+    if "://" in url:
+        return PortInfo(url)
+    names = (url, os.path.realpath(url))
+    return next((port for port in list_ports() if port.device in names), PortInfo(url))
 
-    Parameters
-    ----------
-    lost : PortInfo
-        What `Port.info` was. A USB device is known again by its numbers, under whatever name. Of two
-        that are alike and have no serial number it is the one in the same socket, then the one of the
-        same name. Without these numbers (a network address, a pseudo-terminal) it is the same address.
+
+def find_replugged(lost: PortInfo) -> str | None:
+    """Address of a lost device; None while it is gone.
+
+    A USB device is recognised by its numbers, under whatever name. Of two that are alike and have no serial
+    number it is the one in the same socket, then the one of the same name. A port without USB numbers (a
+    network address, a pseudo-terminal) keeps its address.
     """
     if lost.vendor_id is None:
         return lost.device
@@ -133,51 +174,48 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
     Raises
     ------
     PortUnavailableError
-        If it is not there, is busy, or may not be opened.
+        If it does not exist, is busy, or may not be opened.
     SettingsError
         If the port cannot be set so.
     """
     if parity not in PARITIES:
-        raise SettingsError(f"parity {parity!r} is not known: give one of {', '.join(PARITIES)}")
+        raise SettingsError(
+            "parity {parity!r} is not known: give one of {allowed}", parity=parity, allowed=PARITIES
+        )
     if baud <= 0:
-        raise SettingsError(f"baud {baud} is not possible: give the device's baud rate, for example 115200")
-    others = other_port_users(url)
-    if others:  # many programs take no lock, and two readers get half of the bytes each
-        raise port_busy_error(url, others)
+        raise SettingsError(
+            "baud {baud} is not possible: give the device's baud rate, for example 115200", baud=baud
+        )
+    users = other_port_users(url)
+    if users:  # many programs take no lock, and two readers get half of the bytes each
+        raise port_busy_error(url, users)
     try:
         wire = serial.serial_for_url(
             url,
             baudrate=baud,
             parity=parity,
             stopbits=stop_bits,
-            timeout=_WAIT_S,
+            timeout=_READ_TIMEOUT_S,
             write_timeout=_WRITE_TIMEOUT_S,
             exclusive=True,
         )
     except PLATFORM_ERRORS as error:
         raise port_unavailable_error(url, baud, error, [port.device for port in list_ports()]) from error
-    _tune(wire)
+    _minimise_latency(wire)
+    _log.info("opened %s at %d baud, parity %s", url, baud, parity)
     return Port(wire, url)
 
 
-def _tune(wire: Any) -> None:
-    """Ask for short latency and a large buffer where the platform has them."""
+def _minimise_latency(wire: Any) -> None:
+    """Ask for low latency and a large buffer where the platform has them."""
     with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
         wire.set_low_latency_mode(True)
     with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
 
 
-def port_info(url: str) -> PortInfo:
-    """What is known of the port that `url` opens, or leads to as a symbolic link."""
-    if "://" in url:
-        return PortInfo(url)
-    names = (url, os.path.realpath(url))
-    return next((port for port in list_ports() if port.device in names), PortInfo(url))
-
-
 class Port:
-    """An open port (a `Link`), made by `open_port`.
+    """An open port, made by `open_port`.
 
     Reading and writing may happen in two threads; closing must wait until both are done.
     """
@@ -188,7 +226,6 @@ class Port:
         self._terminal = _terminal_of(wire)
         self.url = url
         self.info = port_info(url)
-        """What is known of the port, to find the device again or to name it in a run."""
 
     def __enter__(self) -> Self:
         return self
@@ -218,11 +255,11 @@ class Port:
 
     @property
     def has_baud(self) -> bool:
-        """Whether the baud rate means anything here, as it does not on a network or pseudo-terminal."""
+        """Whether the baud rate has an effect; it has none on a network or a pseudo-terminal."""
         return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")
 
-    def configure(self, baud: int, parity: str) -> None:
-        """Go on with another baud rate and parity; what waited to be read is thrown away.
+    def configure(self, line_settings: LineSettings) -> None:
+        """Change baud rate and parity and discard unread bytes.
 
         Raises
         ------
@@ -232,10 +269,14 @@ class Port:
             If the port is gone.
         """
         try:
-            self._wire.baudrate, self._wire.parity = baud, parity
+            self._wire.baudrate, self._wire.parity = line_settings.baud, line_settings.parity
         except PLATFORM_ERRORS as error:
             raise SettingsError(
-                f"port {self.url} cannot be set to {baud} baud, parity {parity} ({error}): give others"
+                "port {port} cannot be set to {baud} baud, parity {parity} ({fault}): give others",
+                port=self.url,
+                baud=line_settings.baud,
+                parity=line_settings.parity,
+                fault=error,
             ) from error
         try:
             self._wire.reset_input_buffer()
@@ -243,221 +284,202 @@ class Port:
             raise self._lost(error) from error
 
     def write(self, data: bytes) -> None:
-        """Send all of `data`.
-
-        Raises
-        ------
-        DeviceLostError
-            If the port is gone, or takes nothing for 2 s.
-        """
+        """Send all of `data`. Raises DeviceLostError if the port is gone, or takes nothing for 2 s."""
         try:
             self._wire.write(data)
         except PLATFORM_ERRORS as error:
             raise self._lost(error) from error
 
     def close(self) -> None:
-        """Give the port up; may be called twice, and when the device is gone."""
+        """Close the port; may be called twice, and when the device is gone."""
         if self._is_socket and self._wire.is_open:
             self._wire._socket.close()  # pyserial leaves it open when the other end is gone
         with contextlib.suppress(*PLATFORM_ERRORS):
             self._wire.close()
+        _log.info("closed %s", self.url)
 
     def _rest(self) -> bytes:
         parts: list[bytes] = []
         size = 0
-        # An error after the first bytes shows again at the next call; these are not to be lost.
+        # An error after the first bytes is raised by the next call; the bytes must not be lost.
         with contextlib.suppress(*PLATFORM_ERRORS):
-            while size < _DRAIN_BYTES and (waiting := self._wire.in_waiting):
-                parts.append(bytes(self._wire.read(min(waiting, _DRAIN_BYTES))))
+            while size < _MAX_READ_BYTES and (waiting := self._wire.in_waiting):
+                parts.append(bytes(self._wire.read(min(waiting, _MAX_READ_BYTES))))
                 size += len(parts[-1])
         return b"".join(parts)
 
     def _socket_rest(self) -> bytes:
-        # `in_waiting` of a socket is only 0 or 1. Without time to wait, pyserial receives once.
+        # `in_waiting` of a socket is only 0 or 1. With a timeout of 0, pyserial receives once.
         self._wire.timeout = 0
         try:
-            return bytes(self._wire.read(_SOCKET_BYTES))
+            return bytes(self._wire.read(_MAX_READ_BYTES))
         except PLATFORM_ERRORS:  # as in `_rest`
             return b""
         finally:
-            self._wire.timeout = _WAIT_S
+            self._wire.timeout = _READ_TIMEOUT_S
 
     def _lost(self, error: Exception) -> DeviceLostError:
-        return device_lost_error(self.url, error)
+        lost = device_lost_error(self.url, error)
+        _log.warning("%s (%s: %s)", lost, type(error).__name__, error)
+        return lost
 
 
 def _terminal_of(wire: Any) -> int | None:
-    """Descriptor of a POSIX terminal: reading it without the detours of pyserial costs a third."""
+    """Descriptor of a POSIX terminal, whose direct reads cost a third of pyserial's."""
     is_terminal = sys.platform != "win32" and type(wire) is serial.Serial
     return int(wire.fileno()) if is_terminal else None
 
 
 def _read_terminal(descriptor: int) -> bytes:
     """All that is there, or comes first within 50 ms. Raises an error of `PLATFORM_ERRORS`."""
-    parts = [_taken(descriptor)]
-    if not parts[0] and select.select([descriptor], [], [], _WAIT_S)[0]:
-        parts = [os.read(descriptor, _DRAIN_BYTES)]
+    parts = [_read_available(descriptor)]
+    if not parts[0] and select.select([descriptor], [], [], _READ_TIMEOUT_S)[0]:
+        parts = [os.read(descriptor, _MAX_READ_BYTES)]
         if not parts[0]:
-            raise serial.SerialException("it is ready and gives nothing, as when it is unplugged")
-    # An error after the first bytes shows again at the next call; these are not to be lost.
+            raise serial.SerialException("the port is ready and gives nothing, as when it is unplugged")
+    # An error after the first bytes is raised by the next call; the bytes must not be lost.
     with contextlib.suppress(*PLATFORM_ERRORS):
-        while len(parts[-1]) >= _TERMINAL_BYTES and len(parts) < _TERMINAL_READS:
-            parts.append(_taken(descriptor))
+        while len(parts[-1]) >= _TERMINAL_BYTES and len(parts) < _MAX_TERMINAL_READS:
+            parts.append(_read_available(descriptor))
     return b"".join(parts)
 
 
-def _taken(descriptor: int) -> bytes:
-    """What a terminal holds, b"" if nothing; which of two ways tells that depends on the system."""
+def _read_available(descriptor: int) -> bytes:
+    """What a terminal holds; an empty one returns nothing or raises, depending on the system."""
     try:
-        return os.read(descriptor, _DRAIN_BYTES)
+        return os.read(descriptor, _MAX_READ_BYTES)
     except BlockingIOError:
         return b""
 
 
-class ReaderEndReason(StrEnum):
-    """Why a `PortReader` ended."""
-
-    STOPPED = "stopped"
-    DEVICE_LOST = "device-lost"
-    QUEUE_FULL = "queue-full"
-    FAILED = "failed"
-
-
 @dataclass(frozen=True, slots=True)
-class ReaderEnd:
-    """Last word of a `PortReader`."""
+class PortUser:
+    """A program that has a port open."""
 
-    reason: ReaderEndReason
-    message: str = ""
+    process: int
+    program: str
+
+    def __str__(self) -> str:
+        return f"{self.program} (process {self.process})" if self.program else f"process {self.process}"
 
 
-class QueueFullError(DriverError):
-    """Raised by a sink that cannot take more: the reader ends, since it may not skip."""
+def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
+    """Programs that have `device` open, as far as the system tells: Linux does, for the same user.
 
-
-class PortReader:
-    """Thread that reads a device, stamps what came, and hands it on; nothing else.
-
-    Parameters
-    ----------
-    read : callable
-        Waits shortly and returns what came, b"" if nothing, as `Port.read` or `SampleSource.read` of an
-        open port does. Raises DeviceLostError.
-    sink : callable (arrival_ns, data)
-        Takes each read with the host's time (ns, `host_time.host_ns`) after it; must not wait. Raises
-        `QueueFullError` when it cannot take more.
-    ended : callable (ReaderEnded)
-        Called once from the thread, as its last act.
+    `processes` is the process folder of Linux; it need not exist.
     """
-
-    def __init__(
-        self,
-        read: Callable[[], bytes],
-        sink: Callable[[int, bytes], None],
-        ended: Callable[[ReaderEnd], None],
-    ) -> None:
-        self._read = read
-        self._sink = sink
-        self._ended = ended
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="port reader", daemon=True)
-
-    def start(self) -> None:
-        """Begin to read."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Wait for the read under way (50 ms, a fraction of a second where a device is asked) and end."""
-        self._stopping.set()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join()
-
-    def _run(self) -> None:
-        ended = ReaderEnd(ReaderEndReason.STOPPED)
-        try:
-            self._read_on()
-        except DeviceLostError as error:
-            ended = ReaderEnd(ReaderEndReason.DEVICE_LOST, str(error))
-        except QueueFullError as error:
-            ended = ReaderEnd(ReaderEndReason.QUEUE_FULL, str(error))
-        except Exception as error:  # whatever it was, those who wait for samples must hear of it
-            ended = ReaderEnd(ReaderEndReason.FAILED, f"reading {type(error).__name__}: {error}")
-        self._ended(ended)
-
-    def _read_on(self) -> None:
-        while not self._stopping.is_set():
-            data = self._read()
-            arrival_ns = host_ns()
-            if data:
-                self._sink(arrival_ns, data)
+    if "://" in device:
+        return []
+    target = os.path.realpath(device)
+    return [
+        PortUser(int(process.name), program_name(process))
+        for process in _entries(processes)
+        if process.name.isdigit() and any(_leads_to(target, file) for file in _entries(process / "fd"))
+    ]
 
 
-if sys.platform == "win32":
-    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError)
-else:
-    from termios import error as _termios_error
+def other_port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
+    """Programs beside this one that have a serial port open; a pseudo-terminal is open in its maker."""
+    if not os.path.realpath(device).startswith("/dev/") or os.path.realpath(device).startswith("/dev/pts/"):
+        return []
+    return [user for user in port_users(device, processes) if user.process != os.getpid()]
 
-    # pyserial lets these through beside its own exception, which is an OSError.
-    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
 
-_BUSY = (errno.EBUSY, errno.EAGAIN)
-_ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
-_DENIED = (errno.EACCES, errno.EPERM)
+def program_name(process: Path) -> str:
+    """Name of a program by its folder in `/proc`; "" where it cannot be read."""
+    with contextlib.suppress(OSError):
+        return (process / "comm").read_text("utf-8", "replace").strip()
+    return ""
+
+
+def _entries(folder: Path) -> Iterator[Path]:
+    with contextlib.suppress(OSError):
+        yield from folder.iterdir()
+
+
+def _leads_to(target: str, file: Path) -> bool:
+    with contextlib.suppress(OSError):  # closed meanwhile, or of another user
+        return os.path.realpath(file) == target
+    return False
 
 
 def device_lost_error(url: str, error: Exception) -> DeviceLostError:
-    """Error to raise for `error`, which an open port gave."""
+    """Error to raise for `error` of an open port."""
     if "://" in url:
         return DeviceLostError(
-            f"the connection to {url} was closed by the other end: check its power and the network"
+            "the connection to {port} was closed by the other end: check its power and the network", port=url
         )
     if "timeout" in str(error).lower():
         return DeviceLostError(
-            f"port {url} takes nothing of what is sent: check the device, and reset it if it hangs"
+            "port {port} takes nothing of what is sent: check the device, and reset it if it hangs", port=url
         )
-    return DeviceLostError(f"port {url} is gone: plug its cable in again, and check the power of the device")
+    return DeviceLostError(
+        "port {port} is gone: plug its cable in again, and check the power of the device", port=url
+    )
 
 
 def port_unavailable_error(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
-    """Error to raise for `error`, which opening `url` gave, while the ports `present` are there."""
+    """Error to raise for `error` of opening `url`, while the ports `present` exist."""
     if "://" in url:
-        return _unreachable(url, error)
-    number = getattr(error, "errno", None)
-    text = str(error)
+        return _unreachable_error(url, str(error))
+    number, text = getattr(error, "errno", None), str(error)
     if number in _DENIED:
         return PortUnavailableError(
-            f"port {url} may not be opened by this user: add the user to the group that owns it "
-            "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again"
+            "port {port} may not be opened by this user: add the user to the group that owns it "
+            "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again",
+            port=url,
         )
     # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
     if number in _BUSY or "PermissionError" in text:
         return port_busy_error(url, port_users(url))
     if number in _ABSENT or "FileNotFoundError" in text:
-        there = f"ports here: {', '.join(present)}" if present else "there is no serial port here"
-        return PortUnavailableError(f"there is no port {url}: plug the device in or give its name; {there}")
+        if present:
+            return PortUnavailableError(
+                "there is no port {port}: plug the device in or give its name; ports here: {present}",
+                port=url,
+                present=present,
+            )
+        return PortUnavailableError(
+            "there is no port {port}: plug the device in or give its name; there is no serial port here",
+            port=url,
+        )
     if isinstance(error, (ValueError, OverflowError)):
-        return SettingsError(f"port {url} cannot be set to {baud} baud ({error}): give another --baud")
-    return PortUnavailableError(f"{url} cannot be used as a serial port ({error}): give the name of a port")
+        return SettingsError(
+            "port {port} cannot be set to {baud} baud ({fault}): give another --baud",
+            port=url,
+            baud=baud,
+            fault=error,
+        )
+    return PortUnavailableError(
+        "{port} cannot be used as a serial port ({fault}): give the name of a port", port=url, fault=error
+    )
 
 
 def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
-    """Error to raise for a port that other programs have open, those that are known."""
-    held = f", held by {', '.join(map(str, users))}" if users else ""
-    return PortUnavailableError(f"port {url} is busy{held}: close the program that has it open")
+    """Error to raise for a port that other programs have open."""
+    if users:
+        return PortUnavailableError(
+            "port {port} is busy, held by {users}: close the program that has it open", port=url, users=users
+        )
+    return PortUnavailableError("port {port} is busy: close the program that has it open", port=url)
 
 
-def _unreachable(url: str, error: Exception) -> DriverError:
-    if "not known" in str(error):
+def _unreachable_error(url: str, fault: str) -> DriverError:
+    if "not known" in fault:
         return PortUnavailableError(
-            f"{url} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
+            "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port",
+            port=url,
         )
-    text = str(error).lower()
-    if "refused" in text:
+    fault = fault.lower()
+    if "refused" in fault:
         return PortUnavailableError(
-            f"{url} refuses: nothing listens there, start the device's server or check the port number"
+            "{port} refuses: nothing listens there, start the device's server or check the port number",
+            port=url,
         )
-    if "name or service" in text or "getaddrinfo" in text or "nodename" in text:
-        return PortUnavailableError(f"{url} is not known in this network: check how the address is written")
+    if "name or service" in fault or "getaddrinfo" in fault or "nodename" in fault:
+        return PortUnavailableError(
+            "{port} is not known in this network: check how the address is written", port=url
+        )
     return PortUnavailableError(
-        f"{url} does not answer: check address, port number, network and power of the device"
+        "{port} does not answer: check address, port number, network and power of the device", port=url
     )

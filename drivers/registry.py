@@ -1,138 +1,46 @@
-"""Every protocol by its name."""
+"""All devices by name: the folders of `drivers.devices`, and names that are reserved for later ones."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from importlib import import_module
+from pkgutil import iter_modules
 
+from drivers import devices
+from drivers.driver import DeviceDriver
 from drivers.errors import SettingsError
-from drivers.source import SampleSource
 
-UNVERIFIED = "not verified on hardware"
-RESERVED = "reserved, comes later"
-
-
-@dataclass(frozen=True, slots=True)
-class ProtocolInfo:
-    """What can be said of a protocol, and how to speak it.
-
-    Attributes
-    ----------
-    name : str
-        As given to `--protocol`.
-    title : str
-        For people.
-    default_baud : int
-        0 where none is usual.
-    channels : int
-        Gauges on one port.
-    verified : str
-        What it was tested against.
-    module : str
-        Where its `make_source(settings, rate_hz)` is, imported on use; "" for a name that is only
-        reserved.
-    bauds : mapping of str to int
-        Usual baud rates of a device that is chosen by its setting `format`.
-    """
-
-    name: str
-    title: str
-    default_baud: int
-    channels: int
-    verified: str = RESERVED
-    module: str = ""
-    bauds: Mapping[str, int] = field(default_factory=dict)
-
-    @property
-    def available(self) -> bool:
-        """Whether the protocol is built."""
-        return bool(self.module)
-
-    def default_baud_for(self, settings: Mapping[str, str]) -> int:
-        """Baud rate of a device with its own `settings`; 0 where none is usual."""
-        return self.bauds.get(settings.get("format", ""), self.default_baud)
-
-    def make_source(self, settings: dict[str, str], rate_hz: float | None) -> SampleSource:
-        """Source of a device with its own `settings`.
-
-        Raises
-        ------
-        SettingsError
-            For a setting or rate that cannot be, or a protocol that is only reserved.
-        """
-        find_protocol(self.name)
-        make: Callable[[dict[str, str], float | None], SampleSource]
-        make = import_module(self.module).make_source
-        return make(settings, rate_hz)
+_RESERVED = (
+    DeviceDriver("dataq", "DATAQ DI-1100 to DI-4208", 40),
+    DeviceDriver("hbm-aed", "HBM/HBK AED and FIT", 60, channels=1),
+    DeviceDriver("enod4", "Scaime eNod4 fast SCMBus", 70, 115200, 1),
+    DeviceDriver("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 80, 115200, 1),
+    DeviceDriver("scale-line", "Lines of scales (Dini Argeo, KERN, Laumas)", 90, channels=1),
+)
 
 
-PROTOCOLS: dict[str, ProtocolInfo] = {
-    info.name: info
-    for info in (
-        ProtocolInfo(
-            "slipstand-binary",
-            "Slipstand binary (microcontroller with the reference firmware)",
-            460800,
-            2,
-            f"{UNVERIFIED}; the reference firmware is read in simavr, an AVR simulator",
-            "drivers.slipstand_binary.source",
-        ),
-        ProtocolInfo(
-            "csv",
-            "CSV lines (Arduino, HX711, ADS1256, OpenScale, loggers)",
-            115200,
-            2,
-            UNVERIFIED,
-            "drivers.csv_lines.source",
-            {"openscale": 9600},
-        ),
-        ProtocolInfo(
-            "gsv",
-            "ME-Systeme GSV-8 and GSV-6 (the GSV-6 usually at 230400 baud)",
-            115200,
-            2,
-            f"{UNVERIFIED}; the vendor's client gsv86lib 0.1.1 reads the simulated device",
-            "drivers.gsv.source",
-        ),
-        ProtocolInfo("dataq", "DATAQ DI-1100 to DI-4208", 0, 2),
-        ProtocolInfo(
-            "modbus",
-            "Modbus RTU transmitters (Laumas TLB4, Scaime eNod4, others by their registers)",
-            115200,
-            2,
-            f"{UNVERIFIED}; reads pymodbus 3.16 as server, and minimalmodbus 2.1 reads the simulated device",
-            "drivers.modbus.source",
-        ),
-        ProtocolInfo("hbm-aed", "HBM/HBK AED and FIT", 0, 1),
-        ProtocolInfo("enod4", "Scaime eNod4 fast SCMBus", 115200, 1),
-        ProtocolInfo("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 115200, 1),
-        ProtocolInfo("scale-line", "Lines of scales (Dini Argeo, KERN, Laumas)", 0, 1),
-        ProtocolInfo(
-            "harp",
-            "Harp LoadCells",
-            1_000_000,
-            2,
-            f"{UNVERIFIED}; harp-python 0.4.2 reads the simulated device's bytes",
-            "drivers.harp.source",
-        ),
-    )
-}
+def _find_drivers() -> dict[str, DeviceDriver]:
+    folders = (import_module(f"{devices.__name__}.{entry.name}") for entry in iter_modules(devices.__path__))
+    found = {driver.name: driver for driver in _RESERVED}
+    found |= {folder.DRIVER.name: folder.DRIVER for folder in folders}
+    return {driver.name: driver for driver in sorted(found.values(), key=lambda driver: driver.rank)}
 
 
-def find_protocol(name: str) -> ProtocolInfo:
-    """The protocol of that name.
+DRIVERS = _find_drivers()
+"""By name, in the order of lists; reserved names included."""
 
-    Raises
-    ------
-    SettingsError
-        If it is not known, or only reserved.
-    """
-    info = PROTOCOLS.get(name)
-    if info is None:
-        raise SettingsError(f"protocol {name!r} is not known: use one of {_usable()}")
-    if not info.available:
-        raise SettingsError(f"protocol {name!r} ({info.title}) comes later: use one of {_usable()}")
-    return info
+AVAILABLE = tuple(driver for driver in DRIVERS.values() if driver.available)
+"""Those that are built, in the same order."""
 
 
-def _usable() -> str:
-    return ", ".join(info.name for info in PROTOCOLS.values() if info.available)
+def find_driver(name: str) -> DeviceDriver:
+    """Driver of that name. Raises SettingsError for one that is unknown or only reserved."""
+    driver = DRIVERS.get(name)
+    usable = [one.name for one in AVAILABLE]
+    if driver is None:
+        raise SettingsError("protocol {name!r} is not known: use one of {usable}", name=name, usable=usable)
+    if not driver.available:
+        raise SettingsError(
+            "protocol {name!r} ({title}) comes later: use one of {usable}",
+            name=name,
+            title=driver.title,
+            usable=usable,
+        )
+    return driver

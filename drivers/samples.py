@@ -1,4 +1,4 @@
-"""What leaves a driver: blocks of samples with their flags, and the account of what was lost."""
+"""What leaves a driver: blocks of samples with their flags, and counts of what was lost."""
 
 from dataclasses import dataclass, field
 from enum import IntFlag
@@ -12,21 +12,21 @@ class SampleStatus(IntFlag):
 
     GOOD = 0
     MISSING = 1
-    """Never arrived; the row stands in for it."""
+    """Never arrived; the row replaces it."""
     DAMAGED = 2
-    """Arrived with a wrong checksum or cut short; the row stands in for it."""
+    """Arrived with a wrong checksum or cut short; the row replaces it."""
     OVERLOAD_TABLE = 4
     OVERLOAD_RELATIVE = 8
     TABLE_MISSING = 16
-    """Of two devices read as one: only the reading of gauge 1 is missing or damaged."""
+    """Two devices: only the reading of gauge 1 is missing or damaged."""
     RELATIVE_MISSING = 32
 
 
 ABSENT = SampleStatus.MISSING | SampleStatus.DAMAGED
-"""Rows with one of these flags carry no reading: their counts are 0."""
+"""Rows with one of these flags have no reading: their counts are 0."""
 
 ABSENT_BY_GAUGE = (ABSENT | SampleStatus.TABLE_MISSING, ABSENT | SampleStatus.RELATIVE_MISSING)
-"""Rows with one of these flags carry no reading of gauge 1, of gauge 2: its count is 0."""
+"""For gauge 1 and gauge 2: rows with one of these flags have no reading of it, and its count is 0."""
 
 INCOMPLETE = SampleStatus.MISSING | SampleStatus.TABLE_MISSING | SampleStatus.RELATIVE_MISSING
 """Rows with one of these flags lack a reading that never arrived."""
@@ -65,7 +65,7 @@ class SampleBlock:
 
 @dataclass(slots=True)
 class Losses:
-    """Running account of a stream. `samples` counts every row, absent ones included."""
+    """Counts of a stream. `samples` counts every row, missing and damaged ones included."""
 
     samples: int = 0
     missing: int = 0
@@ -75,18 +75,18 @@ class Losses:
     damaged: int = 0
     overloaded: int = 0
     discarded_bytes: int = 0
-    """Bytes that belonged to no good frame or line."""
+    """Bytes outside good frames and lines."""
     restarts: int = 0
-    """Times the device began anew within the stream; the rows between are estimated."""
+    """Restarts of the device within the stream; the rows between are estimated."""
     repeated: int = 0
-    """Frames or lines that came twice and were left out once."""
+    """Frames or lines that came twice; one of the two was left out."""
     unexplained_drops: int = 0
-    """Times the device said that it had dropped samples while its sequence shows no gap."""
+    """How often the device reported dropped samples while its sequence shows no gap."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """What a device says of itself."""
+    """What a device reports of itself."""
 
     protocol: str
     name: str

@@ -1,44 +1,89 @@
-"""The seam between a device and everything above it."""
+"""The interfaces between a port, a device and the application."""
 
 import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.errors import DeviceLostError
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
+from messages.message import Message
 
 
 class Link(Protocol):
-    """An open byte connection, as `drivers.port.Port` is one; tests use a fake."""
+    """An open byte connection; `drivers.port.Port` is one."""
 
     def read(self) -> bytes:
-        """Wait shortly (<= 50 ms) and return what came, b"" if nothing. Raises DeviceLostError."""
+        """Wait at most 50 ms and return what came, b"" if nothing. Raises DeviceLostError."""
 
     def write(self, data: bytes) -> None:
         """Send all of `data`. Raises DeviceLostError."""
 
 
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """Baud rate and parity of a serial port."""
+
+    baud: int
+    parity: str = "N"
+
+    def __str__(self) -> str:
+        return f"{self.baud} baud 8{self.parity}1"
+
+
+class ConfigurableLink(Link, Protocol):
+    """A link whose line settings can be changed while it is open."""
+
+    @property
+    def has_baud(self) -> bool:
+        """Whether baud rate and parity have an effect."""
+
+    def configure(self, line_settings: LineSettings) -> None:
+        """Change the settings and discard unread bytes. Raises SettingsError where the port cannot."""
+
+
+class CancellableLink:
+    """A link that raises DeviceLostError from the moment `cancelled` is set, so that a start can be ended."""
+
+    def __init__(self, link: Link, cancelled: threading.Event) -> None:
+        self._link = link
+        self._cancelled = cancelled
+
+    def read(self) -> bytes:
+        """See `Link`."""
+        self._check()
+        return self._link.read()
+
+    def write(self, data: bytes) -> None:
+        """See `Link`."""
+        self._check()
+        self._link.write(data)
+
+    def _check(self) -> None:
+        if self._cancelled.is_set():
+            raise DeviceLostError("the connection was cancelled: connect again")
+
+
 class SampleSource(Protocol):
     """One device: its conversation and its decoder.
 
-    `start` and `stop` talk; `decode` is pure (no port, clock or thread), so that captured bytes
-    replay through the very code that decoded them live. The port loop stands between:
-    `data = source.start(port)`; then `source.decode(data, arrival_ns)` for that and all that
-    `source.read(port)` gives; then `source.stop(port)`. Where the link broke,
-    `source.decode(b"", arrival_ns)` says so, also to a replay, and what `source.resume(port)` returns is
-    decoded next.
+    `start` and `stop` talk to the device. `decode` uses no port, clock or thread, so that recorded bytes are
+    decoded by the code that decoded them live. The caller runs the loop: `data = source.start(link)`, then
+    `source.decode(data, arrival_ns)` for that and for all that `source.read(link)` returns, then
+    `source.stop(link)`. Where the connection broke, the caller passes `source.decode(b"", arrival_ns)`, in a
+    replay too, and decodes next what `source.resume(link)` returns.
     """
 
     batch_delay_s: float
-    """How long `read` may let bytes gather first (s), set by who reads; one that asks its device need not."""
+    """How long `read` may let bytes collect (s); set by the caller. Polled devices ignore it."""
 
     @property
     def channels(self) -> int:
-        """Gauges that it reads, 1 or 2; the column of another is 0."""
+        """Gauges that the device reads, 1 or 2; the column of a missing one is 0."""
 
     @property
     def identity(self) -> DeviceIdentity:
-        """Known after `start` (a replayed source knows only its protocol)."""
+        """Known after `start`; before it, the protocol alone."""
 
     @property
     def rate_hz(self) -> float:
@@ -46,68 +91,44 @@ class SampleSource(Protocol):
 
     @property
     def losses(self) -> Losses:
-        """The account until now."""
+        """Counts until now."""
 
     @property
-    def run_note(self) -> str:
-        """What every run of this device must say of itself, known after `start`; "" for most."""
+    def run_note(self) -> Message:
+        """Remark to store with every run of this device, known after `start`; empty for most."""
 
-    def take_warnings(self) -> list[str]:
-        """What is to be said of the stream since the last call, in sentences; ask after each `decode`."""
+    def take_warnings(self) -> list[Message]:
+        """Warnings about the stream since the last call; to be called after each `decode`."""
 
     def prepare(self) -> None:
-        """Do what takes long and needs no port, such as compiling; `start` does it if it was not done."""
+        """Compile what decoding needs. `start` does it where it was not done."""
 
     def start(self, link: Link) -> bytes:
-        """Bring the device to a known state, set it up and start the stream.
+        """Bring the device into a known state, set it up and start the stream.
 
-        Returns what was read here of the stream, to be decoded before all else.
-        Raises NoDataError within about 3 s when nothing intelligible comes, saying what did come.
+        Returns what was read of the stream, to be decoded first. Raises NoDataError within about 3 s where
+        nothing intelligible comes.
         """
 
     def resume(self, link: Link) -> bytes:
-        """Go on with a device that was lost and found again; else as `start`.
+        """Continue with a device that was lost and found again; else as `start`.
 
-        One that sends already is left as it is: its count then tells exactly what is missing.
+        A device that is still sending is left alone: its sequence then proves what is missing.
         """
 
     def read(self, link: Link) -> bytes:
-        """What comes next, b"" if nothing did within a fraction of a second; to be decoded next.
+        """Next bytes to decode, b"" if none came within a fraction of a second.
 
-        A device that sends by itself is listened to. One that must be asked is asked once, at its time,
-        and its answer awaited. Called again and again by one thread, `decode` meanwhile by another.
+        A polled device is asked once, when its poll is due. One thread may call this while another decodes.
         Raises DeviceLostError.
         """
 
     def stop(self, link: Link) -> None:
-        """Ask the device to stop sending; never raises when the device is gone."""
+        """Ask the device to stop sending. Does not raise where the device is gone."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Samples completed by `data`. Keeps a bounded unfinished rest for the next call.
+        """Samples completed by `data`; an unfinished rest of bounded size is kept. Exhaust the iterator.
 
-        No data at all, b"", means that the link was broken here: what comes next may not go on where
-        it ended. Rows stand for what is missing, by the device's sequence or time where the time that
-        has passed on the host bears it out, else estimated by that time.
+        b"" says that the connection broke here. Missing rows are counted from the device's sequence or time
+        where the host's clock agrees with it, else estimated from the host's clock.
         """
-
-
-class CancellableLink:
-    """Reads and writes of `link` until `stopping` is set; then each raises DeviceLostError."""
-
-    def __init__(self, link: Link, cancelled: threading.Event) -> None:
-        self._link = link
-        self._stopping = cancelled
-
-    def read(self) -> bytes:
-        """See `drivers.source.Link`."""
-        self._check()
-        return self._link.read()
-
-    def write(self, data: bytes) -> None:
-        """See `drivers.source.Link`."""
-        self._check()
-        self._link.write(data)
-
-    def _check(self) -> None:
-        if self._stopping.is_set():
-            raise DeviceLostError("the device is not wanted any more: connect again")

@@ -77,6 +77,10 @@ class Message(msgspec.Struct, frozen=True):
         )
 
 
+EMPTY = Message("")
+"""Nothing to say; false in a condition."""
+
+
 class MessageError(Exception):
     """Root of errors whose text is a `Message`.
 

@@ -17,8 +17,7 @@ from app.acquisition.messages import (
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.child_process import ChildProcess, encode_line, spawn
 from app.runs.metadata import RunMetadata
-from drivers.clock import ClockEstimate
-from drivers.skew import Skew
+from drivers.clock import ClockEstimate, Skew
 
 _TIMED_EVERY_S = 1.0
 DIED_NOTE = "the live identification ended by itself. The run goes on, and is identified when it has ended"

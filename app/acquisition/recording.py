@@ -27,9 +27,8 @@ from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer_messages import OpenRun
-from drivers.clock import ClockEstimate
+from drivers.clock import ClockEstimate, Skew
 from drivers.samples import Losses
-from drivers.skew import Skew
 
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
@@ -329,7 +328,7 @@ class Recording:
         facts, clock = self._trigger.measurement, self._around.clock()
         self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
-        self._say("" if skew is None else skew.description)
+        self._say("" if skew is None else str(skew.description))
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz

@@ -115,11 +115,11 @@ def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> St
 
 
 def _protocols() -> tuple[ProtocolChoice, ...]:
-    from drivers.registry import PROTOCOLS
+    from drivers.registry import DRIVERS
 
     return tuple(
         ProtocolChoice(entry.name, entry.title, entry.default_baud, entry.verified)
-        for entry in PROTOCOLS.values()
+        for entry in DRIVERS.values()
         if entry.available
     )
 

@@ -12,7 +12,7 @@ import msgspec
 from app.child_process import ChildProcess, json_decoder, spawn
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
-from drivers.simulated.disturbances import parse_disturbance
+from drivers.simulated.faults import parse_disturbance
 
 
 class Ready(msgspec.Struct, frozen=True):
@@ -113,7 +113,7 @@ class SimulatedStand:
         Raises
         ------
         SettingsError
-            If `text` is not as `drivers.simulated.disturbances.parse_disturbance` wants it.
+            If `text` is not as `drivers.simulated.faults.parse_disturbance` wants it.
         SimulatedStandError
             If the stand has ended.
         """

@@ -7,7 +7,8 @@ from typing import Literal
 import msgspec
 
 from drivers.errors import DriverError
-from drivers.simulated.disturbances import parse_disturbance
+from drivers.registry import find_driver
+from drivers.simulated.faults import parse_disturbance
 
 PULLBACK_MAX_M = 0.1
 """Nobody pulls a stand back farther; numbers beyond are millimetres by mistake."""
@@ -132,7 +133,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Fraction of the frames that are cut short."""
     disturbances: tuple[str, ...] = ()
     """What happens when, after the start of the first stream: `stall 2 at 5`, `unplug 1.5 at 8`, see
-    `drivers.simulated.disturbances.parse_disturbance`."""
+    `drivers.simulated.faults.parse_disturbance`."""
     seed: int | None = None
     """Makes noise and faults repeatable."""
     truth_file: str | None = None
@@ -168,14 +169,13 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         for text in self.disturbances:
             parse_disturbance(text)
 
-    def device_settings(self) -> dict[str, str]:
-        """Settings of the device, with what follows from its only gauge."""
-        match self.protocol, self.gauge:
-            case "modbus", str(gauge):
-                return {"channel": gauge} | self.device
-            case "csv", str(_) if "format" not in self.device:
-                return {"columns": "time_us,value"} | self.device
-        return self.device
+    def device_settings(self) -> tuple[dict[str, str], bool]:
+        """Settings of the device, and whether its first column holds gauge 2. Raises SettingsError."""
+        driver = find_driver(self.protocol)
+        if self.gauge is None or driver.single_gauge is None:
+            return self.device, False
+        settings, column = driver.single_gauge_settings(self.gauge, self.device)
+        return settings, self.gauge == "relative" and column == 0
 
     def timetable(self) -> Timetable:
         """What the stand does when."""

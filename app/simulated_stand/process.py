@@ -24,7 +24,7 @@ from app.simulated_stand.stand import SimulatedStandDevice
 from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
 from drivers.errors import DriverError, SettingsError
-from drivers.simulated.disturbances import Disturbance, parse_disturbance
+from drivers.simulated.faults import Disturbance, parse_disturbance
 from drivers.simulated.transport import Transport, has_pseudo_terminals, open_pseudo_terminal, open_tcp_port
 
 

@@ -11,13 +11,11 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.signal import StandSignal, SwappedChannels
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
-from drivers.simulated.device import DeviceSetup
-from drivers.simulated.disturbances import Disturbance, parse_disturbance
-from drivers.simulated.faults import FaultRates
-from drivers.simulated.polled_device import make_device
+from drivers.registry import find_driver
+from drivers.simulated.device import DeviceSetup, make_device
+from drivers.simulated.faults import Disturbance, FaultRates, parse_disturbance
 from drivers.simulated.stream_sender import Signal
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import make_simulated_protocol
 
 
 class SimulatedStandDevice:
@@ -52,12 +50,9 @@ class SimulatedStandDevice:
         self._gauges = load_gauges(options.gauges_file)
         # Samples after a release compile what must be compiled, before anybody waits for it.
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
-        self._device = make_device(
-            transport,
-            make_simulated_protocol(options.protocol, options.device_settings()),
-            self._signal_at,
-            _setup(options),
-        )
+        settings, self._is_swapped = options.device_settings()
+        protocol = find_driver(options.protocol).make_simulated(settings)
+        self._device = make_device(transport, protocol, self._signal_at, _setup(options))
         self._told: tuple[object, ...] = ()
 
     def step(self, now_ns: int) -> float:
@@ -101,8 +96,7 @@ class SimulatedStandDevice:
     def _signal_at(self, rate_hz: float, started_s: float) -> Signal:
         lag_s = self._options.lag_s
         signal = StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s - lag_s)
-        is_alone = (self._options.protocol, self._options.gauge) == ("csv", "relative")
-        return SwappedChannels(signal) if is_alone else signal
+        return SwappedChannels(signal) if self._is_swapped else signal
 
     def _releases(self) -> int:
         """Releases until the last sample of this session."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions, Timetable
-from drivers.simulated.disturbances import Disturbance
+from drivers.simulated.faults import Disturbance
 from drivers.simulated.stream_sender import TransmissionLog
 
 

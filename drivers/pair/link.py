@@ -1,71 +1,53 @@
-"""Two open ports read as one link: each by a thread of its own, each found again by itself."""
+"""Two open ports as one link: each is read by a thread of its own and reconnected by itself."""
 
 import contextlib
+import logging
 import queue
 import threading
-from dataclasses import dataclass
 
 from drivers.envelope import wrap
-from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
+from drivers.errors import DeviceLostError, DriverError, QueueFullError
 from drivers.host_time import ActiveTimer, host_ns
-from drivers.port import OpenPort, PortInfo, QueueFullError, find_replugged, open_port
+from drivers.port import OpenPort, PortConfig, PortInfo
 from drivers.source import CancellableLink, SampleSource
+from messages.message import message_of
+
+_log = logging.getLogger(__name__)
 
 RECONNECT_TIMEOUT_S = 10.0
-"""A device is looked for so long while the other one goes on; then both count as lost."""
+"""How long one device is looked for while the other goes on; after it both count as lost."""
 _SILENT_S = 3.0
-_STOOD_S = 2.0
-"""One read of a device that is asked may take a second: whoever comes back later stood still."""
+"""A device that sends nothing for so long is reconnected."""
+_STALL_S = 2.0
+"""A read of a polled device takes up to a second: after more, this computer stood still."""
 _SILENT_SAMPLES = 5.0
-_AGAIN_S = 0.2
+_RETRY_S = 0.2
 _WAIT_S = 0.05
 _QUEUED_READS = 4096
-_JOINED_READS = 256
-
-
-@dataclass(frozen=True, slots=True)
-class PairPortSettings:
-    """How to open one of the ports."""
-
-    url: str
-    baud: int
-    parity: str = "N"
-
-    def open(self) -> OpenPort:
-        """Open it. Raises DriverError."""
-        return open_port(self.url, self.baud, self.parity)
-
-    def reopen(self, lost: PortInfo) -> OpenPort:
-        """Open the same device again, wherever it is now. Raises DriverError while it is not there."""
-        url = find_replugged(lost)
-        if url is None:
-            raise PortUnavailableError(
-                f"the device of {lost.device} is not there: plug it in again, into the same socket"
-            )
-        return open_port(url, self.baud, self.parity)
+_MAX_READS = 256
 
 
 class PairLink:
-    """Reads of both ports in envelopes, in the order in which they came; make it with `open_pair`.
+    """Reads of both ports in envelopes, in order of arrival; made by `open_pair`.
 
-    A device that is gone, or silent, is looked for while the other one is read on; an empty envelope stands
-    where its link was broken.
+    A device that is gone or silent is reconnected while the other one is read; an empty envelope marks where
+    its connection broke.
 
     Parameters
     ----------
     ports : pair of OpenPort
         Open, of gauge 1 and gauge 2; closed here.
-    choices : pair of PortChoice
+    configs : pair of PortConfig
     sources : pair of SampleSource
-        Their `start`, `read`, `resume` and `stop` are called from the thread of their port.
+        Called from the thread of their port.
     is_resumed : bool
-        The devices were started before.
+        Whether the devices were started before.
     """
 
     def __init__(
         self,
         ports: tuple[OpenPort, OpenPort],
-        choices: tuple[PairPortSettings, PairPortSettings],
+        configs: tuple[PortConfig, PortConfig],
         sources: tuple[SampleSource, SampleSource],
         *,
         is_resumed: bool = False,
@@ -73,7 +55,7 @@ class PairLink:
         self._reads: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._readers = [
             _ChannelReader(gauge, *half, self._reads, is_resumed=is_resumed)
-            for gauge, half in enumerate(zip(ports, choices, sources, strict=True))
+            for gauge, half in enumerate(zip(ports, configs, sources, strict=True))
         ]
         self._is_ending = False
         for reader in self._readers:
@@ -81,12 +63,12 @@ class PairLink:
 
     @property
     def infos(self) -> tuple[PortInfo, PortInfo]:
-        """What is known of each port, to open both again."""
+        """Each port, to open both again."""
         return self._readers[0].info, self._readers[1].info
 
     @property
     def info(self) -> PortInfo:
-        """Both ports by their addresses, with what is known of their USB devices."""
+        """Both ports in one description."""
         return PortInfo(" + ".join(reader.info.identity for reader in self._readers))
 
     @property
@@ -95,12 +77,12 @@ class PairLink:
         return " + ".join(reader.info.device for reader in self._readers)
 
     def read(self) -> bytes:
-        """Wait at most 50 ms for the first envelope and return all that are there.
+        """Wait at most 50 ms for the first envelope and return all that wait.
 
         Raises
         ------
         DeviceLostError
-            If one of the devices is gone and was not back in 10 s.
+            If one of the devices was not back within 10 s.
         QueueFullError
             If thousands of reads wait.
         DriverError
@@ -109,15 +91,17 @@ class PairLink:
         failure = next(filter(None, (reader.failure for reader in self._readers)), None)
         if failure is not None and self._is_ending:
             raise failure
-        self._is_ending = failure is not None  # what came before it is handed on first
+        self._is_ending = failure is not None  # reads before the failure are returned first
         return b"".join(self._waiting())
 
     def write(self, data: bytes) -> None:
-        """Refuse: each device is spoken to through its own port."""
-        raise DriverError(f"{len(data)} bytes cannot be sent to two devices at once: use their own links")
+        """Not supported: each device has its own link. Raises DriverError."""
+        raise DriverError(
+            "{count} bytes cannot be sent to two devices at once: use their own links", count=len(data)
+        )
 
     def close(self) -> None:
-        """Stop both devices and give both ports up; may be called twice."""
+        """Stop both devices and close both ports; may be called twice."""
         for reader in self._readers:
             reader.ask_to_stop()
         for reader in self._readers:
@@ -128,21 +112,21 @@ class PairLink:
             parts = [self._reads.get(timeout=_WAIT_S)]
         except queue.Empty:
             return []
-        while len(parts) < _JOINED_READS and not self._reads.empty():
+        while len(parts) < _MAX_READS and not self._reads.empty():
             parts.append(self._reads.get_nowait())
         return parts
 
 
 def open_pair(
-    choices: tuple[PairPortSettings, PairPortSettings],
+    configs: tuple[PortConfig, PortConfig],
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
-    """Open both ports and let both devices be started.
+    """Open both ports and start both devices.
 
     Parameters
     ----------
-    choices : pair of PortChoice
+    configs : pair of PortConfig
     sources : pair of SampleSource
     lost : pair of PortInfo, optional
         What the ports were before the link was lost.
@@ -154,23 +138,23 @@ def open_pair(
     """
     ports: list[OpenPort] = []
     try:
-        for gauge, choice in enumerate(choices):
-            ports.append(_opened(gauge, choice, lost[gauge] if lost else None))
+        for gauge, config in enumerate(configs):
+            ports.append(_opened(gauge, config, lost[gauge] if lost else None))
     except BaseException:
         for port in ports:
             port.close()
         raise
-    return PairLink((ports[0], ports[1]), choices, sources, is_resumed=lost is not None)
+    return PairLink((ports[0], ports[1]), configs, sources, is_resumed=lost is not None)
 
 
 class _ChannelReader:
-    """One port with its thread: starts the device, reads it, stamps what came, finds it again."""
+    """Thread of one port: starts the device, reads it, stamps what came, reconnects it."""
 
     def __init__(
         self,
         gauge: int,
         port: OpenPort,
-        choice: PairPortSettings,
+        config: PortConfig,
         source: SampleSource,
         reads: "queue.SimpleQueue[bytes]",
         *,
@@ -180,7 +164,7 @@ class _ChannelReader:
         self.failure: DriverError | None = None
         self._gauge = gauge
         self._port: OpenPort | None = port
-        self._choice = choice
+        self._config = config
         self._source = source
         self._reads = reads
         self._is_resumed = is_resumed
@@ -192,11 +176,11 @@ class _ChannelReader:
         self._thread.start()
 
     def ask_to_stop(self) -> None:
-        """Let the thread end after the read under way."""
+        """End the thread after the read under way."""
         self._stopping.set()
 
     def join(self) -> None:
-        """Wait for the end of the thread, stop the device, and give the port up."""
+        """Wait for the end of the thread, stop the device, and close the port."""
         self._thread.join()
         if self._port is not None:
             self._source.stop(self._port)
@@ -212,8 +196,14 @@ class _ChannelReader:
                 self._reconnect()
         except DriverError as error:
             self.failure = _with_gauge(self._gauge, error)
-        except Exception as error:  # a thread that dies unseen would be a device silent for ever
-            self.failure = DriverError(f"gauge {self._gauge + 1}: reading {type(error).__name__}: {error}")
+        except Exception as error:  # a dead thread would look like a silent device
+            _log.exception("reader of gauge %d failed", self._gauge + 1)
+            self.failure = DriverError(
+                "gauge {gauge}: reading {kind}: {fault}",
+                gauge=self._gauge + 1,
+                kind=type(error).__name__,
+                fault=message_of(error),
+            )
 
     def _start_device(self, port: OpenPort, *, is_resumed: bool) -> None:
         link = CancellableLink(port, self._stopping)
@@ -225,7 +215,7 @@ class _ChannelReader:
         port = self._port
         if port is None:
             return
-        silent = ActiveTimer(_STOOD_S)
+        silent = ActiveTimer(_STALL_S)
         limit_s = max(_SILENT_S, _SILENT_SAMPLES / self._source.rate_hz)
         with contextlib.suppress(DeviceLostError):
             while not self._stopping.is_set():
@@ -237,9 +227,10 @@ class _ChannelReader:
                     break
 
     def _reconnect(self) -> None:
-        """Look for the device until it is back. Raises DeviceLostError when it stays away."""
+        """Look for the device until it is back. Raises DeviceLostError after 10 s."""
         if self._stopping.is_set() or self._port is None:
             return
+        _log.warning("device of gauge %d lost, looking for it", self._gauge + 1)
         self._put(b"")
         self._port.close()
         self._port = None
@@ -250,14 +241,16 @@ class _ChannelReader:
             except DriverError as error:
                 if host_ns() - lost_ns > RECONNECT_TIMEOUT_S * 1e9:
                     raise DeviceLostError(
-                        f"it was not back within {RECONNECT_TIMEOUT_S:g} s ({error})"
+                        "it was not back within {timeout_s:g} s ({fault})",
+                        timeout_s=RECONNECT_TIMEOUT_S,
+                        fault=error,
                     ) from error
             else:
                 return
-            self._stopping.wait(_AGAIN_S)
+            self._stopping.wait(_RETRY_S)
 
     def _reopen(self) -> None:
-        port = self._choice.reopen(self.info)
+        port = self._config.reopen(self.info)
         try:
             self._start_device(port, is_resumed=True)
         except BaseException:
@@ -268,18 +261,19 @@ class _ChannelReader:
     def _put(self, data: bytes) -> None:
         if self._reads.qsize() >= _QUEUED_READS:
             raise QueueFullError(
-                f"this computer is too slow: {_QUEUED_READS} reads wait to be decoded. Close other programs"
+                "this computer is too slow: {count} reads wait to be decoded. Close other programs",
+                count=_QUEUED_READS,
             )
         self._reads.put(wrap(self._gauge, host_ns(), data))
 
 
-def _opened(gauge: int, choice: PairPortSettings, lost: PortInfo | None) -> OpenPort:
+def _opened(gauge: int, config: PortConfig, lost: PortInfo | None) -> OpenPort:
     try:
-        return choice.open() if lost is None else choice.reopen(lost)
+        return config.open() if lost is None else config.reopen(lost)
     except DriverError as error:
         raise _with_gauge(gauge, error) from error
 
 
 def _with_gauge(gauge: int, error: DriverError) -> DriverError:
-    """The same error, which says of which gauge's device it is."""
-    return type(error)(f"gauge {gauge + 1}: {error}")
+    """The same error with the number of the gauge."""
+    return type(error)("gauge {gauge}: {fault}", gauge=gauge + 1, fault=error)

@@ -1,4 +1,4 @@
-"""Readings of two devices laid beside each other, each as it was received."""
+"""Merging of two devices: their times by the host's clock, and rows of nearest readings."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -14,14 +14,15 @@ from drivers.samples import ABSENT, SampleStatus
 Counts = NDArray[np.int32] | NDArray[np.float64]
 
 MAX_WAIT_NS = 250_000_000
-"""A reading waits for its counterpart, by the times of arrival, so long and no longer."""
+"""How long a reading waits for its counterpart, by times of arrival; a balance of delay on the screen against
+readings of a busy computer that come late."""
 _FIRST_MAX_WAIT_NS = 2_000_000_000
-"""The first ones: some decoders must see half a second of bytes before they know the rate."""
+"""The same for the first readings: some decoders need half a second of bytes to know the rate."""
 _KEPT_NS = 10_000_000_000
 MAX_WAITING = 4 * MAX_BLOCK_ROWS
-"""More readings of a gauge do not wait: so many in seconds are no device's, but claims of gaps in rubbish."""
+"""Readings of a gauge that may wait. No device sends more in seconds; garbage can claim gaps of so many."""
 _REACH = 1.5
-"""Periods of a device from one of its readings within which that one is taken."""
+"""A row takes a reading that is no further than so many periods of its device."""
 _OVERLOAD = int(SampleStatus.OVERLOAD_TABLE)
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
@@ -29,15 +30,15 @@ _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChannelSamples:
-    """Consecutive readings of one device, those that stand for lost ones included.
+    """Consecutive readings of one device, lost ones included.
 
     Attributes
     ----------
     host_ns : (n,) int64
-        When they were taken, by the host's clock (ns); never decreasing.
+        Host's time of each reading (ns), never decreasing.
     counts : (n,) int32 or float64
     status : (n,) uint8
-        `SampleStatus` as of a gauge 1.
+        `SampleStatus`, flags as of gauge 1.
     """
 
     host_ns: NDArray[np.int64]
@@ -48,11 +49,11 @@ class ChannelSamples:
         return len(self.status)
 
     def take(self, which: slice | NDArray[np.int64]) -> "ChannelSamples":
-        """Some of them."""
+        """A part of them."""
         return ChannelSamples(self.host_ns[which], self.counts[which], self.status[which])
 
     def append(self, more: "ChannelSamples") -> "ChannelSamples":
-        """These and those after them, none earlier than the one before it."""
+        """These followed by `more`, whose times are raised where they would decrease."""
         host_ns = np.maximum.accumulate(more.host_ns)
         if len(self):
             host_ns = np.maximum(host_ns, self.host_ns[-1])
@@ -76,9 +77,9 @@ class MergedRows:
     status : (n,) uint8
         `SampleStatus` flags.
     lag_ns : (n,) int64
-        By how much later the reading of gauge 2 was taken than that of gauge 1.
+        Time of gauge 2 minus time of gauge 1.
     is_paired : (n,) bool
-        Both are there.
+        Whether both readings exist.
     """
 
     counts: Counts
@@ -91,16 +92,15 @@ class MergedRows:
 
 
 class Merger:
-    """Gives each reading of one gauge the nearest one of the other.
+    """Pairs each reading of one gauge with the nearest one of the other.
 
     A row is ready as soon as the other gauge has a reading that is not earlier, or has had none for 0.25 s.
-    What it becomes depends on the readings and their times of arrival alone, so that the same reads give the
-    same rows however they are cut.
+    Rows depend on readings and times of arrival alone, so the same reads give the same rows in any cut.
 
     Parameters
     ----------
     base : int
-        Whose readings make the rows: 0 for gauge 1, 1 for gauge 2.
+        Gauge whose readings make the rows: 0 for gauge 1, 1 for gauge 2.
     other_period_s : float
         Nominal time between two readings of the other gauge (s).
     """
@@ -113,11 +113,11 @@ class Merger:
 
     @property
     def buffered(self) -> int:
-        """Readings that are kept: tenths of a second of one gauge, at most 10 s of the other; never many."""
+        """Readings in memory: tenths of a second of one gauge, at most 10 s of the other."""
         return sum(map(len, self._waiting))
 
     def add(self, gauge: int, readings: ChannelSamples) -> None:
-        """Take the next readings of a gauge. Of those that nothing is laid beside yet the oldest may go."""
+        """Add the next readings of a gauge. The oldest of those that wait may be dropped."""
         held = self._waiting[gauge].append(readings)
         if gauge != self._base and len(held):
             self._patience_ns = MAX_WAIT_NS
@@ -126,7 +126,7 @@ class Merger:
         self._waiting[gauge] = held
 
     def is_overdue(self, now_ns: int) -> bool:
-        """Tell whether a row has waited long enough, when something came at `now_ns`: `take` it then."""
+        """Whether a row has waited long enough at the arrival `now_ns`."""
         waiting = self._waiting[self._base]
         return bool(len(waiting)) and bool(waiting.host_ns[0] < now_ns - self._patience_ns)
 
@@ -165,35 +165,36 @@ class Merger:
         )
 
     def _nothing(self, rows: ChannelSamples) -> ChannelSamples:
-        """Readings that are too far from `rows` to be taken."""
+        """Readings too far from `rows` to be paired with them."""
         return ChannelSamples(rows.host_ns - 2 * self._reach_ns, rows.counts, np.zeros_like(rows.status))
 
 
 def _nearest(wanted: NDArray[np.int64], offered: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Place in `offered` (m,), m >= 1, sorted, of what is nearest to each of `wanted` (n,)."""
+    """Index in `offered` (m,), m >= 1, sorted, of the nearest to each of `wanted` (n,)."""
     after = np.clip(np.searchsorted(offered, wanted), 1, max(len(offered) - 1, 1))
     after = np.minimum(after, len(offered) - 1)
     before = np.maximum(after - 1, 0)
     return np.where(wanted - offered[before] <= offered[after] - wanted, before, after)
 
 
-_CELL_NS = 150_000_000
-_REACH_NS = 6_000_000_000
-_MIN_CELLS = 8
+_WINDOW_NS = 150_000_000
+_SPAN_NS = 6_000_000_000
+"""The fit takes the earliest arrival of each window of the last 6 s: long enough for 0.1 ms, and so short
+that a replay from the middle of a stream soon agrees with the live decoder."""
+_MIN_WINDOWS = 8
 _LEAP_NS = 100_000_000
 _LEAP = 0.02
-"""A clock is ahead of what is known of it by no more than this, and by this part of the time since."""
+"""A clock that is ahead of its fit by more than this, plus this share of the time since, has leapt."""
 
 _Point: TypeAlias = tuple[float, int]
-"""Device's own time (s) of the last reading of a read, and host's time (ns) after that."""
+"""Device's own time (s) of the last reading of a read, and host's time (ns) after the read."""
 
 
 class HostTimeFit:
-    """Host's time of a device's readings, by the device's own count or clock.
+    """Converts a device's own times to the host's clock.
 
-    A read arrives late by what system and wire add, never early. So of each 0.15 s only the most punctual
-    read counts, and a line through those of the last 6 s tells host's time from the device's own. It
-    forgets what is older, so that a replay that begins amid a stream soon says the same as was said live.
+    A read arrives late by what system and wire add, never early. So only the earliest arrival of each 0.15 s
+    counts, and a line through those of the last 6 s gives the host's time.
     """
 
     def __init__(self) -> None:
@@ -204,29 +205,29 @@ class HostTimeFit:
 
     @property
     def scatter_s(self) -> float:
-        """How late the punctual reads were, as root mean square about the line (s); 0 while unknown."""
+        """Root mean square of the residuals of the line (s); 0 while unknown."""
         return 0.0 if self._line is None else self._line.scatter
 
     def reset(self) -> None:
-        """The link was broken, or the device began anew: its own time may mean another from here on."""
+        """Forget all times: the connection broke or the device restarted, and its time may have changed."""
         self._points.clear()
         self._best = self._line = None
 
     def add(self, device_s: float, arrival_ns: int) -> None:
-        """Take the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
+        """Add the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
         point = (device_s, arrival_ns)
         if self._leaps(point):
             self.reset()
-        if self._best is None or _cell(point) > _cell(self._best):
-            self._close_cell(arrival_ns)
+        if self._best is None or _window(point) > _window(self._best):
+            self._close_window(arrival_ns)
             self._best = point
         elif _late_ns(point) < _late_ns(self._best):
             self._best = point
 
     def host_ns(self, device_s: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Host's time (ns) of readings (n,) at the device's own times (s), as far as is known by now.
+        """Host's time (ns) of readings (n,) at the device's own times (s).
 
-        It includes what the most punctual read took to arrive, which nothing here can tell.
+        It includes the shortest delay of delivery, which cannot be measured here.
         """
         own_origin_s, origin_ns = self._nearest() if self._line is None else self._origin
         since_s = device_s - own_origin_s
@@ -235,7 +236,7 @@ class HostTimeFit:
         return origin_ns + np.rint(since_s * 1e9).astype(np.int64)
 
     def _leaps(self, point: _Point) -> bool:
-        """Tell whether a reading would have been taken after it came: the device's clock leapt ahead."""
+        """Whether the device's clock leapt ahead: a reading would have been taken after it came."""
         if self._best is None:
             return False
         own_s, arrival_ns = point
@@ -243,27 +244,27 @@ class HostTimeFit:
         return early_ns > _LEAP_NS + _LEAP * (arrival_ns - self._best[1])
 
     def _nearest(self) -> _Point:
-        """What to go by while there are too few cells for a line: the latest one that is whole."""
+        """Reference while there are too few windows for a line: that of the last complete window."""
         return self._points[-1] if self._points else self._best or (0.0, 0)
 
-    def _close_cell(self, now_ns: int) -> None:
+    def _close_window(self, now_ns: int) -> None:
         if self._best is not None:
             self._points.append(self._best)
-        while self._points and self._points[0][1] < now_ns - _REACH_NS:
+        while self._points and self._points[0][1] < now_ns - _SPAN_NS:
             self._points.popleft()
         self._line = None
-        if len(self._points) >= _MIN_CELLS:
+        if len(self._points) >= _MIN_WINDOWS:
             self._refit()
 
     def _refit(self) -> None:
         self._origin = own_s, origin_ns = self._points[-1]
-        since_s = np.array([cell_s - own_s for cell_s, _ in self._points])
+        since_s = np.array([point_s - own_s for point_s, _ in self._points])
         late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._points]) - since_s
         self._line = fit_robust_line(since_s, late_s)
 
 
-def _cell(point: _Point) -> int:
-    return point[1] // _CELL_NS
+def _window(point: _Point) -> int:
+    return point[1] // _WINDOW_NS
 
 
 def _late_ns(point: _Point) -> float:

@@ -1,12 +1,23 @@
-"""The simulated device: paced by a clock of its own, never waiting for whoever reads it."""
+"""The simulated device, paced by a clock of its own; it never waits for its reader."""
 
+import logging
+import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
 
 from drivers.errors import SettingsError
-from drivers.simulated.commands import Command, CommandKind
-from drivers.simulated.disturbances import Disturbance, DisturbanceKind, DisturbanceSchedule
-from drivers.simulated.faults import FaultRates, FrameDamager
+from drivers.simulated.faults import (
+    Disturbance,
+    DisturbanceKind,
+    DisturbanceSchedule,
+    FaultRates,
+    FrameDamager,
+)
+from drivers.simulated.protocol import Command, CommandKind, PolledProtocol, SimulatedProtocol
 from drivers.simulated.stream_sender import (
     DeviceClock,
     Signal,
@@ -16,36 +27,39 @@ from drivers.simulated.stream_sender import (
     WireOutput,
 )
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import SimulatedProtocol
 
+_log = logging.getLogger(__name__)
 _SEQUENCES = 1 << 32
+
+SignalFactory: TypeAlias = Callable[[float, float], Signal]
+"""Makes the signal of a new stream from samples a second and first sample, both on the stand's time."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceSetup:
-    """What a simulated device is like.
+    """Properties of a simulated device.
 
     Attributes
     ----------
     rate_hz : float
-        Sample rate at power-on (Hz), as the device says it.
+        Sample rate at power-on (Hz), as the device reports it.
     clock_ppm : float
         How much the device's clock is fast (1e-6).
     rate_error : float
-        By what fraction it samples faster than it says, its times being right.
+        Fraction by which it samples faster than it reports; its times are right.
     first_sequence : int
-        Number of sample 0, which counts on modulo 2**32.
+        Number of sample 0; it wraps at 2**32.
     first_time_s : float
-        What its clock reads at sample 0 (s).
+        Device's clock at sample 0 (s).
     faults : FaultRates
-        Damage done to its frames.
+        Damage to its frames.
     disturbances : tuple of Disturbance
-        What happens to it, counted from the start of a session.
+        Planned for each session.
     seed : int or None
         Makes the damage repeatable.
     began_ns : int or None
-        Host's monotonic time at which the stand's own time is 0 for good, so that several devices show one
-        motion; None begins with each session.
+        Host's monotonic time at which the stand's own time is 0, which makes several devices show one motion;
+        None: the stand's time begins with each session.
     """
 
     rate_hz: float
@@ -61,28 +75,38 @@ class DeviceSetup:
     def __post_init__(self) -> None:
         if not 0 <= self.first_sequence < _SEQUENCES:
             raise SettingsError(
-                f"first_sequence {self.first_sequence} is no counter: give 0 to {_SEQUENCES - 1}"
+                "first_sequence {value} is no counter: give 0 to {most}",
+                value=self.first_sequence,
+                most=_SEQUENCES - 1,
             )
 
 
+def make_device(
+    transport: Transport, protocol: SimulatedProtocol, signal_at: SignalFactory, setup: DeviceSetup
+) -> "SimulatedDevice":
+    """The device for a protocol: one that sends, or one that is polled."""
+    if isinstance(protocol, PolledProtocol):
+        return PolledDevice(transport, protocol, signal_at, setup)
+    return SimulatedDevice(transport, protocol, signal_at, setup)
+
+
 class SimulatedDevice:
-    """Firmware of the simulated amplifier; `step` it as often as it asks.
+    """Firmware of the simulated amplifier. The caller runs `step` as often as it asks for.
 
-    Sample k is taken at k / rate of the device's own clock, counted from the start of the stream. A
-    stream starts when asked for, or with the opening of the port.
+    Sample k is taken at k / rate of the device's own clock, counted from the start of the stream. A stream
+    starts by command, or when the port is opened.
 
-    The stand's own time begins with a session, which is a stream that is started afresh. A stream that
-    is started after the one before was torn (cable, power, or a reader that left without a word) goes on
-    with the session: the stand has not waited. One that began by itself then may be stopped and started once.
+    The stand's own time begins with a session, which is a stream that is started afresh. A stream that is
+    started after the last one was interrupted (cable, power, or a reader that left without a command)
+    continues the session, because the stand does not wait. A stream that resumed by itself may be stopped and
+    started once within the session.
 
     Parameters
     ----------
     transport : Transport
-        Where bytes go and commands come from.
-    packing : Packing
-        Protocol spoken.
+    protocol : SimulatedProtocol
     signal_at : callable (rate_hz, started_s)
-        Makes the signal of a new stream: samples a second and first sample, both on the stand's time.
+        See `SignalFactory`.
     setup : DeviceSetup
     """
 
@@ -91,20 +115,20 @@ class SimulatedDevice:
     def __init__(
         self,
         transport: Transport,
-        packing: SimulatedProtocol,
-        signal_at: Callable[[float, float], Signal],
+        protocol: SimulatedProtocol,
+        signal_at: SignalFactory,
         setup: DeviceSetup,
     ) -> None:
         self._transport = transport
-        self._packing = packing
+        self._protocol = protocol
         self._signal_at = signal_at
         self._setup = setup
         self._rate_hz = setup.rate_hz
-        self._script = DisturbanceSchedule(setup.disturbances)
-        damager = FrameDamager(setup.faults, packing.line_end, setup.seed)
-        self._line = WireOutput(transport, packing, damager, self._script)
-        self._commands = packing.command_parser()
-        self._reader_is_there = False
+        self._schedule = DisturbanceSchedule(setup.disturbances)
+        damager = FrameDamager(setup.faults, protocol.line_end, setup.seed)
+        self._output = WireOutput(transport, protocol, damager, self._schedule)
+        self._parser = protocol.command_parser()
+        self._has_reader = False
         self._cable_fault: DisturbanceKind | None = None
         self._stream: Stream | None = None
         self._was_interrupted = False
@@ -113,52 +137,53 @@ class SimulatedDevice:
         self.log = TransmissionLog(setup.rate_hz, setup.rate_hz)
         """Of the running stream, or of the last one."""
         self.earlier_logs: list[TransmissionLog] = []
-        """Of the streams of this session before that one."""
+        """Of earlier streams of this session."""
         self.streams = 0
         """Streams started until now."""
 
     @property
     def is_streaming(self) -> bool:
-        """Tell whether samples are being sent."""
+        """Whether samples are being sent."""
         return self._stream is not None
 
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
-        """What is planned for this session and what was asked for in it, with its times."""
-        return self._script.disturbances
+        """Those of this session, planned or requested, with their times."""
+        return self._schedule.disturbances
 
     @property
     def is_plugged_in(self) -> bool:
-        """Tell whether there is a port."""
+        """Whether there is a port."""
         return self._cable_fault is None
 
     def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
-        """Let something happen, at its time or at once."""
-        self._script.add(disturbance, self._time_s(now_ns))
+        """Add a disturbance, at its time or at once."""
+        _log.info("disturbance: %s", disturbance)
+        self._schedule.add(disturbance, self._time_s(now_ns))
 
     def step(self, now_ns: int) -> float:
-        """Do what is due at `now_ns` of the host's monotonic clock; return seconds to wait at most."""
+        """Do what is due at `now_ns` of the host's monotonic clock; returns seconds to wait at most."""
         self._follow_cable(now_ns)
         received = self._transport.receive()
         if received is None:
-            self._note_absent_reader()
+            self._lose_reader()
         else:
-            self._receive_commands(received, now_ns)
-        return self._stream.send_due(now_ns, self._reader_is_there) if self._stream else self._NO_STREAM_S
+            self._receive(received, now_ns)
+        return self._stream.send_due(now_ns, self._has_reader) if self._stream else self._NO_STREAM_S
 
     def _time_s(self, now_ns: int) -> float:
-        """The stand's own time; before the first session, since the first step."""
+        """The stand's own time; before the first session, time since the first step."""
         if self._session_ns is None:
             self._session_ns = now_ns
         return (now_ns - self._session_ns) * 1e-9
 
     def _follow_cable(self, now_ns: int) -> None:
-        fault = self._script.cable_fault(self._time_s(now_ns))
+        fault = self._schedule.cable_fault(self._time_s(now_ns))
         if fault is self._cable_fault:
             return
         if self._cable_fault is None:
             self._transport.unplug()
-            self._reader_is_there = False
+            self._has_reader = False
             self._was_interrupted = self._was_interrupted or self.is_streaming
         if fault is DisturbanceKind.POWER:
             self._stream = None
@@ -167,45 +192,43 @@ class SimulatedDevice:
             self._transport.plug_in()
         self._cable_fault = fault
 
-    def _note_absent_reader(self) -> None:
-        if not self._reader_is_there:
+    def _lose_reader(self) -> None:
+        if not self._has_reader:
             return
-        self._reader_is_there = False
+        self._has_reader = False
         if self._transport.resets_device:
             self._stream = None
         self._was_interrupted = self.is_streaming
 
-    def _receive_commands(self, received: bytes, now_ns: int) -> None:
-        if not self._reader_is_there:
-            self._reader_is_there = True
-            self._commands = self._packing.command_parser()
-            if self._packing.streams_on_open and self._stream is None:
-                was_torn = self._was_interrupted
+    def _receive(self, received: bytes, now_ns: int) -> None:
+        if not self._has_reader:
+            self._has_reader = True
+            self._parser = self._protocol.command_parser()
+            if self._protocol.streams_on_open and self._stream is None:
+                was_interrupted = self._was_interrupted
                 self._start(now_ns)
-                self._resumed_by_itself = was_torn
-        for command in self._commands.feed(received):
+                self._resumed_by_itself = was_interrupted
+        for command in self._parser.feed(received):
             self._respond(command, self._execute(command, now_ns), now_ns)
 
     def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
-        answer = self._packing.respond(command, is_done, self._rate_hz)
-        if answer and not self._is_silent(now_ns):
+        answer = self._protocol.respond(command, is_done, self._rate_hz)
+        is_stalled = self._schedule.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
+        if answer and not is_stalled:
             self._transport.send(answer)
 
     def _execute(self, command: Command, now_ns: int) -> bool:
-        """Do what is asked for; tell whether it can be."""
+        """Execute a command; returns whether it is possible."""
         match command.kind:
             case CommandKind.START if self._stream is None:
                 self._start(now_ns)
             case CommandKind.STOP:
                 self._stream = None
             case CommandKind.RATE:
-                is_possible = self._stream is None and 1.0 <= command.rate_hz <= self._packing.max_rate_hz
+                is_possible = self._stream is None and 1.0 <= command.rate_hz <= self._protocol.max_rate_hz
                 self._rate_hz = command.rate_hz if is_possible else self._rate_hz
                 return is_possible
         return True
-
-    def _is_silent(self, now_ns: int) -> bool:
-        return self._script.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
 
     def _start(self, now_ns: int) -> None:
         if self._was_interrupted or self._resumed_by_itself:
@@ -213,19 +236,110 @@ class SimulatedDevice:
         else:
             self.earlier_logs = []
             self._session_ns = now_ns if self._setup.began_ns is None else self._setup.began_ns
-            self._script.restart()
+            self._schedule.restart()
         self._was_interrupted = self._resumed_by_itself = False
         self.streams += 1
-        self._stream = self._new_stream(now_ns)
-
-    def _new_stream(self, now_ns: int) -> Stream:
-        setup = self._setup
-        device_rate_hz = self._rate_hz * (1.0 + setup.rate_error)
-        true_rate_hz = device_rate_hz * (1.0 + setup.clock_ppm * 1e-6)
+        device_rate_hz = self._rate_hz * (1.0 + self._setup.rate_error)
+        true_rate_hz = device_rate_hz * (1.0 + self._setup.clock_ppm * 1e-6)
         self.log = TransmissionLog(self._rate_hz, true_rate_hz, self._time_s(now_ns))
         signal = self._signal_at(true_rate_hz, self.log.started_s)
-        return self._make_stream(signal, device_rate_hz, now_ns)
+        self._stream = self._make_stream(signal, device_rate_hz, now_ns)
 
     def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:
         clock = DeviceClock(device_rate_hz, self._setup.first_sequence, self._setup.first_time_s)
-        return StreamSender(self._line, signal, clock, self.log, now_ns)
+        return StreamSender(self._output, signal, clock, self.log, now_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class _PendingRequest:
+    """A request that is complete at `due_ns`."""
+
+    due_ns: int
+    command: Command
+    is_done: bool
+
+
+class PolledDevice(SimulatedDevice):
+    """A `SimulatedDevice` that answers requests; faults damage its answers, which its log counts as frames.
+
+    A request is on the wire for as long as its bytes take. Then the registers are read, and the answer is
+    there when its own bytes have passed.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        protocol: PolledProtocol,
+        signal_at: SignalFactory,
+        setup: DeviceSetup,
+    ) -> None:
+        super().__init__(transport, protocol, signal_at, setup)
+        self._registers = protocol
+        self._requests: deque[_PendingRequest] = deque()
+        self._answers: deque[tuple[int, bytes]] = deque()
+
+    def step(self, now_ns: int) -> float:
+        """Do what is due at `now_ns` of the host's monotonic clock; returns seconds to wait at most."""
+        wait_s = super().step(now_ns)
+        if not self._has_reader:
+            self._requests.clear()
+            self._answers.clear()
+        while self._requests and self._requests[0].due_ns <= now_ns:
+            self._answer(self._requests.popleft())
+        while self._answers and self._answers[0][0] <= now_ns:
+            self._transport.send(self._answers.popleft()[1])
+        due_ns = [request.due_ns for request in self._requests] + [due for due, _ in self._answers]
+        return max(0.0, min([wait_s, *((due - now_ns) * 1e-9 for due in due_ns)]))
+
+    def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
+        on_wire_s = self._registers.request_bytes(command) * self._registers.byte_s
+        self._requests.append(_PendingRequest(now_ns + round(on_wire_s * 1e9), command, is_done))
+
+    def _answer(self, request: _PendingRequest) -> None:
+        answer = self._protocol.respond(request.command, request.is_done, self._rate_hz)
+        if not answer:
+            return
+        sent, fault = self._output.distort(answer, self._time_s(request.due_ns))
+        self.log.add(0, fault)
+        self.log.bytes_sent += len(sent)
+        if sent:
+            takes_s = self._registers.turnaround_s + len(sent) * self._registers.byte_s
+            self._answers.append((request.due_ns + round(takes_s * 1e9), sent))
+
+    def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:  # noqa: ARG002
+        return RegisterUpdater(self._registers, signal, self.log, now_ns)
+
+
+class RegisterUpdater:
+    """Takes samples at their rate into the registers of a polled device; its `Stream`.
+
+    Parameters
+    ----------
+    registers : PolledProtocol
+    signal : Signal
+    log : TransmissionLog
+        Its samples are counted here, its answers as frames by the device.
+    started_ns : int
+        Host's monotonic time of sample 0.
+    """
+
+    _INTERVAL_S = 0.02
+
+    def __init__(
+        self, registers: PolledProtocol, signal: Signal, log: TransmissionLog, started_ns: int
+    ) -> None:
+        self._registers = registers
+        self._signal = signal
+        self._log = log
+        self._started_ns = started_ns
+
+    def send_due(self, now_ns: int, has_reader: bool) -> float:  # noqa: ARG002 - registers need no reader
+        """Take the samples that are due; returns seconds until the next call, requests or not."""
+        rate_hz = self._log.true_rate_hz
+        due = math.floor((now_ns - self._started_ns) * 1e-9 * rate_hz) + 1 - self._log.samples
+        if due > 0:
+            counts, status = self._signal.take(due)
+            self._registers.store_sample(counts[-1], int(status[-1]))
+            self._log.samples += due
+            self._log.samples_clipped += int(np.count_nonzero(status))
+        return self._INTERVAL_S

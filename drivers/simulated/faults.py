@@ -1,9 +1,14 @@
-"""Damage done to frames on their way: bytes dropped, bits flipped and ends cut off, as often as asked."""
+"""Faults of the simulated device: damaged frames at random, and disturbances at given times."""
 
 import math
 import random
-from dataclasses import asdict, dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drivers.errors import SettingsError
 
@@ -14,26 +19,26 @@ class FrameFault(StrEnum):
     DROP = "drop"
     """A byte is missing, or the end of a line."""
     FLIP = "flip"
-    """A bit is wrong, or the end of a line is not one."""
+    """A bit is wrong, or the end of a line is another character."""
     TRUNCATE = "truncate"
     """Its end is missing."""
     MERGED = "merged"
-    """The line before lost its end, and ran into this one."""
+    """The line before lost its end and runs into this one."""
     GARBAGE = "rubbish"
-    """Random bytes went out instead."""
+    """Random bytes were sent instead."""
     CUT = "cut"
     """The port did not take all of it."""
     NO_READER = "unheard"
-    """Nobody had the port open."""
+    """No reader had the port open."""
     STALL = "stall"
-    """The device said nothing."""
+    """The device sent nothing."""
 
 
 LOSING_FAULTS = (FrameFault.CUT, FrameFault.NO_READER, FrameFault.STALL)
-"""Faults that leave nothing, or not all, of a frame on the wire."""
+"""Faults after which a frame is not on the wire, or not all of it."""
 
 LASTING_FAULTS = (FrameFault.NO_READER, FrameFault.STALL, FrameFault.GARBAGE)
-"""Faults that take frame after frame."""
+"""Faults that last for many frames."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,61 +52,195 @@ class FaultRates:
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             if not (math.isfinite(value) and value >= 0.0):
-                raise SettingsError(f"{name} = {value:g} is no fraction of the frames: give 0 to 1")
+                raise SettingsError(
+                    "{name} = {value:g} is no fraction of the frames: give 0 to 1", name=name, value=value
+                )
         if self.drop + self.flip + self.truncate > 1.0:
-            said = ", ".join(f"{name} {value:g}" for name, value in asdict(self).items())
-            raise SettingsError(f"{said} are more than all frames: give 1 at most together")
+            raise SettingsError(
+                "drop {drop:g}, flip {flip:g}, truncate {truncate:g} are more than all frames:"
+                " give 1 at most together",
+                **asdict(self),
+            )
 
 
 class FrameDamager:
-    """Damages frames at random, repeatably for one `seed`."""
+    """Damages frames at random; the same `seed` gives the same damage."""
 
     def __init__(self, rates: FaultRates, line_end: bytes, seed: int | None) -> None:
         self._rates = rates
         self._line_end = line_end
         self._random = random.Random(seed)
         self.is_line_open = False
-        """The line that went out last waits for its end."""
+        """Whether the last line was sent without its end."""
 
     def damage(self, frame: bytes) -> tuple[bytes, FrameFault | None]:
-        """Return the frame as the wire carries it, and what happened to it."""
-        merged, self.is_line_open = self.is_line_open, False
+        """Bytes of a frame on the wire, and what happened to it."""
+        is_merged, self.is_line_open = self.is_line_open, False
         rates = self._rates
         draw = self._random.random()
         if draw < rates.drop:
-            return self._without_a_byte(frame), FrameFault.DROP
+            return self._drop_byte(frame), FrameFault.DROP
         if draw < rates.drop + rates.flip:
-            return self._with_a_wrong_bit(frame), FrameFault.FLIP
+            return self._flip_bit(frame), FrameFault.FLIP
         if draw < rates.drop + rates.flip + rates.truncate:
-            return self._cut_short(frame), FrameFault.TRUNCATE
-        return frame, FrameFault.MERGED if merged else None
+            return self._truncate(frame), FrameFault.TRUNCATE
+        return frame, FrameFault.MERGED if is_merged else None
 
     def garbage(self, frame: bytes) -> tuple[bytes, FrameFault]:
-        """Return random bytes in place of a frame."""
+        """Random bytes in place of a frame."""
         data = self._random.randbytes(len(frame))
         self.is_line_open = bool(self._line_end) and data[-1] not in self._line_end
         return data, FrameFault.GARBAGE
 
-    def _without_a_byte(self, frame: bytes) -> bytes:
-        at = self._place(frame)
+    def _drop_byte(self, frame: bytes) -> bytes:
+        at = self._choose_byte(frame)
         return frame[:at] if self.is_line_open else frame[:at] + frame[at + 1 :]
 
-    def _with_a_wrong_bit(self, frame: bytes) -> bytes:
-        at = self._place(frame)
+    def _flip_bit(self, frame: bytes) -> bytes:
+        at = self._choose_byte(frame)
         if self.is_line_open:
             return frame[:at]
-        # In text, only bits that make another character of it: a case or a blank may pass for the same.
+        # In text, only bits that make another digit or letter: a change of case may mean the same.
         bit = self._random.choice((0, 1, 2, 3, 6)) if self._line_end else self._random.randrange(8)
         return frame[:at] + bytes([frame[at] ^ (1 << bit)]) + frame[at + 1 :]
 
-    def _cut_short(self, frame: bytes) -> bytes:
-        """Leave at least a byte of it, so that it is damaged, not lost; a line loses its end too."""
+    def _truncate(self, frame: bytes) -> bytes:
+        """Keep a byte at least, so that the frame is damaged and not lost; a line loses its end too."""
         self.is_line_open = bool(self._line_end)
         return frame[: self._random.randrange(1, len(frame) - len(self._line_end))]
 
-    def _place(self, frame: bytes) -> int:
-        """Choose a byte; the end of a line counts as one, since either half of it would still end a line."""
+    def _choose_byte(self, frame: bytes) -> int:
+        """Position of a byte; the end of a line counts as one byte, because one half still ends it."""
         content = len(frame) - len(self._line_end)
         at = self._random.randrange(content + bool(self._line_end))
         self.is_line_open = at == content
         return at
+
+
+class DisturbanceKind(StrEnum):
+    """What happens to a device at some time."""
+
+    STALL = "stall"
+    """The device sends nothing; its clock and converter go on."""
+    GARBAGE = "rubbish"
+    """It sends random bytes, as many as its frames would have."""
+    UNPLUG = "unplug"
+    """Its port vanishes and comes back; the device has its own power and goes on."""
+    POWER = "power"
+    """Its port vanishes and comes back, and the device was without power meanwhile."""
+    JUMP = "jump"
+    """The device's time leaps by so many seconds, forward or back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """One disturbance.
+
+    Attributes
+    ----------
+    kind : DisturbanceKind
+    seconds : float or None
+        How long it lasts, None for ever; of a jump, by how much (s), of either sign.
+    at_s : float or None
+        Stand's own time (s), negative before its motion begins; None: at once.
+
+    Raises
+    ------
+    SettingsError
+        For a length that is not positive, or a jump without one.
+    """
+
+    kind: DisturbanceKind
+    seconds: float | None = None
+    at_s: float | None = None
+
+    def __post_init__(self) -> None:
+        seconds = self.seconds
+        if self.kind is DisturbanceKind.JUMP:
+            if seconds is None or not (math.isfinite(seconds) and seconds):
+                raise SettingsError("a jump needs its seconds: give for example 'jump -5 at 3'")
+        elif seconds is not None and not 0.0 < seconds < math.inf:
+            raise SettingsError(
+                "{kind} {seconds:g}: give a positive number of seconds, or none for ever",
+                kind=self.kind,
+                seconds=seconds,
+            )
+
+    @property
+    def end_s(self) -> float:
+        """When it is over; infinite where it lasts for ever."""
+        return math.inf if self.seconds is None else (self.at_s or 0.0) + self.seconds
+
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_KINDS = "|".join(DisturbanceKind)
+_PATTERN = re.compile(rf"({_KINDS})(?:\s+({_NUMBER}))?(?:\s+at\s+({_NUMBER}))?", re.IGNORECASE)
+
+
+def parse_disturbance(text: str) -> Disturbance:
+    """Parse `KIND [SECONDS] [at SECONDS]`, for example `unplug 1.5`, `stall`, `jump -5 at 3`.
+
+    Raises
+    ------
+    SettingsError
+        For anything else.
+    """
+    match = _PATTERN.fullmatch(text.strip())
+    if match is None:
+        raise SettingsError(
+            "{text!r} is no fault that is known: give {kinds}, then how many"
+            " seconds, then 'at' and when, for example 'unplug 1.5 at 4'",
+            text=text.strip(),
+            kinds=list(DisturbanceKind),
+        )
+    kind, seconds, at = match.groups()
+    at_s = None if at is None else float(at)
+    if at_s is not None and not 0.0 <= at_s < math.inf:
+        raise SettingsError(
+            "{kind} at {at_s:g}: give the seconds after the start, from 0 on", kind=kind, at_s=at_s
+        )
+    return Disturbance(DisturbanceKind(kind.lower()), None if seconds is None else float(seconds), at_s)
+
+
+class DisturbanceSchedule:
+    """All disturbances of a device, on the stand's own time.
+
+    Parameters
+    ----------
+    planned : sequence of Disturbance
+        Happen in each session; at its start where they have no time. None before the first session.
+    """
+
+    def __init__(self, planned: Sequence[Disturbance] = ()) -> None:
+        self._planned = tuple(replace(one, at_s=one.at_s or 0.0) for one in planned)
+        self.disturbances: tuple[Disturbance, ...] = ()
+        """Those of this session, each with its time."""
+
+    def restart(self) -> None:
+        """Begin a session: only what is planned will happen."""
+        self.disturbances = self._planned
+
+    def add(self, disturbance: Disturbance, now_s: float) -> None:
+        """Add one, at its time or now."""
+        at_s = now_s if disturbance.at_s is None else disturbance.at_s
+        self.disturbances += (replace(disturbance, at_s=at_s),)
+
+    def cable_fault(self, now_s: float) -> DisturbanceKind | None:
+        """Why there is no port now, POWER or UNPLUG; None while there is one."""
+        return self._first_of((DisturbanceKind.POWER, DisturbanceKind.UNPLUG), now_s)
+
+    def wire_fault(self, time_s: float) -> DisturbanceKind | None:
+        """What happens to a frame whose first sample is taken at `time_s`: STALL, GARBAGE or nothing."""
+        return self._first_of((DisturbanceKind.STALL, DisturbanceKind.GARBAGE), time_s)
+
+    def clock_offset_s(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Error of the device's time by its jumps (s), (n,), at the stand's times (n,)."""
+        offset = np.zeros_like(time_s)
+        for one in self.disturbances:
+            if one.kind is DisturbanceKind.JUMP:
+                offset[time_s >= (one.at_s or 0.0)] += one.seconds or 0.0
+        return offset
+
+    def _first_of(self, kinds: Sequence[DisturbanceKind], time_s: float) -> DisturbanceKind | None:
+        active = [one.kind for one in self.disturbances if (one.at_s or 0.0) <= time_s < one.end_s]
+        return next((kind for kind in kinds if kind in active), None)

@@ -1,4 +1,4 @@
-"""How the simulated device's bytes leave its process: the seam between it and its wire."""
+"""Ports of the simulated device: a pseudo-terminal (POSIX) or TCP (every system)."""
 
 import contextlib
 import errno
@@ -20,46 +20,46 @@ class Transport(Protocol):
 
     @property
     def url(self) -> str:
-        """What a reader opens; the same after the wire was unplugged and came back."""
+        """Address that a reader opens; it does not change when the port is unplugged and comes back."""
 
     @property
     def resets_device(self) -> bool:
-        """True: a reader that leaves the port resets the device, as DTR does. False: it goes on alone."""
+        """Whether a reader that closes the port resets the device, as the DTR line of an Arduino does."""
 
     @property
     def burst_s(self) -> float:
-        """So much of a stream may be sent at once when it is late, for a reader to follow."""
+        """How much of a late stream may be sent at once (s), so that a reader keeps up."""
 
     def wait(self, timeout_s: float) -> None:
         """Sleep until the reader has sent something or `timeout_s` is over."""
 
     def receive(self) -> bytes | None:
-        """Return what the reader has sent, b"" if nothing; None while no reader has the port open."""
+        """What the reader has sent, b"" if nothing; None while no reader has the port open."""
 
     def send(self, data: bytes) -> int:
-        """Offer `data` and return how many bytes were taken; the rest is lost, as on a UART."""
+        """Send what there is room for; returns the number of bytes. The rest is lost, as on a UART."""
 
     def unplug(self) -> None:
-        """Let the port vanish under whoever reads it."""
+        """Remove the port, even while it is open."""
 
     def plug_in(self) -> None:
-        """Let the port appear again under its old address."""
+        """Open the port again under its old address."""
 
     def close(self) -> None:
-        """Give the port up."""
+        """Close the port for good."""
 
 
 HOST = "127.0.0.1"
-"""Nobody but this computer may come in."""
+"""Only this computer may connect."""
 
 _SEND_BUFFER_BYTES = 1 << 16
-"""A reader that stands still for longer loses samples, as with any port."""
+"""64 KiB hold 80 ms at 100 kHz: a reader that stands still for longer loses samples, as on a UART."""
 
 
 class TcpPort:
     """A TCP port for one reader at a time (a `Transport`), see `open_tcp_port`.
 
-    While a reader is there the port does not listen, so that a second one is refused by the system.
+    While a reader is connected the port does not listen, so the system refuses a second one.
 
     Parameters
     ----------
@@ -78,26 +78,26 @@ class TcpPort:
 
     @property
     def url(self) -> str:
-        """What a reader opens: `socket://127.0.0.1:PORT`."""
+        """Address that a reader opens: `socket://127.0.0.1:PORT`."""
         return f"socket://{HOST}:{self._number}"
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until a reader came or has sent something, or `timeout_s` is over."""
+        """Sleep until a reader connects or sends something, or `timeout_s` is over."""
         watched = self._reader or self._listener
-        if watched is None:  # where there is nothing to watch, select fails on Windows
+        if watched is None:  # select without sockets fails on Windows
             time.sleep(max(0.0, timeout_s))
         else:
             select.select([watched], [], [], max(0.0, timeout_s))
 
     def receive(self) -> bytes | None:
-        """Return what the reader has sent; None while there is no reader."""
+        """See `Transport`."""
         if self._reader is None and not self._accept():
             return None
         try:
             data = self._reader.recv(4096) if self._reader else b""
         except BlockingIOError:
             return b""
-        except OSError:  # gone without a word
+        except OSError:  # the reader is gone
             data = b""
         if not data:
             self._drop_reader()
@@ -105,7 +105,7 @@ class TcpPort:
         return data or None
 
     def send(self, data: bytes) -> int:
-        """Offer `data` and return how many bytes the connection had room for."""
+        """See `Transport`."""
         if self._reader is None:
             return 0
         try:
@@ -114,7 +114,7 @@ class TcpPort:
             return 0
 
     def unplug(self) -> None:
-        """End the connection and refuse others."""
+        """Close the connection and refuse others."""
         self._is_plugged_in = False
         self._drop_reader()
         self._deafen()
@@ -125,7 +125,7 @@ class TcpPort:
         self._listen()
 
     def close(self) -> None:
-        """End the connection and give the port up."""
+        """Close the connection and the port."""
         self.unplug()
 
     def _accept(self) -> bool:
@@ -142,7 +142,7 @@ class TcpPort:
         return True
 
     def _listen(self) -> None:
-        """Listen if it is time to. A port that another program took meanwhile is tried again later."""
+        """Listen while plugged in. A port that another program took meanwhile is tried again later."""
         if self._is_plugged_in and self._listener is None:
             with contextlib.suppress(OSError):
                 self._listener = _listener(self._number)
@@ -163,15 +163,21 @@ def open_tcp_port(number: int = 0) -> TcpPort:
     try:
         return TcpPort(_listener(number))
     except OSError as error:
-        busy = error.errno == errno.EADDRINUSE
-        fault = "is used by another program" if busy else f"cannot be used ({error.strerror})"
-        raise PortUnavailableError(f"TCP port {number} {fault}: give another one, or 0 for any") from None
+        if error.errno == errno.EADDRINUSE:
+            raise PortUnavailableError(
+                "TCP port {number} is used by another program: give another one, or 0 for any", number=number
+            ) from None
+        raise PortUnavailableError(
+            "TCP port {number} cannot be used ({fault}): give another one, or 0 for any",
+            number=number,
+            fault=error.strerror,
+        ) from None
 
 
 def _listener(number: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        if os.name == "posix":  # elsewhere it would let another program take the port away
+        if os.name == "posix":  # on Windows this lets another program take the port
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         listener.bind((HOST, number))
@@ -186,16 +192,15 @@ def _listener(number: int) -> socket.socket:
 class PseudoTerminal:
     """The device's end of a POSIX pseudo-terminal (a `Transport`), see `open_pseudo_terminal`.
 
-    Readers open a link to it, since a terminal that comes back has another name. While no reader has the
-    other end open, reading here fails or ends; so a reader that comes or goes is noticed, as an Arduino
-    notices it by the DTR line that resets it.
+    Readers open a link to it, because a terminal that is opened again has another name. While no reader has
+    the other end open, reading here fails or ends: this shows when a reader comes or leaves.
 
     Parameters
     ----------
     descriptor : int
         The device's end.
     link : Path
-        Leads to the reader's end; alone in a folder that is removed with it.
+        To the reader's end; alone in a folder that is removed with it.
     """
 
     resets_device = True
@@ -215,14 +220,14 @@ class PseudoTerminal:
         return str(self._link)
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until the reader has sent something or `timeout_s` is over; 5 ms while nobody is there."""
+        """Sleep until the reader sends something or `timeout_s` is over; 5 ms while there is no reader."""
         if self._reader_is_there and self._descriptor is not None:
             select.select([self._descriptor], [], [], max(0.0, timeout_s))
-        else:  # the descriptor of a deserted terminal counts as readable all the time
+        else:  # a terminal without a reader is readable all the time
             select.select([], [], [], min(self._LOOK_FOR_READER_S, max(0.0, timeout_s)))
 
     def receive(self) -> bytes | None:
-        """Return what the reader has sent; None while no reader has the port open."""
+        """See `Transport`."""
         if self._descriptor is None:
             return None
         try:
@@ -230,13 +235,13 @@ class PseudoTerminal:
         except BlockingIOError:
             self._reader_is_there = True
             return b""
-        except OSError:  # EIO on Linux; BSD and macOS report the end of the file instead
+        except OSError:  # EIO on Linux; BSD and macOS report the end of the file
             data = b""
         self._reader_is_there = bool(data)
         return data or None
 
     def send(self, data: bytes) -> int:
-        """Offer `data` and return how many bytes the terminal had room for."""
+        """See `Transport`."""
         if self._descriptor is None:
             return 0
         try:
@@ -245,7 +250,7 @@ class PseudoTerminal:
             return 0
 
     def unplug(self) -> None:
-        """Hang the terminal up and take the link away."""
+        """Close the terminal and remove the link."""
         self._link.unlink(missing_ok=True)
         if self._descriptor is not None:
             os.close(self._descriptor)
@@ -253,18 +258,18 @@ class PseudoTerminal:
         self._reader_is_there = False
 
     def plug_in(self) -> None:
-        """Let the old link lead to a new terminal."""
+        """Open a new terminal behind the old link."""
         if self._descriptor is None:
             self._descriptor = _open_device_end(self._link)
 
     def close(self) -> None:
-        """Close the device's end, which a reader notices, and remove the link with its folder."""
+        """Close the device's end and remove the link with its folder."""
         self.unplug()
         shutil.rmtree(self._link.parent, ignore_errors=True)
 
 
 def has_pseudo_terminals() -> bool:
-    """Tell whether this system has pseudo-terminals; Windows has none."""
+    """Whether this system has pseudo-terminals; Windows has none."""
     return sys.platform != "win32"
 
 
@@ -283,21 +288,21 @@ def open_pseudo_terminal() -> PseudoTerminal:
 
 
 def _open_device_end(link: Path) -> int:
-    """Open a terminal, let `link` lead to its reader's end, and return the device's end."""
-    if sys.platform == "win32":  # said above; here it tells the type checker
+    """Open a terminal, link `link` to its reader's end, and return the device's end."""
+    if sys.platform == "win32":  # checked before; for the type checker
         raise PortUnavailableError("there are no pseudo-terminals on Windows: use TCP")
     import tty
 
     device_end, reader_end = os.openpty()
     try:
-        # Raw before anybody opens it: otherwise the terminal echoes our samples back as commands.
+        # Raw mode before a reader opens it: otherwise the terminal echoes samples back as commands.
         tty.setraw(reader_end)
         link.symlink_to(os.ttyname(reader_end))
     except BaseException:
         os.close(device_end)
         raise
     finally:
-        # Opened and closed once, the port tells apart "nobody there" from "nothing sent".
+        # Once it was open and closed, "no reader" and "nothing sent" can be told apart.
         os.close(reader_end)
     os.set_blocking(device_end, False)
     return device_end

@@ -21,11 +21,11 @@ from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
 from drivers.clock import ClockEstimate
-from drivers.csv_lines.codec import encode_lines
-from drivers.csv_lines.columns import LineFormat
-from drivers.registry import find_protocol
+from drivers.devices.csv_lines.codec import encode_lines
+from drivers.devices.csv_lines.columns import LineFormat
+from drivers.devices.slipstand_binary.codec import encode_frames
+from drivers.registry import find_driver
 from drivers.samples import Losses
-from drivers.slipstand_binary.codec import encode_frames
 
 RATE_HZ = 500.0
 TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_s=0.5)
@@ -80,7 +80,7 @@ class Desk:
         self.folder = folder
         self.port = PortSettings("port", protocol)
         self._writer = writer
-        self._source = find_protocol(protocol).make_source({}, RATE_HZ)
+        self._source = find_driver(protocol).make_source({}, RATE_HZ)
         self._losses = Losses()
         self.intake = ReadQueue()
         self.history = ReadHistory(round(history_s * RATE_HZ))

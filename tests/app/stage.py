@@ -34,7 +34,7 @@ from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
-from drivers.simulated.disturbances import parse_disturbance
+from drivers.simulated.faults import parse_disturbance
 from drivers.simulated.stream_sender import TransmissionLog
 from messages.message import message
 

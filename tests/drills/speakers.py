@@ -6,23 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.csv_lines import openscale
-from drivers.csv_lines.codec import LineDecoder, encode_lines
-from drivers.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines import inference
+from drivers.devices.csv_lines.codec import LineDecoder, encode_lines
+from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.devices.gsv.codec import FrameDecoder as GsvDecoder
+from drivers.devices.gsv.codec import FrameLayout
+from drivers.devices.gsv.codec import encode_frames as encode_gsv
+from drivers.devices.harp.codec import EventDecoder, encode_events
+from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.devices.modbus.frames import encode_read_response
+from drivers.devices.modbus.maps import read_map
+from drivers.devices.modbus.registers import plan_poll
+from drivers.devices.slipstand_binary.codec import FrameDecoder, encode_frames
+from drivers.driver import GAUGES
 from drivers.envelope import wrap
-from drivers.gsv.codec import FrameDecoder as GsvDecoder
-from drivers.gsv.codec import FrameLayout
-from drivers.gsv.codec import encode_frames as encode_gsv
-from drivers.harp.codec import EventDecoder, encode_events
-from drivers.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.modbus.frames import encode_read_response
-from drivers.modbus.maps import read_map
-from drivers.modbus.registers import plan_poll
-from drivers.pair.channels import GAUGES
 from drivers.pair.source import make_pair
-from drivers.registry import find_protocol
+from drivers.registry import find_driver
 from drivers.samples import Losses, SampleBlock
-from drivers.slipstand_binary.codec import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
 RATE_HZ = 1000.0
@@ -89,7 +89,7 @@ class _Pair:
     def __init__(self, layout: LineFormat) -> None:
         facts = {f"{gauge}.rate_hz": repr(RATE_HZ) for gauge in GAUGES}
         columns = ",".join(layout.columns)
-        self._source = make_pair(find_protocol("csv"), {"columns": columns}, None, facts)
+        self._source = make_pair(find_driver("csv"), {"columns": columns}, None, facts)
 
     @property
     def losses(self) -> Losses:
@@ -150,8 +150,8 @@ SPEAKERS = {
         ),
         Speaker(
             "openscale",
-            lambda: LineDecoder(openscale.DEFAULT_FORMAT, RATE_HZ),
-            _lines(openscale.DEFAULT_FORMAT),
+            lambda: LineDecoder(inference.OPENSCALE_FORMAT, RATE_HZ),
+            _lines(inference.OPENSCALE_FORMAT),
             has_checksum=False,
             gauges=1,
         ),

@@ -1,6 +1,6 @@
 """What the host's clock says is lost: not what comes late, on however busy a computer."""
 
-from drivers.loss_estimate import LossEstimator
+from drivers.packets import LossEstimator
 
 RATE_HZ = 1000.0
 

@@ -7,14 +7,12 @@ import time
 
 import pytest
 
-from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
+from drivers.errors import DeviceLostError, PortUnavailableError, QueueFullError, SettingsError
 from drivers.host_time import host_ns
 from drivers.port import (
     Port,
     PortInfo,
-    PortReader,
-    QueueFullError,
-    ReaderEndReason,
+    PortUser,
     device_lost_error,
     find_replugged,
     list_ports,
@@ -22,7 +20,8 @@ from drivers.port import (
     port_info,
     port_unavailable_error,
 )
-from drivers.port_users import PortUser
+from drivers.port_reader import PortReader, ReaderEndReason
+from drivers.source import LineSettings
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 
@@ -119,11 +118,11 @@ def test_a_port_is_tuned_while_it_is_open(terminal):
         assert not port.has_baud
         os.write(master, b"old")
         time.sleep(0.05)
-        port.configure(230400, "N")
+        port.configure(LineSettings(230400))
         os.write(master, b"new")
         assert read_until(port, 3) == b"new"
         with pytest.raises(SettingsError, match=r"cannot be set to -1 baud, parity N .*: give others"):
-            port.configure(-1, "N")
+            port.configure(LineSettings(-1))
     with open_port("loop://", 9600) as port:
         assert not port.has_baud
 
@@ -280,7 +279,7 @@ def test_the_reader_tells_that_the_device_is_lost(socket_pair):
     other.close()
     ended = ending.wait()
     assert ended.reason is ReaderEndReason.DEVICE_LOST
-    assert "was closed by the other end" in ended.message
+    assert "was closed by the other end" in str(ended.message)
     reader.stop()
 
 
@@ -301,7 +300,7 @@ def test_a_full_queue_ends_the_reader_and_nothing_is_skipped(socket_pair):
         time.sleep(0.005)
     other.sendall(b"second")
     ended = ending.wait()
-    assert (ended.reason, ended.message) == (ReaderEndReason.QUEUE_FULL, "the journal is 4 MB behind")
+    assert (ended.reason, str(ended.message)) == (ReaderEndReason.QUEUE_FULL, "the journal is 4 MB behind")
     reader.stop()
     assert taken == [b"first"]
 
@@ -318,7 +317,7 @@ def test_a_sink_that_fails_is_not_a_quiet_end(socket_pair):
     other.sendall(b"x")
     ended = ending.wait()
     assert ended.reason is ReaderEndReason.FAILED
-    assert "ZeroDivisionError: oops" in ended.message
+    assert "ZeroDivisionError: oops" in str(ended.message)
     reader.stop()
 
 

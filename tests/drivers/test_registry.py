@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from drivers.errors import SettingsError
-from drivers.registry import PROTOCOLS, find_protocol
+from drivers.registry import DRIVERS, find_driver
 
 NAMES = [
     "slipstand-binary", "csv", "gsv", "dataq", "modbus",
@@ -15,7 +15,7 @@ BUILT = ["slipstand-binary", "csv", "gsv", "modbus", "harp"]
 
 
 def test_all_promised_names_are_there_in_order():
-    assert list(PROTOCOLS) == NAMES
+    assert list(DRIVERS) == NAMES
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ def test_all_promised_names_are_there_in_order():
     [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200), ("modbus", 115200), ("harp", 1_000_000)],
 )
 def test_what_is_built_makes_a_source(name, baud):
-    info = find_protocol(name)
+    info = find_driver(name)
     assert info.available
     assert info.default_baud == baud
     assert "not verified on hardware" in info.verified
@@ -34,19 +34,19 @@ def test_what_is_built_makes_a_source(name, baud):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in BUILT])
 def test_what_is_only_reserved_says_so(name):
-    info = PROTOCOLS[name]
+    info = DRIVERS[name]
     assert not info.available
     with pytest.raises(
         SettingsError, match=rf"protocol '{name}' .* comes later: use one of slipstand-binary, csv"
     ):
-        find_protocol(name)
+        find_driver(name)
     with pytest.raises(SettingsError, match="comes later"):
         info.make_source({}, None)
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
     with pytest.raises(SettingsError, match="'gvs' is not known: use one of slipstand-binary, csv"):
-        find_protocol("gvs")
+        find_driver("gvs")
 
 
 def test_listing_protocols_loads_neither_numba_nor_pyserial():

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
+from replay_kit import replay, split_reads
 from wire_helpers import join
 
-from drivers.csv_lines.codec import encode_lines
-from drivers.csv_lines.columns import LineFormat
+from drivers.devices.csv_lines.codec import encode_lines
+from drivers.devices.csv_lines.columns import LineFormat
+from drivers.devices.slipstand_binary.codec import FrameDecoder, encode_frames
 from drivers.errors import NoDataError
-from drivers.registry import find_protocol
-from drivers.replay import replay, split_reads
-from drivers.slipstand_binary.codec import FrameDecoder, encode_frames
+from drivers.registry import find_driver
 
 RATE_HZ = 500.0
 COUNTS = np.arange(2000).reshape(1000, 2)
@@ -31,7 +31,7 @@ def reads(data: bytes, size: int) -> list[tuple[int, bytes]]:
 def test_a_replay_gives_what_the_decoder_gave(size, rate_hz):
     live = FrameDecoder(RATE_HZ)
     expected = join(live.feed(binary(), 0))
-    source = find_protocol("slipstand-binary").make_source({}, rate_hz)
+    source = find_driver("slipstand-binary").make_source({}, rate_hz)
     block = join(replay(source, reads(binary(), size)))
     np.testing.assert_array_equal(block.counts, expected.counts)
     np.testing.assert_array_equal(block.status, expected.status)
@@ -42,7 +42,7 @@ def test_a_replay_gives_what_the_decoder_gave(size, rate_hz):
 
 @pytest.mark.parametrize("size", [1, 44, 200_000])
 def test_a_replay_of_lines(size):
-    source = find_protocol("csv").make_source({}, None)
+    source = find_driver("csv").make_source({}, None)
     block = join(replay(source, reads(lines(), size)))
     np.testing.assert_array_equal(block.counts, COUNTS)
 
@@ -58,12 +58,12 @@ def test_stored_bytes_are_cut_as_they_came():
 
 @pytest.mark.parametrize("data", [b"", bytes(range(256)) * 20])
 def test_bytes_without_a_sample_are_an_error(data):
-    source = find_protocol("slipstand-binary").make_source({}, None)
+    source = find_driver("slipstand-binary").make_source({}, None)
     with pytest.raises(NoDataError, match="the recorded bytes hold no sample: "):
         list(replay(source, reads(data, 100)))
 
 
 def test_endless_rubbish_is_not_hoarded():
-    source = find_protocol("csv").make_source({}, None)
+    source = find_driver("csv").make_source({}, None)
     with pytest.raises(NoDataError, match="check the baud rate"):
         list(replay(source, reads(b"\x00\xff" * 600_000, 50_000)))

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_source
 from drivers.host_time import host_ns
 from drivers.port import Port, open_port
 from drivers.samples import SampleBlock
-from drivers.slipstand_binary.source import SlipstandBinarySource, make_source
 
 BAUD = 500_000
 FIRMWARE = Path(__file__).parents[2] / "firmware"

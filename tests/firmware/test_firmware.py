@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from board_kit import BAUD, ask, listening, run_make, running
 
+from drivers.devices.slipstand_binary.codec import FrameFlags
 from drivers.errors import ProtocolError
 from drivers.port import open_port
 from drivers.samples import Losses
-from drivers.slipstand_binary.codec import FrameFlags
 
 DROPPED = FrameFlags.DROPPED_BEFORE
 

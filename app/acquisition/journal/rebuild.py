@@ -17,8 +17,8 @@ from app.runs.blocks import BlockLayout, StoredRun
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events
 from app.runs.writer import RunWriter, create_run
+from drivers.clock import Skew
 from drivers.samples import SampleStatus
-from drivers.skew import Skew
 
 INTERRUPTED_NOTE = "Slipstand was ended while it recorded; this run was rebuilt from its journal"
 DIFFERS_NOTE = "its samples do not number as they did while they came: the version of Slipstand may differ"
@@ -199,7 +199,7 @@ def _ending(
 
 def _notes(replay: Replay, skew: Skew | None) -> list[str]:
     differs = [DIFFERS_NOTE.capitalize()] if replay.differs else []
-    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [skew.description])]
+    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [str(skew.description)])]
 
 
 def _events(mark: Mark, start_index: int, rate_hz: float) -> Events:

@@ -13,9 +13,9 @@ from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.acquisition.stream.connection import create_source
 from app.acquisition.stream.reads import losses_between
 from app.runs.journal import JournalRecord, RecordKind, read_journal
+from drivers.clock import HasSkew, Skew
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
-from drivers.skew import HasSkew, Skew
 from drivers.source import SampleSource
 
 _READS_MAX = 4096

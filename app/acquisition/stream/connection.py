@@ -9,11 +9,11 @@ from app.acquisition.messages import PortSettings
 from app.acquisition.stream.reads import ReadQueue
 from drivers.errors import DriverError, SettingsError
 from drivers.host_time import host_ns
-from drivers.pair.link import PairLink, PairPortSettings, open_pair
+from drivers.pair.link import PairLink, open_pair
 from drivers.pair.source import PairSource, make_pair
-from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnd
-from drivers.read_batching import read_for
-from drivers.registry import find_protocol
+from drivers.port import OpenPort, PortConfig, PortInfo
+from drivers.port_reader import PortReader, ReaderEnd, read_for
+from drivers.registry import find_driver
 from drivers.source import CancellableLink, SampleSource
 
 
@@ -45,7 +45,7 @@ def create_source(
     SettingsError
         If it cannot be.
     """
-    protocol = find_protocol(settings.protocol)
+    protocol = find_driver(settings.protocol)
     if settings.relative_url:
         return make_pair(protocol, settings.device, settings.rate_hz, facts)
     source = protocol.make_source(settings.device, rate_hz)
@@ -59,18 +59,18 @@ def create_source(
 
 def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
-    baud = settings.baud or find_protocol(settings.protocol).default_baud_for(settings.device)
-    choice = PairPortSettings(settings.url, baud, settings.parity)
+    baud = settings.baud or find_driver(settings.protocol).default_baud_for(settings.device)
+    choice = PortConfig(settings.url, baud, settings.parity)
     if not isinstance(source, PairSource):
         return _Single(choice)
     if settings.relative_url == settings.url:
         raise SettingsError(f"both gauges are said to be at {settings.url}: give the port of each device")
-    return _Pair((choice, PairPortSettings(settings.relative_url, baud, settings.parity)), source)
+    return _Pair((choice, PortConfig(settings.relative_url, baud, settings.parity)), source)
 
 
 @dataclass(slots=True)
 class _Single:
-    choice: PairPortSettings
+    choice: PortConfig
     opened: PortInfo | None = None
 
     def open(self) -> OpenPort:
@@ -84,7 +84,7 @@ class _Single:
 
 @dataclass(slots=True)
 class _Pair:
-    choices: tuple[PairPortSettings, PairPortSettings]
+    choices: tuple[PortConfig, PortConfig]
     source: PairSource
     opened: tuple[PortInfo, PortInfo] | None = None
 

@@ -13,12 +13,12 @@ from app.acquisition.stream.connection import Connection, Reconnection, create_o
 from app.acquisition.stream.monitors import RateMonitor, StallDetector
 from app.acquisition.stream.reads import DecodedRead, RawRead, ReadQueue, losses_between
 from config.schema import Gauges
-from drivers.clock import ClockEstimate
+from drivers.clock import ClockEstimate, HasSkew, Skew
 from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostMonitor
-from drivers.port import OpenPort, ReaderEndReason
+from drivers.port import OpenPort
+from drivers.port_reader import ReaderEndReason
 from drivers.samples import DeviceIdentity, Losses
-from drivers.skew import HasSkew, Skew
 from drivers.source import SampleSource
 
 PATIENCE_S = 10.0
@@ -144,7 +144,7 @@ class LiveStream:
     @property
     def note(self) -> str:
         """What every run of the device must say of itself; "" for most."""
-        return self._source.run_note
+        return str(self._source.run_note)
 
     @property
     def losses(self) -> Losses:
@@ -199,7 +199,7 @@ class LiveStream:
         StreamEndedError
             When this computer is too slow to take what comes, or what comes makes no sense.
         """
-        self._news.extend(StreamNotice(note) for note in self._host.check())
+        self._news.extend(StreamNotice(str(note)) for note in self._host.check())
         if self._connection is None:
             self._look_for_device(timeout_s)
         if self._connection is None:
@@ -231,7 +231,7 @@ class LiveStream:
     def _chunk(self, read: RawRead) -> DecodedRead:
         arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
-        self._news.extend(StreamNotice(note) for note in self._source.take_warnings())
+        self._news.extend(StreamNotice(str(note)) for note in self._source.take_warnings())
         before, self._losses = self._losses, replace(self._source.losses)
         added = losses_between(self._losses, before)
         if added.restarts:
@@ -261,9 +261,9 @@ class LiveStream:
         ended = connection.ended
         if ended is not None and ended.reason is ReaderEndReason.QUEUE_FULL:
             if is_all_taken:
-                raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
+                raise StreamEndedError(EndReason.WRITE_ERROR, str(ended.message))
         elif ended is not None:
-            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, ended.message))
+            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, str(ended.message)))
         elif self._silence.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
             self._lose(connection, DeviceLost(EndReason.STALLED, self._silence.message()))
 

@@ -3,8 +3,8 @@
 import math
 
 from drivers.clock import ClockEstimate, ClockFit
-from drivers.diagnosis import describe_unreadable
 from drivers.host_time import host_ns
+from drivers.recognition import describe_unreadable
 from drivers.source import SampleSource
 
 RATE_WORDS = "samples a second instead of"

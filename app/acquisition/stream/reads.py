@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import TypeAlias
 
 from app.acquisition.stream.calibration import CalibratedBlock, concatenate
-from drivers.port import QueueFullError
+from drivers.errors import QueueFullError
 from drivers.samples import Losses
 
 _WAITING_READS = 4096

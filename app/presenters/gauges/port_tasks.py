@@ -9,12 +9,13 @@ from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.state import PortCard
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import ReportProgress
+from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, list_ports
-from drivers.probe.host_checks import usb_chip_name
-from drivers.probe.recognition import Recognition
-from drivers.probe.report import PortReport, ProbeOutcome, probe_port
-from drivers.registry import PROTOCOLS
+from drivers.port_probe import PortReport, ProbeOutcome, probe_port
+from drivers.recognition import Recognition
+from drivers.registry import DRIVERS
 from messages.i18n import N_, gettext, translate
+from messages.message import Message, message
 
 _OUTCOMES = {
     ProbeOutcome.UNREADABLE: Chip(N_("something speaks that is not known"), Tone.WARN),
@@ -38,13 +39,13 @@ def probe_ports(task: ProbePorts, report: ReportProgress) -> tuple[PortCard, ...
             cards.append(listed_port(port, Chip(gettext("connected here"), Tone.OK)))
             continue
         tell = partial(_report_step, report, port.device, number / len(present))
-        tell("looking")
+        tell(message("looking"))
         cards.append(probed_port(probe_port(port, task.query_silent, tell)))
     return tuple(cards)
 
 
-def _report_step(report: ReportProgress, device: str, fraction: float, step: str) -> None:
-    report(Progress(f"{device}: {step}", fraction))
+def _report_step(report: ReportProgress, device: str, fraction: float, step: Message) -> None:
+    report(Progress(f"{device}: {translate(step)}", fraction))
 
 
 def listed_port(port: PortInfo, status: Chip = EMPTY_CHIP) -> PortCard:
@@ -57,7 +58,7 @@ def listed_port(port: PortInfo, status: Chip = EMPTY_CHIP) -> PortCard:
 def probed_port(report: PortReport) -> PortCard:
     """Card of a port that was probed."""
     card = listed_port(report.port)
-    hints = tuple(translate(f"{hint.message}. {hint.remedy}") for hint in report.hints)
+    hints = tuple(f"{translate(hint.message)}. {translate(hint.remedy)}" for hint in report.hints)
     found = report.recognition
     if found is None:
         return PortCard(
@@ -66,8 +67,10 @@ def probed_port(report: PortReport) -> PortCard:
             replace(_OUTCOMES[report.outcome], text=gettext(_OUTCOMES[report.outcome].text)),
             (_in_window(report.message), *hints),
         )
-    info = PROTOCOLS[found.protocol]
-    title = f"{info.title} at {report.line_settings}" if report.line_settings else info.title
+    info = DRIVERS[found.protocol]
+    title = gettext(info.title)
+    if report.line_settings:
+        title = f"{title} at {report.line_settings}"
     remark = (_in_window(found.remark),) if found.remark else ()
     return PortCard(
         card.url,
@@ -81,7 +84,7 @@ def probed_port(report: PortReport) -> PortCard:
 def suggested_form(report: PortReport, found: Recognition) -> ConnectForm:
     """Form of Start that connects to the device; empty fields take the defaults of the protocol."""
     line_settings = report.line_settings
-    usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
+    usual = DRIVERS[found.protocol].default_baud_for(found.settings)
     return ConnectForm(
         port=report.port.device,
         protocol=found.protocol,
@@ -98,7 +101,7 @@ def _signal(found: Recognition) -> str:
     return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
 
 
-def _in_window(text: str) -> str:
+def _in_window(text: Message) -> str:
     """Replace options of the command line by the controls of the window."""
     asked = translate(text).replace(
         "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"

@@ -14,8 +14,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_stand
 from drivers.envelope import wrap
 from drivers.pair.source import make_pair
-from drivers.registry import find_protocol
-from drivers.simulated.wire import make_simulated_protocol
+from drivers.registry import find_driver
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
@@ -31,7 +30,7 @@ FORMS = {
 
 def test_two_openscales_become_a_run_with_the_true_friction(tmp_path, writer):
     desk = Desk(tmp_path, writer, "csv")
-    desk._source = make_pair(find_protocol("csv"), {"format": "openscale"}, RATE_HZ)
+    desk._source = make_pair(find_driver("csv"), {"format": "openscale"}, RATE_HZ)
     desk.arm(duration_s=3.0)
     times_ms = (1000 * np.arange(len(COUNTS)) / RATE_HZ).astype(int)
     devices = [
@@ -65,11 +64,13 @@ def in_pieces(lines: list[bytes], seed: int = 0) -> Iterator[tuple[int, bytes]]:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_form_of_lines_becomes_a_run_with_the_true_friction(tmp_path, writer, form):
     times_s = 70 + np.arange(len(COUNTS)) / RATE_HZ
-    units = make_simulated_protocol("csv", FORMS[form]).encode(
-        900, COUNTS, np.zeros(len(COUNTS), np.uint8), times_s
+    units = (
+        find_driver("csv")
+        .make_simulated(FORMS[form])
+        .encode(900, COUNTS, np.zeros(len(COUNTS), np.uint8), times_s)
     )
     desk = Desk(tmp_path, writer, "csv")
-    desk._source = find_protocol("csv").make_source(FORMS[form], RATE_HZ)
+    desk._source = find_driver("csv").make_source(FORMS[form], RATE_HZ)
     desk.arm(duration_s=3.0)
     for read in in_pieces([b"ADC ready\r\n# gain 128\r\n", *units]):
         desk.take(read)

@@ -16,7 +16,7 @@ from app.acquisition.stream.live_stream import LiveStream
 from app.acquisition.stream.reads import ReadQueue
 from app.runs.reader import open_run
 from config.files import load_gauges, load_stand
-from drivers.slipstand_binary.source import make_source
+from drivers.devices.slipstand_binary.source import make_source
 
 PRETRIGGER_S, DURATION_S = 1.0, 4.0
 ALL_READS = 200

@@ -11,11 +11,11 @@ from app.acquisition.stream.connection import Connection
 from app.acquisition.stream.live_stream import DeviceFound, DeviceLost, LiveStream, SearchFailed, StreamNotice
 from app.acquisition.stream.reads import ReadQueue
 from config.files import load_gauges
+from drivers.devices.slipstand_binary.codec import encode_frames
+from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_source
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
 from drivers.port import PortInfo
-from drivers.slipstand_binary.codec import encode_frames
-from drivers.slipstand_binary.source import SlipstandBinarySource, make_source
 
 RATE_HZ = 1000.0
 N = 5
@@ -97,9 +97,9 @@ class Wire:
 @pytest.fixture(autouse=True)
 def short_limits(monkeypatch):
     monkeypatch.setattr(SlipstandBinarySource, "limit_s", 0.3)
-    monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
-    monkeypatch.setattr("drivers.slipstand_binary.source._QUIET_S", 0.02)
-    monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
+    monkeypatch.setattr("drivers.devices.slipstand_binary.source._ANSWER_S", 0.05)
+    monkeypatch.setattr("drivers.devices.slipstand_binary.source._QUIET_S", 0.02)
+    monkeypatch.setattr("drivers.devices.slipstand_binary.source._LISTEN_S", 0.1)
     monkeypatch.setattr("app.acquisition.stream.live_stream.PATIENCE_S", 1.0)
     monkeypatch.setattr("app.acquisition.stream.monitors.STALLED_S", 0.3)
     monkeypatch.setattr("app.acquisition.stream.connection._OFTEN_S", 0.02)

@@ -17,10 +17,10 @@ from app.acquisition.stream.live_stream import LiveStream
 from app.acquisition.stream.reads import ReadQueue
 from app.runs.blocks import StoredRun
 from config.files import load_gauges, load_stand
+from drivers.devices.slipstand_binary.codec import encode_frames
+from drivers.devices.slipstand_binary.source import make_source
 from drivers.host_time import host_ns
 from drivers.port import PortInfo
-from drivers.slipstand_binary.codec import encode_frames
-from drivers.slipstand_binary.source import make_source
 
 RATE_HZ = 100.0
 READ_SAMPLES = 10

@@ -24,8 +24,8 @@ from app.acquisition.stream.connection import create_source
 from app.runs.metadata import create_metadata
 from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
-from drivers.csv_lines.codec import encode_line
-from drivers.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.codec import encode_line
+from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.envelope import wrap
 from drivers.samples import SampleStatus
 

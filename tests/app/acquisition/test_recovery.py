@@ -30,7 +30,7 @@ from drivers.samples import SampleStatus
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
-PROTOCOLS = ("slipstand-binary", "csv")
+DRIVERS = ("slipstand-binary", "csv")
 
 
 def recorded(desk, all_reads, *, armed_at=0, until=3000, **settings):
@@ -51,7 +51,7 @@ def kept_journal(desk):
     return copy
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", DRIVERS)
 @pytest.mark.parametrize(
     ("faults", "armed_at", "history_s", "settings"),
     [
@@ -117,7 +117,7 @@ def test_what_a_dying_engine_had_not_decoded_is_recovered(tmp_path, writer):
     np.testing.assert_array_equal(counts, COUNTS[decoded - last :][: len(run)])
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", DRIVERS)
 def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_path, writer, protocol):
     desk = Desk(tmp_path, writer, protocol)
     recorded(desk, reads(wire(protocol)), until=2600, duration_s=60.0)

@@ -18,8 +18,8 @@ from app.acquisition.stream.monitors import StallDetector
 from app.child_process import encode_line
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
+from drivers.devices.slipstand_binary.source import make_source
 from drivers.errors import PortUnavailableError
-from drivers.slipstand_binary.source import make_source
 from tests.drills.processes import gone
 
 FIRST = encode_record(b"{}", 0, RecordKind.NOTE)

@@ -13,9 +13,8 @@ from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
 from config.files import append_check, checks_path, load_gauges, save_calibration, settings_file
 from config.schema import GaugeCheck
-from drivers.port import PortInfo
-from drivers.port_users import PortUser
-from drivers.probe.host_checks import PortHint
+from drivers.host_checks import PortHint
+from drivers.port import PortInfo, PortUser
 
 FTDI = PortInfo("/dev/ttyUSB7", "FT232R", 0x0403, 0x6001, "A1")
 

@@ -11,8 +11,7 @@ from app.runs.reader import load_counts, load_raw_bytes, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from drivers.modbus.source import make_source
-from drivers.replay import replay
+from drivers.devices.modbus.source import make_source
 from drivers.source import SampleSource
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
@@ -98,7 +97,11 @@ def assert_replays(path: str, source: SampleSource) -> None:
     run = open_run(path)
     recorded = np.column_stack([run.status, load_counts(run)])
     recorded = recorded[np.argmax(run.status == 0) :]
-    blocks = list(replay(source, [(arrival_ns, data) for data, arrival_ns in load_raw_bytes(run).chunks()]))
+    blocks = [
+        block
+        for data, arrival_ns in load_raw_bytes(run).chunks()
+        for block in source.decode(data, arrival_ns)
+    ]
     made = np.concatenate([np.column_stack([block.status, block.counts]) for block in blocks])
     rows = len(recorded)
     assert rows > 200

@@ -11,12 +11,10 @@ from app.presenters.gauges import port_tasks
 from app.presenters.gauges.port_tasks import list_port_cards, listed_port, probe_ports, probed_port
 from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.start.presenter import port_settings
-from drivers.port import PortInfo
-from drivers.port_users import PortUser
-from drivers.probe.host_checks import PortHint
-from drivers.probe.listening import LineSettings
-from drivers.probe.recognition import Recognition
-from drivers.probe.report import PortReport, ProbeOutcome
+from drivers.host_checks import PortHint
+from drivers.port import PortInfo, PortUser
+from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
+from drivers.recognition import Recognition
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}

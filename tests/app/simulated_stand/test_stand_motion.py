@@ -221,10 +221,11 @@ def test_a_series_that_the_paper_has_not_is_refused():
 
 def test_a_device_of_one_gauge_has_it_on_its_first_channel():
     table, relative = (SimulatedStandOptions(protocol="csv", gauge=gauge) for gauge in ("table", "relative"))
-    assert table.device_settings() == relative.device_settings() == {"columns": "time_us,value"}
+    assert table.device_settings() == ({"columns": "time_us,value"}, False)
+    assert relative.device_settings() == ({"columns": "time_us,value"}, True)
     polled = SimulatedStandOptions(protocol="modbus", gauge="relative", device={"unit": "2"})
-    assert polled.device_settings() == {"channel": "relative", "unit": "2"}
-    assert SimulatedStandOptions(protocol="modbus").device_settings() == {}
+    assert polled.device_settings() == ({"channel": "relative", "unit": "2"}, False)
+    assert SimulatedStandOptions(protocol="modbus").device_settings() == ({}, False)
 
     options = SimulatedStandOptions(seed=1, relative_clip_m=1e-5)
     both, turned = (StandSignal(stand_motion(), load_gauges(), options, 500.0) for _ in range(2))

@@ -14,4 +14,4 @@ from app.simulated_stand.options import SimulatedStandOptions
 )
 def test_an_only_gauge_is_among_the_devices_settings(protocol, given, settings):
     options = SimulatedStandOptions(protocol=protocol, gauge="relative", device=given)
-    assert options.device_settings() == settings
+    assert options.device_settings() == (settings, protocol == "csv")

@@ -18,10 +18,10 @@ from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth, read_truth
 from config.files import load_gauges
 from config.schema import Gauges
+from drivers.devices.slipstand_binary.codec import FrameDecoder
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
 from drivers.port import Port, open_port
 from drivers.samples import SampleBlock
-from drivers.slipstand_binary.codec import FrameDecoder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 

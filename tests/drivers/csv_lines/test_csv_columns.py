@@ -1,6 +1,6 @@
 import pytest
 
-from drivers.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.errors import SettingsError
 
 C = Column

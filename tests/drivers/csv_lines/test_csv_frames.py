@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.csv_lines.codec import (
+from drivers.devices.csv_lines.codec import (
     MAX_LINE_BYTES,
     LineDecoder,
     clock_step_from_lines,
@@ -15,7 +15,7 @@ from drivers.csv_lines.codec import (
     has_good_line,
     rate_from_lines,
 )
-from drivers.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.samples import Losses, SampleStatus
 
 C = Column

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from wire_helpers import ScriptedLink, join
 
-from drivers.csv_lines.codec import encode_lines
-from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.source import CsvLinesSource, make_source
+from drivers.devices.csv_lines.codec import encode_lines
+from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.source import CsvLinesSource, make_source
 from drivers.errors import NoDataError, SettingsError
 from drivers.samples import DeviceIdentity
 
@@ -116,7 +116,7 @@ def test_lines_with_other_columns_are_shown():
 
 
 def test_binary_frames_are_recognised():
-    from drivers.slipstand_binary.codec import encode_frame
+    from drivers.devices.slipstand_binary.codec import encode_frame
 
     frame = encode_frame(0, 0, np.zeros((2, 2), dtype=np.int32))
     with pytest.raises(NoDataError, match="Slipstand frames, choose protocol slipstand-binary"):

@@ -1,9 +1,9 @@
 import pytest
 from wire_helpers import ScriptedLink, join
 
-from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.openscale import find_layout
-from drivers.csv_lines.source import OpenScaleSource, make_source
+from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.inference import find_openscale_format
+from drivers.devices.csv_lines.source import OpenScaleSource, make_source
 from drivers.errors import NoDataError, SettingsError
 
 C = Column
@@ -34,7 +34,7 @@ FORMS = {
 
 @pytest.mark.parametrize(("form", "columns"), FORMS.items())
 def test_the_columns_that_are_switched_on_show_in_the_lines(form, columns):
-    layout = find_layout(BANNER + lines(form))
+    layout = find_openscale_format(BANNER + lines(form))
     assert layout is not None
     assert layout.columns == columns
     assert layout.unit == ("lbs" if "lbs" in form else "kg")
@@ -54,7 +54,7 @@ def test_readings_come_through_in_any_cut(form, size):
 
 
 def test_the_time_is_a_signed_number():
-    assert find_layout(lines("{ms},{value:.2f},kg,", first_ms=-500)).columns[0] is C.TIME_MS
+    assert find_openscale_format(lines("{ms},{value:.2f},kg,", first_ms=-500)).columns[0] is C.TIME_MS
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_the_time_is_a_signed_number():
     ],
 )
 def test_what_is_none_of_its_lines(data):
-    assert find_layout(data) is None
+    assert find_openscale_format(data) is None
 
 
 def test_after_the_unit_is_known_another_one_breaks_the_line():

@@ -3,7 +3,7 @@
 import numpy as np
 from wire_helpers import join
 
-from drivers.gsv.codec import FrameDecoder, FrameLayout, encode_frames
+from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, encode_frames
 
 RATE_HZ = 100.0
 TWO = FrameLayout(2)

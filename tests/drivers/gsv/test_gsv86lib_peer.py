@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from gsv_kit import decode, frames, readings
 
-from drivers.gsv.codec import FrameLayout, encode_frames
-from drivers.gsv.commands import encode_response
+from drivers.devices.gsv.codec import FrameLayout, encode_frames
+from drivers.devices.gsv.commands import encode_response
+from drivers.registry import find_driver
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.transport import open_pseudo_terminal
-from drivers.simulated.wire import make_simulated_protocol
 
 pytest.importorskip("gsv86lib", reason="the vendor's client is not installed")
 from gsv86lib.GSV6_Protocol import GSV_6Protocol
@@ -43,7 +43,7 @@ class Stand:
         self.terminal = open_pseudo_terminal()
         self.device = SimulatedDevice(
             self.terminal,
-            make_simulated_protocol("gsv", {}),
+            find_driver("gsv").make_simulated({}),
             lambda *_: Counting(),
             DeviceSetup(RATE_HZ),
         )
@@ -87,7 +87,7 @@ def test_the_peer_decodes_the_same_samples_from_our_bytes(layout):
 
 
 def test_the_peer_builds_the_same_requests():
-    from drivers.gsv.commands import (
+    from drivers.devices.gsv.commands import (
         Code,
         InputType,
         encode_request,

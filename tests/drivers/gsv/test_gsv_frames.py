@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.errors import ProtocolError
-from drivers.gsv.codec import (
+from drivers.devices.gsv.codec import (
     MAX_FRAME_BYTES,
     FrameDecoder,
     FrameLayout,
@@ -14,6 +13,7 @@ from drivers.gsv.codec import (
     encode_frames,
     find_layout,
 )
+from drivers.errors import ProtocolError
 from drivers.samples import Losses, SampleStatus
 
 GOOD, MISSING, DAMAGED = SampleStatus.GOOD, SampleStatus.MISSING, SampleStatus.DAMAGED

@@ -5,9 +5,8 @@ import pytest
 from gsv_kit import TWO, frames, readings
 from wire_helpers import ScriptedLink, join
 
-from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.gsv.codec import FrameLayout, ValueKind
-from drivers.gsv.commands import (
+from drivers.devices.gsv.codec import FrameLayout, ValueKind
+from drivers.devices.gsv.commands import (
     Code,
     InputType,
     encode_request,
@@ -16,7 +15,8 @@ from drivers.gsv.commands import (
     set_input,
     write_rate,
 )
-from drivers.gsv.source import GsvSource, make_source
+from drivers.devices.gsv.source import GsvSource, make_source
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.samples import DeviceIdentity
 
 FRAMES = 300
@@ -52,7 +52,7 @@ class Firmware:
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
     monkeypatch.setattr(GsvSource, "timeout_s", 0.3)
-    monkeypatch.setattr("drivers.gsv.source._ANSWER_S", 0.05)
+    monkeypatch.setattr(GsvSource, "answer_timeout_s", 0.05)
 
 
 def read_out(source, link, first: bytes, arrival_ns: int = 0):

@@ -4,14 +4,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.harp.codec import EVENT_BYTES, EventDecoder, encode_events, rate_from_events
-from drivers.harp.messages import U8, U16, WRITE, Message, encode
+from drivers.devices.harp.codec import (
+    EVENT_BYTES,
+    U8,
+    U16,
+    WRITE,
+    EventDecoder,
+    HarpMessage,
+    encode,
+    encode_events,
+    rate_from_events,
+)
 from drivers.samples import Losses, SampleStatus
 
 RATE_HZ = 1000.0
 GOOD, MISSING, DAMAGED = SampleStatus.GOOD, SampleStatus.MISSING, SampleStatus.DAMAGED
-REPLY = encode(Message(WRITE, 32, b"\x01"), U8, 5)
-LONG_REPLY = encode(Message(1, 12, bytes(range(25))), U8, 5)
+REPLY = encode(HarpMessage(WRITE, 32, b"\x01"), U8, 5)
+LONG_REPLY = encode(HarpMessage(1, 12, bytes(range(25))), U8, 5)
 
 
 def readings(samples: int, first: int = 0) -> np.ndarray:
@@ -173,4 +182,4 @@ def test_memory_is_bounded():
 def test_the_rate_is_told_by_the_times():
     assert rate_from_events(b"".join([REPLY, *events(900)])) == pytest.approx(1000, rel=1e-4)
     assert rate_from_events(b"".join(events(300))) is None
-    assert rate_from_events(encode(Message(1, 0, b"\xd0\x04"), U16, 5)) is None
+    assert rate_from_events(encode(HarpMessage(1, 0, b"\xd0\x04"), U16, 5)) is None

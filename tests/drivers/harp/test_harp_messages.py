@@ -1,6 +1,6 @@
 import pytest
 
-from drivers.harp.messages import (
+from drivers.devices.harp.codec import (
     ERROR,
     EVENT,
     READ,
@@ -8,7 +8,7 @@ from drivers.harp.messages import (
     U8,
     U16,
     WRITE,
-    Message,
+    HarpMessage,
     Register,
     encode,
     encode_read,
@@ -29,7 +29,7 @@ from drivers.harp.messages import (
         (encode_stop(), "02 05 20 ff 01 00 27"),
         (encode_read(Register.WHO_AM_I), "01 04 00 ff 02 06"),
         (encode_write(Register.OPERATION, 0xE1), "02 05 0a ff 01 e1 f2"),
-        (encode(Message(READ, 0, b"\xd0\x04"), U16, 31_251), "01 0c 00 ff 12 01 00 00 00 01 00 d0 04 f4"),
+        (encode(HarpMessage(READ, 0, b"\xd0\x04"), U16, 31_251), "01 0c 00 ff 12 01 00 00 00 01 00 d0 04 f4"),
     ],
 )
 def test_messages_as_they_are_written(sent, expected):
@@ -37,15 +37,15 @@ def test_messages_as_they_are_written(sent, expected):
 
 
 def test_messages_are_found_in_rubbish_with_and_without_their_time():
-    reply = encode(Message(READ, Register.WHO_AM_I, b"\xd0\x04"), U16, 77)
-    event = encode(Message(EVENT, Register.LOAD_CELLS, bytes(16)), S16, 78)
-    refused = encode(Message(WRITE | ERROR, Register.ACQUISITION, b"\x00"), U8)
+    reply = encode(HarpMessage(READ, Register.WHO_AM_I, b"\xd0\x04"), U16, 77)
+    event = encode(HarpMessage(EVENT, Register.LOAD_CELLS, bytes(16)), S16, 78)
+    refused = encode(HarpMessage(WRITE | ERROR, Register.ACQUISITION, b"\x00"), U8)
     data = b"\x00\x01\x02" + reply + event + b"\xff" + refused
     messages, used = find_messages(data + b"\x01\x04\x00")
     assert messages == [
-        Message(READ, 0, b"\xd0\x04"),
-        Message(EVENT, 33, bytes(16)),
-        Message(WRITE | ERROR, 32, b"\x00"),
+        HarpMessage(READ, 0, b"\xd0\x04"),
+        HarpMessage(EVENT, 33, bytes(16)),
+        HarpMessage(WRITE | ERROR, 32, b"\x00"),
     ]
     assert messages[0].number == 1232
     assert used == len(data)

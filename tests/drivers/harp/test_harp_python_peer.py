@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from drivers.harp.codec import EventDecoder, encode_events
-from drivers.harp.messages import Register as OurRegister
-from drivers.harp.messages import encode_start, encode_stop, encode_write
-from drivers.harp.simulated import HarpCommandParser, SimulatedHarp
-from drivers.harp.source import Settings
-from drivers.simulated.commands import Command
+from drivers.devices.harp.codec import EventDecoder, encode_events, encode_start, encode_stop, encode_write
+from drivers.devices.harp.codec import Register as OurRegister
+from drivers.devices.harp.simulated import HarpCommandParser, SimulatedHarp
+from drivers.devices.harp.source import HarpSettings
+from drivers.simulated.protocol import Command
 
 harp = pytest.importorskip("harp.io", reason="harp-python is not installed")
 
@@ -45,7 +44,7 @@ def test_we_decode_what_the_peer_writes():
     ids=["start", "stop", "write of a register"],
 )
 def test_the_peer_reads_our_replies(request_bytes, kind):
-    device = SimulatedHarp(Settings())
+    device = SimulatedHarp(HarpSettings())
     (command,) = HarpCommandParser().feed(request_bytes)
     reply = device.respond(command, True, 1000.0)
     said = harp.read(reply, address=command.code, dtype=np.dtype(np.uint8), length=1, keep_type=True)
@@ -54,5 +53,5 @@ def test_the_peer_reads_our_replies(request_bytes, kind):
 
 
 def test_the_peer_reads_who_we_are():
-    reply = SimulatedHarp(Settings()).respond(Command(None, code=0, parameters=b"\x01"), True, 1000.0)
+    reply = SimulatedHarp(HarpSettings()).respond(Command(None, code=0, parameters=b"\x01"), True, 1000.0)
     assert harp.read(reply, address=0, dtype=np.dtype(np.uint16), length=1)[0].tolist() == [1232]

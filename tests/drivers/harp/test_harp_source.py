@@ -2,23 +2,23 @@ import numpy as np
 import pytest
 from wire_helpers import ScriptedLink, join
 
-from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.harp.codec import encode_events
-from drivers.harp.messages import (
+from drivers.devices.harp.codec import (
     ERROR,
     U16,
-    Message,
+    HarpMessage,
     Register,
     encode,
+    encode_events,
     encode_read,
     encode_start,
     encode_stop,
     encode_write,
 )
-from drivers.harp.simulated import HarpCommandParser, SimulatedHarp
-from drivers.harp.source import HarpSource, Settings, make_source
+from drivers.devices.harp.simulated import HarpCommandParser, SimulatedHarp
+from drivers.devices.harp.source import HarpSettings, HarpSource, make_source
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.samples import DeviceIdentity
-from drivers.simulated.commands import CommandKind
+from drivers.simulated.protocol import CommandKind
 
 EVENTS = 800
 
@@ -32,7 +32,11 @@ class Firmware:
     """Answers with the registers of the simulated device; sends all its events at once."""
 
     def __init__(self, rate_hz: float = 1000.0) -> None:
-        self._device, self._listener, self._rate_hz = SimulatedHarp(Settings()), HarpCommandParser(), rate_hz
+        self._device, self._listener, self._rate_hz = (
+            SimulatedHarp(HarpSettings()),
+            HarpCommandParser(),
+            rate_hz,
+        )
 
     def __call__(self, sent: bytes) -> bytes:
         (command,) = self._listener.feed(sent)
@@ -43,7 +47,7 @@ class Firmware:
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
     monkeypatch.setattr(HarpSource, "timeout_s", 0.4)
-    monkeypatch.setattr("drivers.harp.source._ANSWER_S", 0.05)
+    monkeypatch.setattr(HarpSource, "answer_timeout_s", 0.05)
 
 
 def test_the_conversation_of_a_start():
@@ -79,7 +83,7 @@ def test_another_rate_than_expected_is_said():
 
 
 def test_another_harp_device_is_refused():
-    behaviour = encode(Message(1, Register.WHO_AM_I, (1216).to_bytes(2, "little")), U16, 7)
+    behaviour = encode(HarpMessage(1, Register.WHO_AM_I, (1216).to_bytes(2, "little")), U16, 7)
     with pytest.raises(ProtocolError, match="is Harp 1216, and LoadCells is 1232: choose its port"):
         make_source({}, None).start(ScriptedLink(lambda _: behaviour))
 
@@ -87,7 +91,7 @@ def test_another_harp_device_is_refused():
 def test_a_device_that_refuses_to_start():
     class Refusing(Firmware):
         def __call__(self, sent: bytes) -> bytes:
-            refused = encode(Message(2 | ERROR, Register.ACQUISITION, b"\x00"), 1, 7)
+            refused = encode(HarpMessage(2 | ERROR, Register.ACQUISITION, b"\x00"), 1, 7)
             return refused if sent == encode_start() else super().__call__(sent)
 
     with pytest.raises(ProtocolError, match="refuses to start"):

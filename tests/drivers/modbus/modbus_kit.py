@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.devices.modbus.frames import Request, encode_read_response
+from drivers.devices.modbus.maps import GAUGES
+from drivers.devices.modbus.registers import Poll, plan_poll
+from drivers.devices.modbus.simulated import ModbusCommandParser, SimulatedModbus
+from drivers.devices.modbus.source import read_modbus_settings
 from drivers.errors import DeviceLostError
-from drivers.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.modbus.frames import Request, encode_read_response
-from drivers.modbus.maps import GAUGES
-from drivers.modbus.registers import Poll, plan_poll
-from drivers.modbus.simulated import ModbusCommandParser, SimulatedModbus
-from drivers.modbus.source import read_modbus_settings
 from drivers.samples import SampleBlock
 
 COUNTS = np.array([70_000, -80_000], dtype=np.int32)

@@ -6,9 +6,9 @@ from hypothesis import given
 from modbus_kit import answer_of, decoded, decoder_for, poll_for, polled
 from wire_helpers import cut_at, cuts, join, single_bytes
 
+from drivers.devices.modbus.decoder import wrap_response
+from drivers.devices.modbus.frames import encode_exception, encode_read_response
 from drivers.envelope import wrap
-from drivers.modbus.decoder import wrap_response
-from drivers.modbus.frames import encode_exception, encode_read_response
 from drivers.samples import Losses, SampleStatus
 
 RATE_HZ = 100.0

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.modbus.frames import (
+from drivers.devices.modbus.frames import (
     ExceptionResponse,
     Function,
     InvalidResponse,
@@ -60,7 +60,7 @@ def test_answers_as_they_are_written():
 def test_an_exception_is_told_by_its_name(code, words):
     answer = parse_response(READ_ONE, encode_exception(1, 3, code))
     assert isinstance(answer, ExceptionResponse)
-    assert answer.description == f"{words} (exception {code})"
+    assert str(answer.description) == f"{words} (exception {code})"
 
 
 def test_the_exception_of_the_specification():
@@ -88,7 +88,7 @@ def test_the_exception_of_the_specification():
 def test_what_is_no_answer(received, why):
     answer = parse_response(READ_ONE, received)
     assert isinstance(answer, InvalidResponse)
-    assert why in answer.reason
+    assert why in str(answer.reason)
 
 
 def test_the_echo_of_another_write_is_no_answer():
@@ -117,5 +117,5 @@ def test_rubbish_is_no_answer_and_raises_nothing(data):
 
 
 def test_a_request_says_what_it_asks_for():
-    assert READ_ONE.description == "function 03 for register 12291"
-    assert Request(1, Function.READ_INPUT, 7, 4).description == "function 04 for registers 7 to 10"
+    assert str(READ_ONE.description) == "function 03 for register 12291"
+    assert str(Request(1, Function.READ_INPUT, 7, 4).description) == "function 04 for registers 7 to 10"

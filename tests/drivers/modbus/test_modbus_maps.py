@@ -3,10 +3,9 @@ import struct
 import pytest
 from modbus_kit import poll_for
 
-from drivers.errors import SettingsError
-from drivers.modbus.frames import Function, Request
-from drivers.modbus.maps import read_map, shipped_maps
-from drivers.modbus.registers import (
+from drivers.devices.modbus.frames import Function, Request
+from drivers.devices.modbus.maps import read_map, shipped_maps
+from drivers.devices.modbus.registers import (
     ByteOrder,
     Channel,
     ChannelValue,
@@ -15,6 +14,7 @@ from drivers.modbus.registers import (
     decode_channel,
     encode_channel,
 )
+from drivers.errors import SettingsError
 
 
 def test_the_shipped_maps_can_be_read():

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from wire_helpers import join
 
+from drivers.devices.modbus.source import make_source
 from drivers.errors import ProtocolError
-from drivers.modbus.source import make_source
 from drivers.port import open_port
+from drivers.registry import find_driver
 from drivers.samples import SampleBlock, SampleStatus
-from drivers.simulated.device import DeviceSetup
-from drivers.simulated.polled_device import make_device
+from drivers.simulated.device import DeviceSetup, make_device
 from drivers.simulated.transport import Transport, open_pseudo_terminal, open_tcp_port
-from drivers.simulated.wire import make_simulated_protocol
 
 ORDERS = {"ABCD": "BIG", "CDAB": "LITTLE_SWAP", "BADC": "BIG_SWAP", "DCBA": "LITTLE"}
 """The orders as minimalmodbus names them."""
@@ -38,7 +37,7 @@ class Still:
 def simulated(transport: Transport, settings: dict[str, str]) -> Iterator[str]:
     """The simulated device on a wire, in a thread."""
     device = make_device(
-        transport, make_simulated_protocol("modbus", settings), lambda *_: Still(), DeviceSetup(1000.0)
+        transport, find_driver("modbus").make_simulated(settings), lambda *_: Still(), DeviceSetup(1000.0)
     )
     is_over = threading.Event()
 
@@ -145,7 +144,7 @@ def test_we_read_two_units_of_pymodbus_with_status_and_sign():
 
 
 def test_an_exception_of_pymodbus_is_told(monkeypatch):
-    monkeypatch.setattr("drivers.modbus.source.ModbusSource.timeout_s", 0.1)
+    monkeypatch.setattr("drivers.devices.modbus.source.ModbusSource.timeout_s", 0.1)
     said = "refuses function 03 for registers 2 to 5: illegal data address"
     with pymodbus_server({1: [0, 1, 2, 3]}) as url, pytest.raises(ProtocolError, match=said):
         read_some(url, {"table_register": "2", "relative_register": "4"})

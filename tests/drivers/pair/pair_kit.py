@@ -6,7 +6,7 @@ import numpy as np
 
 from drivers.envelope import wrap
 from drivers.pair.source import PairSource, make_pair
-from drivers.registry import find_protocol
+from drivers.registry import find_driver
 from drivers.samples import SampleBlock
 
 EPOCH_NS = 5_000_000_000_000
@@ -51,7 +51,7 @@ def pair_source(devices: tuple[Device, Device] | None = None, **settings: str) -
     """As a replay makes it: the rates are those of an earlier recording."""
     rates = devices or (Device(), Device())
     facts = {"table.rate_hz": repr(rates[0].rate_hz), "relative.rate_hz": repr(rates[1].rate_hz)}
-    return make_pair(find_protocol("csv"), settings, None, facts)
+    return make_pair(find_driver("csv"), settings, None, facts)
 
 
 def decode(source: PairSource, pieces) -> list[SampleBlock]:

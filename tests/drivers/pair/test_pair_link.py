@@ -6,11 +6,11 @@ import pytest
 from drivers.envelope import Unwrapper
 from drivers.errors import DeviceLostError, NoDataError, PortUnavailableError, SettingsError
 from drivers.pair import link as pair_link
-from drivers.pair.channels import PairedChannel
+from drivers.pair.decoder import PairedChannel
 from drivers.pair.link import PairLink, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import PortInfo
-from drivers.registry import find_protocol
+from drivers.registry import find_driver
 
 PATIENT_S = 10.0
 
@@ -150,7 +150,7 @@ def test_a_device_that_stays_away_ends_the_link(ports, sources, monkeypatch):
 
 
 def test_a_device_that_cannot_be_started_ends_the_start(ports):
-    source = make_pair(find_protocol("csv"), {}, None)
+    source = make_pair(find_driver("csv"), {}, None)
     link = open_pair(tuple(map(FakeChoice, ports)), (FakeSource(), FakeSource(NoDataError("only rubbish"))))
     with pytest.raises(NoDataError, match=r"^gauge 2: only rubbish"):
         source.start(link)
@@ -190,7 +190,7 @@ class AskedSource(FakeSource):
 @pytest.mark.parametrize("rates_hz", [(100.0, 80.0), (80.0, 100.0)])
 def test_devices_that_are_asked_are_asked_together(ports, rates_hz):
     sources = tuple(map(AskedSource, rates_hz))
-    source = PairSource(find_protocol("modbus"), tuple(PairedChannel(one, 0) for one in sources))
+    source = PairSource(find_driver("modbus"), tuple(PairedChannel(one, 0) for one in sources))
     link = open_pair(tuple(map(FakeChoice, ports)), sources)
     source.start(link)
     link.close()

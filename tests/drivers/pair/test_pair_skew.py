@@ -3,8 +3,7 @@ import pytest
 from pair_kit import Device, decode, pair_source, wire_of
 from wire_helpers import join
 
-from drivers.clock import DELIVERY_UNCERTAINTY_S
-from drivers.skew import SkewStatistics
+from drivers.clock import DELIVERY_UNCERTAINTY_S, SkewStatistics
 
 SEEDS = 18
 RATE_HZ = 50.0

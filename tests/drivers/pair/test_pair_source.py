@@ -8,7 +8,7 @@ from wire_helpers import cut_at, cuts, join
 from drivers.envelope import wrap
 from drivers.errors import ProtocolError, SettingsError
 from drivers.pair.source import make_pair
-from drivers.registry import find_protocol
+from drivers.registry import find_driver
 from drivers.samples import SampleStatus
 
 ALIKE = (Device(phase_s=0.001), Device(phase_s=0.003))
@@ -134,11 +134,11 @@ def test_a_lost_device_is_told_of_and_marked():
     silent = [piece for n, piece in enumerate(pieces) if not (800 < n < 1000 and piece[4] == 1)]
     source = pair_source()
     decode(source, [*silent[:801], broken])
-    assert source.take_warnings() == [
+    assert list(map(str, source.take_warnings())) == [
         "the device of gauge 2 is lost and is looked for: the other gauge goes on"
     ]
     decode(source, silent[801:])
-    (note,) = source.take_warnings()
+    (note,) = map(str, source.take_warnings())
     assert note.startswith("the device of gauge 2 was away and is back: 1.0")
 
 
@@ -184,10 +184,10 @@ def test_damaged_first_lines_do_not_contradict_the_rate():
 
 def test_what_cannot_be_a_pair():
     with pytest.raises(SettingsError, match="both gauges on one port"):
-        make_pair(find_protocol("harp"), {}, None)
+        make_pair(find_driver("harp"), {}, None)
     with pytest.raises(SettingsError, match="have no value"):
-        make_pair(find_protocol("csv"), {"columns": "time_us,table,relative"}, None)
+        make_pair(find_driver("csv"), {"columns": "time_us,table,relative"}, None)
     with pytest.raises(SettingsError, match=r"relative\.rate 'fast' is no number"):
-        make_pair(find_protocol("csv"), {"relative.rate": "fast"}, None)
+        make_pair(find_driver("csv"), {"relative.rate": "fast"}, None)
     with pytest.raises(ProtocolError, match="not known: start them"):
-        list(make_pair(find_protocol("csv"), {}, None).decode(b"x", 0))
+        list(make_pair(find_driver("csv"), {}, None).decode(b"x", 0))

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drivers.harp.codec import encode_events
-from drivers.simulated.wire import make_simulated_protocol
+from drivers.devices.harp.codec import encode_events
+from drivers.registry import find_driver
 
 RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "csv": 500.0}
 
@@ -15,7 +15,7 @@ DURATION_S = 0.7
 
 def wire_of(protocol: str, settings: dict[str, str] | None = None) -> bytes:
     """0.7 s of a stand at rest, as the simulated device sends it, the first frame cut."""
-    packing = make_simulated_protocol(protocol, settings or {})
+    packing = find_driver(protocol).make_simulated(settings or {})
     rate_hz = RATES_HZ[protocol]
     per_frame = packing.samples_per_frame(rate_hz)
     rng = np.random.default_rng(4)

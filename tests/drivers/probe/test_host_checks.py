@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.port import PortInfo
-from drivers.port_users import PortUser, other_port_users, port_users
-from drivers.probe import host_checks
-from drivers.probe.host_checks import latency_ms, modem_manager_runs, port_hints, usb_chip_name
+from drivers import host_checks
+from drivers.host_checks import latency_ms, modem_manager_runs, port_hints, usb_chip_name
+from drivers.port import PortInfo, PortUser, other_port_users, port_users
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="rights and folders of POSIX")
 ADAPTER = PortInfo("/dev/ttyUSB7", "USB serial", 0x0403, 0x6001, "A50285BI")
@@ -69,7 +68,7 @@ def test_nothing_stands_in_the_way(tmp_path):
 @posix
 def test_an_adapter_that_holds_bytes_back(tmp_path):
     (hint,) = port_hints(ADAPTER, **folders(tmp_path, 16))
-    assert hint.message.startswith("the FTDI adapter of /dev/ttyUSB7 holds bytes back for 16 ms")
+    assert str(hint.message).startswith("the FTDI adapter of /dev/ttyUSB7 holds bytes back for 16 ms")
     assert hint.rule_helps
 
 
@@ -78,7 +77,8 @@ def test_modem_manager_and_the_rule_that_keeps_it_away(tmp_path, monkeypatch):
     places = folders(tmp_path, 1, "ModemManager")
     (hint,) = port_hints(ADAPTER, **places)
     assert (
-        hint.message == "ModemManager runs and talks to /dev/ttyUSB7 for some seconds after it is plugged in"
+        str(hint.message)
+        == "ModemManager runs and talks to /dev/ttyUSB7 for some seconds after it is plugged in"
     )
     assert modem_manager_runs(places["processes"])
     ignored = PortInfo("/dev/null", "", 0x2341, 0x43)
@@ -98,8 +98,8 @@ def test_a_port_that_this_user_may_not_open(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)
     monkeypatch.setattr(host_checks, "_group_of", lambda _: "uucp")
     (hint,) = port_hints(PortInfo(str(port)), **folders(tmp_path))
-    assert hint.message == f"{port} may not be opened by this user (group uucp may)"
-    assert hint.remedy == "Run: sudo usermod -aG uucp $USER, then log in again"
+    assert str(hint.message) == f"{port} may not be opened by this user (group uucp may)"
+    assert str(hint.remedy) == "Run: sudo usermod -aG uucp $USER, then log in again"
 
 
 def test_a_system_without_those_folders(tmp_path):
@@ -124,7 +124,7 @@ def test_names_of_chips(vendor_id, product_id, name):
 
 
 def test_the_rule_covers_every_known_maker():
-    from drivers.probe import host_checks
+    from drivers import host_checks
 
     rule = (Path(__file__).parents[3] / "config/udev/60-slipstand.rules").read_text("utf-8")
     (line,) = [line for line in rule.splitlines() if "ATTRS{idVendor}" in line]

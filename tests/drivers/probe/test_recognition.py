@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from probe_kit import DURATION_S, RATES_HZ, misread, wire_of
 
-from drivers.probe.recognition import recognise
+from drivers.recognition import recognise
 
 DEVICES = {
     "slipstand-binary": ("slipstand-binary", {}),
@@ -53,11 +53,11 @@ def test_the_time_of_many_lines_a_second_is_known():
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_what_is_suggested_reads_the_bytes(name):
-    from drivers.registry import find_protocol
+    from drivers.registry import find_driver
 
     data, duration_s = heard(name)
     found = recognise(data, duration_s)
-    source = find_protocol(found.protocol).make_source(found.settings, _given_rate(found))
+    source = find_driver(found.protocol).make_source(found.settings, _given_rate(found))
     samples = sum(len(block) for block in source.decode(data, 0))
     assert samples >= DURATION_S * RATES_HZ[found.protocol] - 11
     assert source.losses.damaged == 0

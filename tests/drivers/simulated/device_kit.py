@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from drivers.devices.slipstand_binary.codec import FrameDecoder
+from drivers.devices.slipstand_binary.simulated import SimulatedBinary
 from drivers.samples import SampleBlock
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.wire import SimulatedBinary
-from drivers.slipstand_binary.codec import FrameDecoder
 
 
 class Ramp:

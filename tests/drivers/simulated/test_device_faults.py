@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 from device_kit import Ramp, Wire, decoded, run_for, start
 
-from drivers.csv_lines.codec import LineDecoder
-from drivers.csv_lines.source import Settings
+from drivers.devices.csv_lines.codec import LineDecoder
+from drivers.devices.csv_lines.simulated import SimulatedCsv
+from drivers.devices.csv_lines.source import CsvSettings
+from drivers.devices.gsv.commands import Code, encode_request
+from drivers.devices.slipstand_binary.codec import rate_from_frames
+from drivers.devices.slipstand_binary.simulated import SimulatedBinary
 from drivers.errors import SettingsError
-from drivers.gsv.commands import Code, encode_request
+from drivers.registry import find_driver
 from drivers.samples import SampleStatus
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.disturbances import parse_disturbance
-from drivers.simulated.faults import FaultRates, FrameFault
+from drivers.simulated.faults import FaultRates, FrameFault, parse_disturbance
 from drivers.simulated.stream_sender import TransmissionLog
-from drivers.simulated.wire import SimulatedBinary, SimulatedCsv, make_simulated_protocol
-from drivers.slipstand_binary.codec import rate_from_frames
 
 RATE_HZ = 1000.0
-CHECKED = Settings(columns="time_us,table,relative,crc").layout()
+CHECKED = CsvSettings(columns="time_us,table,relative,crc").layout()
 
 
 def planned(*texts: str, **setup) -> DeviceSetup:
@@ -197,7 +198,7 @@ def test_a_stream_started_after_a_torn_one_goes_on_with_the_session():
 
 def test_a_stream_that_began_by_itself_when_power_came_back_may_be_stopped_and_started_once():
     wire = Wire()
-    device = start(wire, planned("power 0.5 at 1"), make_simulated_protocol("gsv", {}))
+    device = start(wire, planned("power 0.5 at 1"), find_driver("gsv").make_simulated({}))
     now_ns = run_for(device, 2.0)
     assert [one.started_s for one in (*device.earlier_logs, device.log)] == pytest.approx(
         [0.0, 1.5], abs=0.03

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import SettingsError
-from drivers.simulated.disturbances import (
+from drivers.simulated.faults import (
     Disturbance,
     DisturbanceKind,
     DisturbanceSchedule,

@@ -8,12 +8,13 @@ from device_kit import Ramp, Wire, decoded, ramp_at, run_for, start
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from drivers.csv_lines.codec import LineDecoder
-from drivers.csv_lines.source import Settings
+from drivers.devices.csv_lines.codec import LineDecoder
+from drivers.devices.csv_lines.simulated import SimulatedCsv
+from drivers.devices.csv_lines.source import CsvSettings
+from drivers.devices.slipstand_binary.simulated import SimulatedBinary
 from drivers.samples import SampleStatus
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.faults import FaultRates, FrameFault
-from drivers.simulated.wire import SimulatedBinary, SimulatedCsv
 
 
 @given(
@@ -203,7 +204,7 @@ def test_a_line_without_its_end_takes_the_next_one_along():
 
 
 def test_damaged_lines_with_a_checksum_are_all_found_by_the_decoder():
-    layout = Settings(columns="time_us,table,relative,crc").layout()
+    layout = CsvSettings(columns="time_us,table,relative,crc").layout()
     wire = Wire()
     faults = DeviceSetup(1000.0, faults=FaultRates(0.02, 0.02), seed=2)
     device = SimulatedDevice(wire, SimulatedCsv(layout), ramp_at, faults)

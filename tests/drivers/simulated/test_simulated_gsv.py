@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
 
-from drivers.gsv.codec import FrameDecoder, FrameLayout, ValueKind
-from drivers.gsv.commands import (
+from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
+from drivers.devices.gsv.commands import (
     Code,
     encode_request,
     encode_response,
@@ -16,10 +16,10 @@ from drivers.gsv.commands import (
     set_zero,
     write_rate,
 )
-from drivers.gsv.simulated import GsvCommandParser, SimulatedGsv
-from drivers.gsv.source import Settings
+from drivers.devices.gsv.simulated import GsvCommandParser, SimulatedGsv
+from drivers.devices.gsv.source import GsvSettings
+from drivers.registry import find_driver
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.wire import make_simulated_protocol
 
 
 def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> bytes:
@@ -39,14 +39,14 @@ def wire():
 @pytest.fixture
 def silent(wire):
     """A device that was stopped."""
-    device = SimulatedDevice(wire, make_simulated_protocol("gsv", {}), ramp_at, DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, find_driver("gsv").make_simulated({}), ramp_at, DeviceSetup(1000.0))
     device.step(0)
     ask(device, wire, encode_request(Code.STOP))
     return device
 
 
 def test_sends_from_power_up_until_it_is_stopped(wire):
-    device = SimulatedDevice(wire, make_simulated_protocol("gsv", {}), ramp_at, DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, find_driver("gsv").make_simulated({}), ramp_at, DeviceSetup(1000.0))
     run_for(device, 0.05)
     blocks = list(FrameDecoder(FrameLayout(2), 1000.0).feed(bytes(wire.sent), 0))
     counts = np.concatenate([block.counts for block in blocks])
@@ -94,7 +94,7 @@ def test_answers_in_any_cut_and_after_rubbish(silent, wire):
 def test_answers_say_what_was_done(silent, wire, said, error):
     found = find_response(ask(silent, wire, said))
     assert found is not None
-    assert found[0].error == error
+    assert found.error == error
 
 
 def test_set_zero_takes_the_last_reading_off(silent, wire):
@@ -108,7 +108,7 @@ def test_set_zero_takes_the_last_reading_off(silent, wire):
 
 
 def test_a_device_left_at_whole_numbers_changes_to_floats_when_told(wire):
-    packing = SimulatedGsv(Settings(format="device", table=2, relative=1))
+    packing = SimulatedGsv(GsvSettings(format="device", table=2, relative=1))
     device = SimulatedDevice(wire, packing, ramp_at, DeviceSetup(1000.0))
     run_for(device, 0.02)
     assert wire.sent[:3] == bytes([0xAA, 0x11, 0x80 | ValueKind.INT24 << 4])
@@ -121,4 +121,4 @@ def test_a_reader_keeps_little_of_what_is_no_request():
     reader = GsvCommandParser()
     for _ in range(100):
         assert reader.feed(b"\xaa\x9fno request" * 20) == []
-        assert len(reader._rest) < 20
+        assert len(reader._unfinished) < 20

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
 
-from drivers.harp.codec import EventDecoder
-from drivers.harp.messages import (
+from drivers.devices.harp.codec import (
     ERROR,
-    Message,
+    EventDecoder,
+    HarpMessage,
     Register,
     encode_read,
     encode_start,
@@ -15,8 +15,8 @@ from drivers.harp.messages import (
     encode_write,
     find_messages,
 )
+from drivers.registry import find_driver
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.wire import make_simulated_protocol
 
 
 @pytest.fixture
@@ -27,13 +27,13 @@ def wire():
 @pytest.fixture
 def device(wire):
     device = SimulatedDevice(
-        wire, make_simulated_protocol("harp", {}), ramp_at, DeviceSetup(1000.0, first_time_s=7.0)
+        wire, find_driver("harp").make_simulated({}), ramp_at, DeviceSetup(1000.0, first_time_s=7.0)
     )
     device.step(0)
     return device
 
 
-def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> list[Message]:
+def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> list[HarpMessage]:
     before = len(wire.sent)
     for piece in said:
         wire.inbox = piece
@@ -53,7 +53,9 @@ def test_is_silent_until_it_is_active_and_started(device, wire):
     (block,) = EventDecoder(1000.0).feed(bytes(wire.sent), 0)
     np.testing.assert_array_equal(np.diff(block.counts[:, 0]), 1)
     assert len(block) >= 49
-    assert ask(device, wire, encode_stop(), now_ns=end_ns)[-1] == Message(2, Register.ACQUISITION, b"\x00")
+    assert ask(device, wire, encode_stop(), now_ns=end_ns)[-1] == HarpMessage(
+        2, Register.ACQUISITION, b"\x00"
+    )
     sent = len(wire.sent)
     run_for(device, 0.05, end_ns)
     assert len(wire.sent) == sent
@@ -66,12 +68,12 @@ def test_registers_are_read_and_written_in_any_cut(device, wire):
         + b"\x01\x02"
         + encode_read(Register.EVENTS)
     )
-    expected = [Message(1, 0, b"\xd0\x04"), Message(2, 90, b"\x01"), Message(1, 90, b"\x01")]
+    expected = [HarpMessage(1, 0, b"\xd0\x04"), HarpMessage(2, 90, b"\x01"), HarpMessage(1, 90, b"\x01")]
     assert ask(device, wire, said) == expected
     assert ask(device, wire, *(said[k : k + 1] for k in range(len(said)))) == expected
 
 
 def test_what_cannot_be_is_an_error(device, wire):
     unknown = bytes.fromhex("010463ff01") + bytes([0x68])
-    assert ask(device, wire, unknown) == [Message(1 | ERROR, 0x63)]
-    assert ask(device, wire, encode_write(Register.WHO_AM_I, 5)) == [Message(2 | ERROR, 0, b"\xd0\x04")]
+    assert ask(device, wire, unknown) == [HarpMessage(1 | ERROR, 0x63)]
+    assert ask(device, wire, encode_write(Register.WHO_AM_I, 5)) == [HarpMessage(2 | ERROR, 0, b"\xd0\x04")]

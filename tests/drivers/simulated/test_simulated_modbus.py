@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at
 
-from drivers.errors import SettingsError
-from drivers.modbus.frames import (
+from drivers.devices.modbus.frames import (
     ExceptionResponse,
     Function,
     RegisterResponse,
@@ -14,12 +13,11 @@ from drivers.modbus.frames import (
     parse_response,
     with_crc,
 )
-from drivers.modbus.simulated import ModbusCommandParser
-from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.disturbances import parse_disturbance
-from drivers.simulated.faults import FaultRates
-from drivers.simulated.polled_device import PolledDevice, make_device
-from drivers.simulated.wire import make_simulated_protocol
+from drivers.devices.modbus.simulated import ModbusCommandParser
+from drivers.errors import SettingsError
+from drivers.registry import find_driver
+from drivers.simulated.device import DeviceSetup, PolledDevice, SimulatedDevice, make_device
+from drivers.simulated.faults import FaultRates, parse_disturbance
 
 READ = Request(1, Function.READ_HOLDING, 0, 4)
 RATE_HZ = 1000.0
@@ -27,7 +25,7 @@ RATE_HZ = 1000.0
 
 def device_on(wire: Wire, settings: dict[str, str] | None = None, **setup) -> SimulatedDevice:
     device = make_device(
-        wire, make_simulated_protocol("modbus", settings or {}), ramp_at, DeviceSetup(RATE_HZ, **setup)
+        wire, find_driver("modbus").make_simulated(settings or {}), ramp_at, DeviceSetup(RATE_HZ, **setup)
     )
     assert isinstance(device, PolledDevice)
     device.step(0)
@@ -75,7 +73,7 @@ def test_requests_in_any_cut_and_behind_rubbish():
 def test_what_a_listener_keeps_is_bounded():
     listener = ModbusCommandParser()
     assert listener.feed(bytes(100_000)) == []
-    assert len(listener._rest) <= 256
+    assert len(listener._unfinished) <= 256
     assert len(listener.feed(READ.encode())) == 1
 
 
@@ -156,7 +154,7 @@ def test_two_stands_that_began_together_show_one_motion():
     readings = []
     for opened_ns in (10_000_000_000, 12_000_000_000):
         wire = Wire()
-        packing = make_simulated_protocol("modbus", {})
+        packing = find_driver("modbus").make_simulated({})
         device = make_device(wire, packing, ramp_at, DeviceSetup(RATE_HZ, began_ns=9_000_000_000))
         device.step(opened_ns)
         answer = ask(device, wire, READ.encode(), 13_000_000_000)
@@ -166,4 +164,4 @@ def test_two_stands_that_began_together_show_one_motion():
 
 def test_settings_are_checked():
     with pytest.raises(SettingsError, match="map 'x' is not known"):
-        make_simulated_protocol("modbus", {"map": "x"})
+        find_driver("modbus").make_simulated({"map": "x"})

@@ -1,7 +1,6 @@
 import pytest
 
-from drivers.errors import ProtocolError, SettingsError
-from drivers.slipstand_binary.commands import (
+from drivers.devices.slipstand_binary.codec import (
     IDENTIFY,
     START,
     STOP,
@@ -10,6 +9,7 @@ from drivers.slipstand_binary.commands import (
     encode_rate,
     find_identity,
 )
+from drivers.errors import ProtocolError, SettingsError
 
 
 def test_commands_are_the_bytes_of_the_protocol():

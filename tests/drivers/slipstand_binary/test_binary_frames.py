@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.samples import Losses, SampleStatus
-from drivers.slipstand_binary.codec import (
+from drivers.devices.slipstand_binary.codec import (
     FrameDecoder,
     FrameFlags,
     encode_frame,
     encode_frames,
     find_frame_headers,
     rate_from_frames,
+    samples_per_frame,
 )
-from drivers.slipstand_binary.commands import samples_per_frame
+from drivers.samples import Losses, SampleStatus
 
 RATE_HZ = 500.0
 RUBBISH = b"\xaa\x55\x01\x00\x07slipstand\xaa\xaa\x55\x55"

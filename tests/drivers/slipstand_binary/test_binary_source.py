@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from wire_helpers import ScriptedLink, join
 
+from drivers.devices.slipstand_binary.codec import encode_frames
+from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.samples import DeviceIdentity
-from drivers.slipstand_binary.codec import encode_frames
-from drivers.slipstand_binary.source import SlipstandBinarySource, make_source
 
 FRAMES = 500
 
@@ -34,8 +34,8 @@ class Firmware:
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
     monkeypatch.setattr(SlipstandBinarySource, "timeout_s", 0.3)
-    monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
-    monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
+    monkeypatch.setattr(SlipstandBinarySource, "answer_timeout_s", 0.05)
+    monkeypatch.setattr("drivers.devices.slipstand_binary.source._LISTEN_S", 0.1)
 
 
 def test_the_conversation_of_a_start():

@@ -1,1 +1,0 @@
-"""Lines of comma-separated values, as Arduinos and loggers send them."""

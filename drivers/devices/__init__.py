@@ -1,0 +1,1 @@
+"""The device folders: one package a device, independent of each other."""

@@ -1,0 +1,244 @@
+"""Lines of values, encoded and decoded."""
+
+import math
+from functools import reduce
+from operator import xor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import rate_from_steps
+from drivers.crc import crc16
+from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.devices.csv_lines.line_parser import LineParser
+from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
+from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, Packets
+from drivers.samples import Losses
+
+MAX_LINE_BYTES = 1024
+"""A longer line is garbage."""
+_MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
+_LINES_EXAMINED = 200
+
+
+def encode_line(layout: LineFormat, time_s: float, table: float, relative: float, sequence: int = 0) -> bytes:
+    r"""One line, ended by `\r\n` as Arduino's `println` does.
+
+    Parameters
+    ----------
+    layout : LineFormat
+        `ignore` columns become 0, units "kg" where none is given.
+    time_s : float
+        Device time (s); us and ms columns are whole numbers that wrap.
+    table, relative : float
+        Readings; whole numbers have no decimal point. A `value` column has that of `table`.
+    sequence : int
+        Index of the sample; wraps too.
+    """
+    fields = [
+        _field(layout, column, time_s, table, relative, sequence)
+        for column in layout.columns
+        if column is not layout.checksum
+    ]
+    line = layout.separator.join(fields).encode("ascii")
+    if layout.checksum is not None:
+        line += layout.separator.encode("ascii") + _checksum(layout.checksum, line)
+    return line + b"\r\n"
+
+
+def encode_lines(
+    layout: LineFormat,
+    times_s: NDArray[np.float64],
+    counts: NDArray[np.int32] | NDArray[np.float64],
+    first_sequence: int = 0,
+) -> list[bytes]:
+    """A line for each row of `counts` (n, 2), at device times `times_s` (n,); see `encode_line`."""
+    return [
+        encode_line(layout, time_s, table, relative, first_sequence + row)
+        for row, (time_s, (table, relative)) in enumerate(zip(times_s.tolist(), counts.tolist(), strict=True))
+    ]
+
+
+def _field(
+    layout: LineFormat, column: Column, time_s: float, table: float, relative: float, sequence: int
+) -> str:
+    match column:
+        case Column.TIME_US | Column.TIME_MS:
+            return str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.time_wrap))
+        case Column.TIME_S:
+            return _number(round(time_s, 6), layout.decimal)
+        case Column.TABLE | Column.VALUE:
+            return _number(table, layout.decimal)
+        case Column.RELATIVE:
+            return _number(relative, layout.decimal)
+        case Column.SEQUENCE:
+            return str(_wrapped(sequence, layout.sequence_wrap))
+        case Column.UNIT:
+            return layout.unit or "kg"
+        case Column.EMPTY:
+            return ""
+        case _:
+            return "0"
+
+
+def _wrapped(value: int, wrap: int) -> int:
+    return value % wrap if wrap else value
+
+
+def _number(value: float, decimal: str) -> str:
+    text = str(int(value)) if value == int(value) else repr(value)
+    return text.replace(".", decimal)
+
+
+def _checksum(column: Column, line: bytes) -> bytes:
+    if column is Column.CRC:
+        return b"%04X" % crc16(line)
+    return b"%02X" % reduce(xor, line, 0)
+
+
+class LineDecoder(PacketDecoder):
+    """Bytes to sample blocks; sequence or time columns tell lost samples.
+
+    - A sequence proves missing samples.
+    - A time alone: a line that comes k periods after the one before says that k - 1 are lost
+      (`missing_estimated`). Losses shorter than the step of the device's clock do not show.
+    - Neither: a row stands for each broken line; other losses are estimated from the host's clock, in
+      `losses` alone.
+
+    As many of the lost rows as lines came broken are damaged, the others missing. A time or sequence that
+    goes back or leaps by more than `max_gap_s` is a restart of the device: the rows until it are estimated
+    from the host's clock.
+
+    The first line is left out, because it may be cut; lines before the first good one are a banner. Without a
+    checksum a damaged digit in a value is not noticed.
+
+    Parameters
+    ----------
+    layout : LineFormat
+    rate_hz : float
+        Nominal rate, > 0; with a time column the rate of its times (`rate_from_lines`).
+    clock_step_s : float
+        Step of the device's clock (`clock_step_from_lines`).
+    overload_count : float
+        Readings of this size and more are marked as overloaded.
+    max_gap_s : float
+        Longest gap that is believed.
+    """
+
+    def __init__(
+        self,
+        layout: LineFormat,
+        rate_hz: float,
+        clock_step_s: float = 0.0,
+        overload_count: float = math.inf,
+        max_gap_s: float = MAX_GAP_S,
+    ) -> None:
+        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
+        self._state["period_s"] = 1 / rate_hz
+        self._parser = LineParser(layout)
+        time = layout.time_column
+        place = BY_TIME if time else BY_COUNT
+        self._rules = make_rules(
+            BY_SEQUENCE if Column.SEQUENCE in layout.columns else place,
+            rate_hz,
+            unit_s=TIME_UNIT_S[time] if time else 0.0,
+            clock_step_s=clock_step_s,
+            time_wrap=layout.time_wrap,
+            sequence_wrap=layout.sequence_wrap,
+            overload_count=overload_count,
+            max_gap_s=max_gap_s,
+        )
+        self._has_time = time is not None
+        self._loss_estimator = LossEstimator(rate_hz) if self._rules["place"] == BY_COUNT else None
+        self._skipping = True
+        """Until the end of the line that is under way."""
+
+    @property
+    def losses(self) -> Losses:
+        """Counts until now."""
+        losses = super().losses
+        if self._loss_estimator is not None:
+            losses.missing_estimated += self._loss_estimator.lost
+        return losses
+
+    def expect_restart(self) -> None:
+        """See `PacketDecoder`."""
+        self._state["broken"] += self._state["started"] * bool(self._unfinished)
+        self._skipping = True
+        super().expect_restart()
+
+    def _whole_lines(self, data: bytes) -> bytes:
+        """Lines that are complete; keeps the unfinished one."""
+        if self._skipping:
+            start = first_line_start(data)
+            self._state["discarded_bytes"] += start - 1 if start else len(data)
+            data = data[start:] if start else b""
+            self._skipping = not start
+        end = whole_lines_end(data)
+        self._unfinished = data[end:]
+        if len(self._unfinished) > MAX_LINE_BYTES + _MAX_HELD_BYTES:
+            self._state["broken"] += self._state["started"]
+            self._state["discarded_bytes"] += len(self._unfinished)
+            self._unfinished = b""
+            self._skipping = True
+        return data[:end]
+
+    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+        data = self._whole_lines(data)
+        lines = self._parser.read(data)
+        if not len(lines):
+            return None
+        packets = np.empty(len(lines), dtype=PACKET)
+        counts = np.empty((len(lines), 2))
+        before = self._position()
+        self._state["restart_rows"] = self._rows_since(arrival_ns, len(lines))
+        hold_from = len(data) if self._skipping else len(data) - _MAX_HELD_BYTES
+        found, done = count_lines(lines, hold_from, self._state, self._rules, packets, counts)
+        if done < len(lines):
+            self._unfinished = data[int(lines[done]["start"]) :] + self._unfinished
+        if found and self._loss_estimator is not None:
+            self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
+        return self._packets(packets[:found], counts[:found], before, arrival_ns, has_time=self._has_time)
+
+
+def rate_from_lines(layout: LineFormat, data: bytes) -> float | None:
+    """Samples a second by the device's own times; None while there are too few lines."""
+    time = layout.time_column
+    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    if time is None:
+        return None
+    times = lines["time"][lines["good"] != 0]
+    steps = np.diff(times)
+    if layout.time_wrap:
+        steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
+    return rate_from_steps(steps * TIME_UNIT_S[time], clock_step_from_lines(layout, data))
+
+
+def clock_step_from_lines(layout: LineFormat, data: bytes) -> float:
+    """Step (s) of the device's clock: the unit of whole numbers, or the last decimal of seconds."""
+    if layout.time_column is None:
+        return 0.0
+    if layout.time_column is not Column.TIME_S:
+        return TIME_UNIT_S[layout.time_column]
+    place = layout.columns.index(Column.TIME_S)
+    separator, decimal = layout.separator.encode("ascii"), layout.decimal.encode("ascii")
+    lines = data[first_line_start(data) : whole_lines_end(data)].splitlines()[:_LINES_EXAMINED]
+    fields = [line.split(separator) for line in lines if line.count(separator) == len(layout.columns) - 1]
+    decimals = [row[place].strip().partition(decimal)[2] for row in fields]
+    return 10.0 ** -max((len(digits) for digits in decimals if digits.isdigit()), default=0)
+
+
+def first_line_start(data: bytes) -> int:
+    """Position after the first terminator; 0 if there is none."""
+    return min((at + 1 for at in (data.find(b"\n"), data.find(b"\r")) if at >= 0), default=0)
+
+
+def whole_lines_end(data: bytes) -> int:
+    """Position after the last terminator; 0 if there is none."""
+    return max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
+
+
+def has_good_line(layout: LineFormat, data: bytes) -> bool:
+    """Whether one line of `data` after the first is good."""
+    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    return bool(lines["good"].any())

@@ -1,0 +1,141 @@
+"""Layout of a line of values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.errors import SettingsError
+
+
+class Column(StrEnum):
+    """Content of a column."""
+
+    TIME_US = "time_us"
+    TIME_MS = "time_ms"
+    TIME_S = "time_s"
+    TABLE = "table"
+    RELATIVE = "relative"
+    VALUE = "value"
+    """The reading of a device with one gauge."""
+    SEQUENCE = "sequence"
+    XOR = "xor"
+    """Two hex digits: exclusive or of all characters before its separator."""
+    CRC = "crc"
+    """Four hex digits: CRC-16/CCITT-FALSE of all characters before its separator."""
+    UNIT = "unit"
+    """A word, such as kg."""
+    EMPTY = "empty"
+    """Nothing, as after a separator at the end of a line."""
+    IGNORE = "ignore"
+    """A number that is not used."""
+
+
+TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
+CHECKSUMS = (Column.XOR, Column.CRC)
+_READINGS = (Column.TABLE, Column.RELATIVE, Column.VALUE)
+_OF_NUMBERS = "0123456789+-."
+_MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
+
+
+@dataclass(frozen=True, slots=True)
+class LineFormat:
+    """Columns of a line and how they are written.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        From left to right: `table` and `relative` once each, or `value` once of a device with one
+        gauge; at most one time column, one `sequence` and one checksum, which is last; others in any number.
+    separator : str
+        One character; a blank means any number of blanks.
+    decimal : str
+        "." or ",".
+    comment : str
+        First characters of lines that are skipped.
+    time_bits, sequence_bits : int
+        Width of the counters of a time in us or ms and of a sequence, which wrap; 0: they do not wrap.
+    unit : str
+        The word in `unit` columns; "" for any word.
+
+    Raises
+    ------
+    SettingsError
+        If the attributes contradict each other.
+    """
+
+    columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
+    separator: str = ","
+    decimal: str = "."
+    comment: str = "#%;/"
+    time_bits: int = 32
+    sequence_bits: int = 32
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        _check_columns(self.columns)
+        if len(self.separator) != 1 or self.separator in _OF_NUMBERS + "eE\r\n":
+            raise SettingsError(
+                "separator {separator!r} cannot part numbers: give one of , ; tab space",
+                separator=self.separator,
+            )
+        if not self.comment.isascii() or any(mark in _OF_NUMBERS for mark in self.comment):
+            raise SettingsError(
+                "comment {comment!r} cannot mark comments: give characters such as #%;", comment=self.comment
+            )
+        if self.unit and not (self.unit.isascii() and self.unit.isalpha()):
+            raise SettingsError("unit {unit!r} is no word: give letters, for example kg", unit=self.unit)
+        if self.decimal not in (".", ","):
+            raise SettingsError("decimal {decimal!r} is not known: give . or ,", decimal=self.decimal)
+        if self.decimal == self.separator:
+            raise SettingsError(
+                "separator and decimal are both {mark!r}: give another separator", mark=self.decimal
+            )
+        for name, bits in (("time_bits", self.time_bits), ("sequence_bits", self.sequence_bits)):
+            if bits != 0 and not _MIN_BITS <= bits <= _MAX_BITS:
+                raise SettingsError(
+                    "{name} {bits} is out of range: give {least} to {most}, or 0 for no wrap",
+                    name=name,
+                    bits=bits,
+                    least=_MIN_BITS,
+                    most=_MAX_BITS,
+                )
+
+    @property
+    def channels(self) -> int:
+        """Gauges of the device: 1 or 2."""
+        return 1 if Column.VALUE in self.columns else 2
+
+    @property
+    def time_column(self) -> Column | None:
+        """The column with the device's time, if there is one."""
+        return next((column for column in self.columns if column in TIME_UNIT_S), None)
+
+    @property
+    def time_wrap(self) -> int:
+        """Value at which the time wraps, in units of its column; 0: it does not."""
+        wraps = self.time_bits and self.time_column in (Column.TIME_US, Column.TIME_MS)
+        return 1 << self.time_bits if wraps else 0
+
+    @property
+    def sequence_wrap(self) -> int:
+        """Value at which the sequence wraps; 0: it does not."""
+        return 1 << self.sequence_bits if self.sequence_bits else 0
+
+    @property
+    def checksum(self) -> Column | None:
+        """The checksum column, if there is one."""
+        return self.columns[-1] if self.columns[-1] in CHECKSUMS else None
+
+
+def _check_columns(columns: tuple[Column, ...]) -> None:
+    readings = [column for column in columns if column in _READINGS]
+    names = ",".join(columns)
+    if sorted(readings) not in ([Column.RELATIVE, Column.TABLE], [Column.VALUE]):
+        raise SettingsError(
+            "columns {columns} need table and relative exactly once each, or value alone", columns=names
+        )
+    if sum(column in TIME_UNIT_S for column in columns) > 1 or columns.count(Column.SEQUENCE) > 1:
+        raise SettingsError(
+            "columns {columns} hold more than one time or sequence: name others ignore", columns=names
+        )
+    if any(column in CHECKSUMS for column in columns[:-1]):
+        raise SettingsError("columns {columns}: a checksum (xor, crc) can only be the last", columns=names)

@@ -1,0 +1,241 @@
+r"""Layout of lines that nobody has described, inferred from the lines.
+
+A SparkFun OpenScale with firmware 1.2 sends `[ms,]value,lbs|kg,[raw,][t,][t,]`, with firmware 1.0
+`[ms,][t,][t,]value,lbs|kg`, each ended by `\r\n`, after a banner; at 9600 baud and two lines a second unless
+set otherwise (sparkfun/OpenScale, firmware/OpenScale/OpenScale/OpenScale.ino, `loop`, and System.ino,
+`set_default_settings`).
+"""
+
+import math
+import re
+from collections import Counter
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from operator import xor
+from typing import TypeAlias
+
+import numpy as np
+
+from drivers.crc import crc16
+from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.recognition import is_text
+from messages.message import EMPTY, Message, message
+
+_COMMENT = b"#%;/"
+_LINES_NEEDED = 3
+_LINES_EXAMINED = 400
+_ALIKE = 0.8
+"""Share of the lines that must have the same form: some may be banners or damaged."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
+_DECIMALS = {"point": ".", "comma": ","}
+_LEAST_VALUES = 5
+"""Different values that distinguish a counter from a reading that happens to rise."""
+_STEADY = 0.5
+"""Share of the mean step by which steps may differ."""
+_KILOHERTZ_FACTOR = 1.2
+"""How far a rate may be from 1 kHz for a time in milliseconds that grows by one."""
+_ROUNDING = 1e-6
+_USUAL_US = 200
+"""Without a rate, larger steps are taken for microseconds and smaller ones for milliseconds."""
+_TIME_FACTOR = 3.0
+"""Largest ratio between the rate by a time column and the rate of the lines."""
+
+_Rows: TypeAlias = list[list[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class InferredColumns:
+    """A layout, the settings for it, and what is uncertain about it."""
+
+    layout: LineFormat
+    settings: dict[str, str]
+    remark: Message = EMPTY
+
+
+def infer_columns(data: bytes, duration_s: float | None = None) -> InferredColumns | None:
+    """Layout of lines of numbers; None if `data` are not such lines.
+
+    A column that grows in even steps at the rate of the lines (over `duration_s`) is a time, one that grows
+    by one a sequence. The first two of the other columns are taken for the gauges.
+    """
+    every_line = _lines(data)
+    if not is_text(data) or len(every_line) < _LINES_NEEDED:
+        return None
+    lines = every_line[-_LINES_EXAMINED:]
+    rows, separator, decimal = _split(lines)
+    if not rows:
+        return None
+    rate_hz = (len(every_line) - 1) / duration_s if duration_s else None
+    columns = _roles(rows, lines, _SEPARATORS[separator], rate_hz)
+    if not {Column.TABLE, Column.VALUE} & set(columns):
+        return None
+    layout = LineFormat(tuple(columns), _SEPARATORS[separator], _DECIMALS[decimal])
+    settings = {"columns": ",".join(columns)}
+    settings |= {"separator": separator} if separator != "comma" else {}
+    settings |= {"decimal": decimal} if decimal != "point" else {}
+    is_certain = Column.IGNORE not in columns
+    remark = EMPTY if is_certain else message("check which columns are the gauges'")
+    return InferredColumns(layout, settings, remark)
+
+
+def _lines(data: bytes) -> list[str]:
+    """Whole lines without blank ones and comments."""
+    parts = data.replace(b"\r", b"\n").split(b"\n")[1:-1]
+    kept = [part for part in parts if part.strip() and part[:1] not in _COMMENT]
+    return [part.decode("ascii", "replace") for part in kept]
+
+
+def _split(lines: list[str]) -> tuple[_Rows, str, str]:
+    """Fields of the lines of the same form, with the separator and decimal that give most fields."""
+    best: tuple[_Rows, str, str] = ([], "comma", "point")
+    for separator, mark in _SEPARATORS.items():
+        for decimal, point in _DECIMALS.items():
+            if mark == point:
+                continue
+            rows = _alike([_fields(line, mark, point) for line in lines])
+            if len(rows) >= _ALIKE * len(lines) and _width(rows) > _width(best[0]):
+                best = (rows, separator, decimal)
+    return best
+
+
+def _fields(line: str, mark: str, point: str) -> list[str]:
+    """Fields with a decimal point; none unless all are numbers, the last one perhaps a checksum."""
+    fields = line.split() if mark == " " else [field.strip() for field in line.split(mark)]
+    if point == "," and any("." in field for field in fields):
+        return []
+    fields = [field.replace(point, ".") for field in fields]
+    numbers = fields if len(fields) == 1 or _is_number(fields[-1]) else fields[:-1]
+    is_row = all(map(_is_number, numbers)) and (len(numbers) == len(fields) or _is_hex(fields[-1]))
+    return fields if is_row else []
+
+
+def _alike(rows: _Rows) -> _Rows:
+    width, _ = Counter(map(len, rows)).most_common(1)[0]
+    return [row for row in rows if len(row) == width] if width else []
+
+
+def _width(rows: _Rows) -> int:
+    return len(rows[0]) if rows else 0
+
+
+def _is_number(field: str) -> bool:
+    return _NUMBER.fullmatch(field) is not None
+
+
+def _is_hex(field: str) -> bool:
+    return len(field) in (2, 4) and all(digit in "0123456789abcdefABCDEF" for digit in field)
+
+
+def _roles(rows: _Rows, lines: list[str], separator: str, rate_hz: float | None) -> list[Column]:
+    width = len(rows[0])
+    columns = [Column.IGNORE] * width
+    checksum = _checksum(lines, separator) if width > 1 else None
+    if checksum is not None:
+        columns[-1] = checksum
+    for at in range(width - (checksum is not None)):
+        may_be_time = not set(TIME_UNIT_S) & set(columns)
+        role = _counter([row[at] for row in rows], rate_hz, may_be_time)
+        if role is not None and role not in columns:
+            columns[at] = role
+    free = [at for at, column in enumerate(columns) if column is Column.IGNORE]
+    if len(free) == 1:
+        columns[free[0]] = Column.VALUE
+    elif free:
+        columns[free[0]], columns[free[1]] = Column.TABLE, Column.RELATIVE
+    return columns
+
+
+def _checksum(lines: list[str], separator: str) -> Column | None:
+    """Kind of checksum in the last column, if it is right in most lines."""
+    agree = {Column.XOR: 0, Column.CRC: 0}
+    for line in lines:
+        before, _, said = line.strip().rpartition(separator)
+        data = before.encode("ascii", "replace")
+        agree[Column.XOR] += said.upper() == f"{reduce(xor, data, 0):02X}"
+        agree[Column.CRC] += said.upper() == f"{crc16(data):04X}"
+    found = max(agree, key=lambda column: agree[column])
+    return found if agree[found] >= _ALIKE * len(lines) else None
+
+
+def _counter(fields: list[str], rate_hz: float | None, may_be_time: bool) -> Column | None:
+    """Time or sequence in a column; None for others."""
+    values = np.array([float(field) for field in fields])
+    steps = np.diff(values)
+    onward = steps[steps >= 0]
+    if len(onward) < _ALIKE * len(steps) or len(np.unique(values)) < min(_LEAST_VALUES, len(values)):
+        return None
+    finest = 10.0 ** -max(len(field.partition(".")[2]) for field in fields)
+    low, high = np.quantile(onward, (0.1, 0.9))
+    step = float(onward[onward <= 2 * high + finest].mean())
+    if float(np.mean(steps == 1)) >= _ALIKE and not (may_be_time and _is_kilohertz(rate_hz)):
+        return Column.SEQUENCE
+    unit = _unit(step, finest, rate_hz) if may_be_time else None
+    return unit if high - low <= _STEADY * step + finest * (1 + _ROUNDING) else None
+
+
+def _is_kilohertz(rate_hz: float | None) -> bool:
+    """Whether lines come at such a rate that a time in milliseconds grows by one."""
+    return rate_hz is not None and abs(math.log(rate_hz / 1000)) < math.log(_KILOHERTZ_FACTOR)
+
+
+def _unit(step: float, finest: float, rate_hz: float | None) -> Column | None:
+    """Unit in which `step` is the time between lines; the most usual one where their rate is unknown."""
+    if rate_hz is None:
+        whole = Column.TIME_US if step >= _USUAL_US else Column.TIME_MS
+        return whole if finest == 1 else Column.TIME_S
+    misfits = {column: abs(math.log(step * unit_s * rate_hz)) for column, unit_s in TIME_UNIT_S.items()}
+    best = min(misfits, key=lambda column: misfits[column])
+    return best if misfits[best] <= math.log(_TIME_FACTOR) else None
+
+
+OPENSCALE_UNITS = ("kg", "lbs")
+OPENSCALE_FORMAT = LineFormat((Column.TIME_MS, Column.VALUE, Column.UNIT, Column.EMPTY), unit="kg")
+"""As shipped: a time, no temperatures, kg."""
+_OPENSCALE_LINES = 3
+
+
+def find_openscale_format(data: bytes) -> LineFormat | None:
+    """Layout of an OpenScale from the first three consecutive lines of the same form; None without such.
+
+    A first field is a time only where it grows from line to line in whole numbers: a temperature without a
+    sensor is 0.
+    """
+    lines = [line for line in data[: data.rfind(b"\n") + 1].splitlines() if line]
+    rows = [line.decode("ascii", "replace").split(",") for line in lines]
+    shapes = [_shape(row) for row in rows]
+    for end in range(_OPENSCALE_LINES, len(rows) + 1):
+        start = end - _OPENSCALE_LINES
+        if shapes[start] is not None and len(set(shapes[start:end])) == 1:
+            return _layout_of(rows[start:end])
+    return None
+
+
+def _layout_of(rows: list[list[str]]) -> LineFormat:
+    unit_at = next(at for at, field in enumerate(rows[0]) if field in OPENSCALE_UNITS)
+    columns = [Column.IGNORE if field else Column.EMPTY for field in rows[0]]
+    columns[unit_at - 1 : unit_at + 1] = Column.VALUE, Column.UNIT
+    if unit_at > 1 and _is_clock([row[0] for row in rows]):
+        columns[0] = Column.TIME_MS
+    return LineFormat(tuple(columns), unit=rows[0][unit_at])
+
+
+def _shape(fields: list[str]) -> tuple[str, ...] | None:
+    """Form of a line, field by field; None if these are not the fields of an OpenScale."""
+    units = [at for at, field in enumerate(fields) if field in OPENSCALE_UNITS]
+    numbers = [field for field in fields if field and field not in OPENSCALE_UNITS]
+    if len(units) != 1 or units[0] == 0 or "" in fields[:-1] or not all(map(_is_plain_number, numbers)):
+        return None
+    return tuple(field if field in OPENSCALE_UNITS else "number" if field else "" for field in fields)
+
+
+def _is_plain_number(field: str) -> bool:
+    return field.removeprefix("-").replace(".", "", 1).isdigit()
+
+
+def _is_clock(fields: list[str]) -> bool:
+    if not all(field.removeprefix("-").isdigit() for field in fields):
+        return False
+    times = [int(field) for field in fields]
+    return all(before < after for before, after in pairwise(times))

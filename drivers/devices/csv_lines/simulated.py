@@ -1,0 +1,44 @@
+"""A simulated device that sends lines of values."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.devices.csv_lines import DRIVER
+from drivers.devices.csv_lines.codec import encode_lines
+from drivers.devices.csv_lines.columns import LineFormat
+from drivers.devices.csv_lines.source import CsvSettings
+from drivers.simulated.protocol import Command, NullCommandParser, SimulatedProtocol
+from drivers.stream import parse_settings
+
+
+class SimulatedCsv(SimulatedProtocol):
+    """Sends a line a sample from the moment the port is opened; an overload shows as clipping only."""
+
+    streams_on_open = True
+    line_end = b"\r\n"
+
+    def __init__(self, layout: LineFormat | None = None) -> None:
+        self._layout = layout or LineFormat()
+
+    def command_parser(self) -> NullCommandParser:
+        """It takes no commands."""
+        return NullCommandParser()
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Nothing."""
+        return b""
+
+    def encode(
+        self,
+        first_sequence: int,
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],  # noqa: ARG002 - a line of numbers has no flags
+        times_s: NDArray[np.float64],
+    ) -> list[bytes]:
+        """Lines."""
+        return encode_lines(self._layout, times_s, counts, first_sequence)
+
+
+def make_protocol(settings: dict[str, str]) -> SimulatedCsv:
+    """The simulated device with its own settings. Raises SettingsError."""
+    return SimulatedCsv(parse_settings(CsvSettings, settings, DRIVER.name).layout())

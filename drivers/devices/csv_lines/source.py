@@ -1,0 +1,276 @@
+"""A device that sends lines of values, as a `SampleSource`."""
+
+import math
+from typing import Literal
+
+import msgspec
+
+from drivers.devices.csv_lines import DRIVER
+from drivers.devices.csv_lines.codec import (
+    LineDecoder,
+    clock_step_from_lines,
+    encode_line,
+    first_line_start,
+    has_good_line,
+    rate_from_lines,
+    whole_lines_end,
+)
+from drivers.devices.csv_lines.columns import CHECKSUMS, Column, LineFormat
+from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT, find_openscale_format, infer_columns
+from drivers.devices.csv_lines.line_parser import LineParser
+from drivers.errors import NoDataError, SettingsError
+from drivers.recognition import Recognition, is_recognised, rate_from_count
+from drivers.samples import DeviceIdentity
+from drivers.source import Link
+from drivers.stream import RATE_TOLERANCE, StreamSource, parse_settings
+from messages.message import EMPTY, Message
+
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+_DECIMALS = {"point": ".", "comma": ","}
+_DOUBTED_BYTES = 1 << 14
+"""Some hundred lines, few of which are damaged: if their rate is wrong, the settings are."""
+
+
+class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give; see `LineFormat`. Raises SettingsError."""
+
+    format: Literal["columns", "openscale"] = "columns"
+    """`openscale` infers the columns of a SparkFun OpenScale."""
+    columns: str = "time_us,table,relative"
+    separator: str = "comma"
+    decimal: str = "point"
+    comment: str = "#%;/"
+    unit: str = ""
+    """The word in `unit` columns; any word if empty."""
+    time_bits: int = 32
+    sequence_bits: int = 32
+    overload_count: float = math.inf
+    """Readings of this size and more are marked as overloaded."""
+
+    def __post_init__(self) -> None:
+        if not self.overload_count > 0:
+            raise SettingsError("overload_count {count:g} must be positive", count=self.overload_count)
+        if self.format != "openscale":
+            return
+        for field in msgspec.structs.fields(type(self)):
+            given = getattr(self, field.name)
+            if field.name not in ("format", "overload_count") and given != field.default:
+                raise SettingsError(
+                    "format openscale finds {name} by itself: leave {name} out", name=field.name
+                )
+
+    def layout(self) -> LineFormat:
+        """Columns as the decoder takes them; those of a new OpenScale for one. Raises SettingsError."""
+        if self.format == "openscale":
+            return OPENSCALE_FORMAT
+        return LineFormat(
+            columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
+            separator=_SEPARATORS.get(self.separator, self.separator),
+            decimal=_DECIMALS.get(self.decimal, self.decimal),
+            comment=self.comment,
+            time_bits=self.time_bits,
+            sequence_bits=self.sequence_bits,
+            unit=self.unit,
+        )
+
+
+class CsvLinesSource(StreamSource):
+    """The device sends by itself and takes no commands.
+
+    Parameters
+    ----------
+    layout : LineFormat or None
+        None for a device whose lines show it (`find_layout`).
+    rate_hz : float or None
+        Nominal samples a second; needed where no column holds the time.
+    overload_count : float
+        Readings of this size and more are marked as overloaded.
+    """
+
+    name = "CSV lines"
+
+    def __init__(
+        self, layout: LineFormat | None, rate_hz: float | None, overload_count: float = math.inf
+    ) -> None:
+        super().__init__(DeviceIdentity(DRIVER.name, self.name), DRIVER.default_baud, rate_hz)
+        self._layout = layout
+        self._overload_count = overload_count
+        if layout is not None:
+            self._check_rate(layout)
+
+    @property
+    def channels(self) -> int:
+        """One with a `value` column, else two."""
+        return 1 if self._layout is None else self._layout.channels
+
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        layout = self._layout or LineFormat()
+        list(LineDecoder(layout, 1.0).feed(b"\n" + encode_line(layout, 0.0, 0, 0), 0))
+
+    def start(self, link: Link) -> bytes:
+        """Wait for the first good line, and with a time column for as many as show the rate.
+
+        Opening the port resets many Arduinos, which are silent for two seconds after it.
+
+        Raises
+        ------
+        NoDataError
+            If no good line came in time, or after it too few to show the rate.
+        SettingsError
+            If the rate asked for is not that of the device's own times.
+        """
+        self.prepare()
+        link.read()  # what waited in the port is old, and some of it may be lost
+        first, good = self.await_data(link, self.timeout_s, self._has_good_line)
+        if not good or self._layout is None:
+            raise self.no_data_error(first)
+        self._check_rate(self._layout)
+        if self._layout.time_column is None:
+            return first
+        more, good = self.await_data(link, self.timeout_s, lambda data: self._shows_rate(first + data))
+        if not good:
+            raise NoDataError(
+                "the lines of {timeout_s:g} s do not tell a rate: the device is too slow",
+                timeout_s=self.timeout_s,
+            )
+        self._decoder = self._decoder or self.make_decoder(first + more)
+        if self._decoder is None:
+            raise self._rate_error(rate_from_lines(self._layout, first + more) or 0.0)
+        return first + more
+
+    def make_decoder(self, data: bytes) -> LineDecoder | None:
+        """Decoder once the layout is known, and the rate is given or shown by the device's own times.
+
+        Where both rates are there and disagree, the first lines may be damaged: more of them are awaited.
+
+        Raises
+        ------
+        SettingsError
+            If many lines still disagree, or neither rate can be known.
+        """
+        layout = self._layout = self._layout or self.find_layout(data)
+        if layout is None:
+            return None
+        self._check_rate(layout)
+        measured_hz = self._rate_hz if layout.time_column is None else rate_from_lines(layout, data)
+        if measured_hz is None:
+            return None
+        self._rate_hz = self._rate_hz or measured_hz
+        if abs(measured_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+            if len(data) < _DOUBTED_BYTES:
+                return None
+            raise self._rate_error(measured_hz)
+        return LineDecoder(layout, measured_hz, clock_step_from_lines(layout, data), self._overload_count)
+
+    def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
+        """Layout of the lines in `data`, where none was given."""
+        return self._layout
+
+    def _rate_error(self, measured_hz: float) -> SettingsError:
+        return SettingsError(
+            "rate {rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
+            "leave --rate out, or check the unit of the time column",
+            rate_hz=self._rate_hz,
+            measured_hz=measured_hz,
+        )
+
+    def _has_good_line(self, data: bytes) -> bool:
+        self._layout = self._layout or self.find_layout(data)
+        return self._layout is not None and has_good_line(self._layout, data)
+
+    def _shows_rate(self, data: bytes) -> bool:
+        return self._layout is not None and rate_from_lines(self._layout, data) is not None
+
+    def _check_rate(self, layout: LineFormat) -> None:
+        if self._rate_hz is None and layout.time_column is None:
+            raise SettingsError("lines without a time column do not tell their rate: give --rate")
+
+
+class OpenScaleSource(CsvLinesSource):
+    """A SparkFun OpenScale, with whatever columns it is set to send."""
+
+    name = "SparkFun OpenScale"
+    timeout_s = 8.0
+    """It is reset by opening its port, and averages readings before the first line."""
+
+    def __init__(self, rate_hz: float | None, overload_count: float = math.inf) -> None:
+        super().__init__(None, rate_hz, overload_count)
+
+    def find_layout(self, data: bytes) -> LineFormat | None:
+        """See `drivers.devices.csv_lines.inference`."""
+        return find_openscale_format(data)
+
+
+def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
+    """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
+    if rate_hz is not None and not 0 < rate_hz < math.inf:
+        raise SettingsError(
+            "rate {rate_hz:g} Hz cannot be: give samples a second, for example 80", rate_hz=rate_hz
+        )
+    parsed = parse_settings(CsvSettings, settings, DRIVER.name)
+    if parsed.format == "openscale":
+        return OpenScaleSource(rate_hz, parsed.overload_count)
+    return CsvLinesSource(parsed.layout(), rate_hz, parsed.overload_count)
+
+
+def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str]:  # noqa: ARG001
+    """Settings of a device with one gauge. Raises SettingsError for columns without `value`."""
+    if settings.get("format", "columns") != "columns":
+        return settings  # the device shows its columns itself
+    columns = settings.get("columns", "time_us,value")
+    if "value" not in (name.strip() for name in columns.split(",")):
+        raise SettingsError(
+            "columns {columns} have no value: a device with one gauge sends one, as time_us,value",
+            columns=columns,
+        )
+    return settings | {"columns": columns}
+
+
+def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
+    """What `data` are; see `drivers.recognition.recognise`. An OpenScale is preferred to other lines."""
+    openscale = find_openscale_format(data)
+    found = None
+    if openscale is not None:
+        found = _recognise_lines(openscale, data, duration_s, {"format": "openscale"})
+    inferred = infer_columns(data, duration_s)
+    if inferred is not None:
+        lines = _recognise_lines(inferred.layout, data, duration_s, inferred.settings, inferred.remark)
+        if found is None or (lines is not None and lines.share > found.share):
+            return lines
+    return found
+
+
+def _recognise_lines(
+    layout: LineFormat,
+    data: bytes,
+    duration_s: float | None,
+    settings: dict[str, str],
+    remark: Message = EMPTY,
+) -> Recognition | None:
+    whole = data[first_line_start(data) : whole_lines_end(data)]
+    lines = LineParser(layout).read(whole)
+    good = lines[lines["good"] != 0]
+    share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)
+    if not is_recognised(len(good), share, has_checksum=layout.checksum in CHECKSUMS):
+        return None
+    samples = len(good) + 1  # the first line was left out
+    return Recognition(
+        DRIVER.name,
+        min(share, 1.0),
+        len(good),
+        layout.channels,
+        settings,
+        rate_from_lines(layout, data) or rate_from_count(samples, duration_s),
+        layout.time_column is None,
+        remark,
+    )
+
+
+def _column(name: str) -> Column:
+    try:
+        return Column(name)
+    except ValueError as error:
+        raise SettingsError(
+            "column {name!r} is not known: allowed are {allowed}", name=name, allowed=list(Column)
+        ) from error

@@ -1,0 +1,356 @@
+"""Measurement frames of a GSV, encoded and decoded: `AA | header | status | payload | 85`."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.compiled import compiled, inlined
+from drivers.devices.gsv.commands import END, SYNC
+from drivers.errors import ProtocolError
+from drivers.packets import (
+    LOSS_FIELDS,
+    MAX_GAP_S,
+    PACKET,
+    LossEstimator,
+    PacketDecoder,
+    Packets,
+    Record,
+)
+from drivers.samples import Losses, SampleStatus
+
+HEADER_BYTES = 3
+MAX_CHANNELS = 16
+MAX_FRAME_BYTES = HEADER_BYTES + 4 * MAX_CHANNELS + 1
+MEASUREMENT = 0x10
+"""Header: type 00, serial interface; its low four bits are the number of channels less one."""
+TYPE_AND_INTERFACE = 0xF0
+INDICATOR = 0x80
+"""Set in the status of every measurement frame."""
+OVERLOAD = 0x03
+"""Status bits: an input is overloaded (0), a six-axis sensor is out of its range (1)."""
+_BOTH_OVERLOADED = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
+
+
+class ValueKind(IntEnum):
+    """Format of a channel's value, as in bits 6-4 of the status."""
+
+    INT16 = 1
+    INT24 = 2
+    FLOAT32 = 3
+
+    @property
+    def size(self) -> int:
+        """Bytes of a value."""
+        return self + 1
+
+
+_ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
+"""Offset that is added to whole numbers on the wire."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameLayout:
+    """What all measurement frames of a stream have in common.
+
+    Attributes
+    ----------
+    channels : int
+        Values in a frame, 1 to 16.
+    kind : ValueKind
+    table, relative : int
+        Channels of the two gauges, from 1.
+
+    Raises
+    ------
+    ProtocolError
+        If a gauge's channel is not in the frame.
+    """
+
+    channels: int
+    kind: ValueKind = ValueKind.FLOAT32
+    table: int = 1
+    relative: int = 2
+
+    def __post_init__(self) -> None:
+        for name, channel in (("table", self.table), ("relative", self.relative)):
+            if not 1 <= channel <= self.channels:
+                raise ProtocolError(
+                    "the device sends {channels} channels and the {name} gauge is to be {channel}: "
+                    "set {name} to its channel, or let the device send that channel too",
+                    channels=self.channels,
+                    name=name,
+                    channel=channel,
+                )
+
+    @property
+    def length(self) -> int:
+        """Bytes of a frame."""
+        return HEADER_BYTES + self.channels * self.kind.size + 1
+
+    @property
+    def header(self) -> int:
+        """Second byte of a frame."""
+        return MEASUREMENT | (self.channels - 1)
+
+    def offset(self, channel: int) -> int:
+        """Position of a channel's value (from 1) in a frame."""
+        return HEADER_BYTES + (channel - 1) * self.kind.size
+
+
+def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
+    """Channels and kind of the measurement frames in `data`; None while there are not two in a row.
+
+    One frame is not enough, because the bytes that begin and end a frame may occur in a value.
+    """
+    at = data.find(SYNC)
+    while 0 <= at <= len(data) - HEADER_BYTES:
+        found = _layout_at(data, at)
+        if found is not None and _layout_at(data, at + FrameLayout(*found, 1, 1).length) == found:
+            return found
+        at = data.find(SYNC, at + 1)
+    return None
+
+
+def _layout_at(data: bytes, at: int) -> tuple[int, ValueKind] | None:
+    """Channels and kind of a whole frame at `at`."""
+    if len(data) < at + HEADER_BYTES or data[at] != SYNC or data[at + 1] & TYPE_AND_INTERFACE != MEASUREMENT:
+        return None
+    kind = (data[at + 2] & ~INDICATOR) >> 4
+    if not data[at + 2] & INDICATOR or kind not in tuple(ValueKind):
+        return None
+    channels = (data[at + 1] & 0x0F) + 1
+    end = at + HEADER_BYTES + channels * ValueKind(kind).size
+    return (channels, ValueKind(kind)) if len(data) > end and data[end] == END else None
+
+
+def encode_frames(
+    layout: FrameLayout,
+    counts: NDArray[np.int32] | NDArray[np.float64],
+    flags: int | NDArray[np.uint8] = 0,
+) -> NDArray[np.uint8]:
+    """Frames as a device without faults sends them; channels without a gauge are 0.
+
+    Parameters
+    ----------
+    layout : FrameLayout
+    counts : (n, 2)
+        Table and relative; whole numbers are limited to the range of their kind.
+    flags : int or (n,) uint8
+        Low bits of the status: 1 overload, 2 six-axis error.
+
+    Returns
+    -------
+    (n, layout.length) uint8
+        A frame a row; `.tobytes()` is what is sent.
+    """
+    wire = np.zeros((len(counts), layout.length), dtype=np.uint8)
+    wire[:, :2] = SYNC, layout.header
+    wire[:, 2] = INDICATOR | layout.kind << 4 | np.asarray(flags)
+    values = np.zeros((len(counts), layout.channels))
+    values[:, layout.table - 1] = counts[:, 0]
+    values[:, layout.relative - 1] = counts[:, 1]
+    wire[:, HEADER_BYTES:-1] = _encode_values(layout.kind, values)
+    wire[:, -1] = END
+    return wire
+
+
+def _encode_values(kind: ValueKind, values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    if kind is ValueKind.FLOAT32:
+        return values.astype(">f4").view(np.uint8)
+    zero = _ZERO[kind]
+    whole = (np.clip(np.rint(values), -zero, zero - 1) + zero).astype(">u4")
+    return whole.view(np.uint8).reshape(*values.shape, 4)[:, :, 4 - kind.size :].reshape(len(values), -1)
+
+
+class FrameDecoder(PacketDecoder):
+    """Bytes to sample blocks. A frame has no checksum and no number that would prove a loss.
+
+    A row stands for each frame that came broken. Frames that did not come are estimated from the host's
+    clock, in `losses` alone. A wrong bit within a value is not noticed. The sample of a frame is given once
+    the next frame has begun. After a broken connection, rows stand for the time until the next frame.
+
+    An overload is marked on both gauges, because the device does not say on which input it is.
+
+    Parameters
+    ----------
+    layout : FrameLayout
+    rate_hz : float
+        Nominal rate, > 0.
+    max_gap_s : float
+        Longest time that rows stand for.
+    """
+
+    def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
+        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
+        self._layout = layout
+        self._pattern = frame_pattern(layout)
+        self._loss_estimator = LossEstimator(rate_hz)
+
+    @property
+    def losses(self) -> Losses:
+        """Counts until now."""
+        losses = super().losses
+        losses.missing_estimated += self._loss_estimator.lost
+        return losses
+
+    def expect_restart(self) -> None:
+        """See `PacketDecoder`."""
+        self._state["garbage"] += len(self._unfinished)
+        super().expect_restart()
+
+    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
+        broken = np.empty(len(offsets), dtype=np.int64)
+        found, used = find_frames(buffer, self._pattern, self._state, offsets, broken)
+        self._unfinished = data[used:]
+        if not found:
+            return None
+        packets = self._make_packets(buffer, offsets[:found], broken[:found], arrival_ns)
+        first_index = int(self._state["samples"][0])
+        count_packets(packets, self._state)
+        self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
+        values = self._values(buffer, offsets[:found])
+        return self._packets(packets, values, (first_index, 0.0), arrival_ns, has_time=False)
+
+    def _make_packets(
+        self,
+        buffer: NDArray[np.uint8],
+        offsets: NDArray[np.int64],
+        broken: NDArray[np.int64],
+        arrival_ns: int,
+    ) -> NDArray[np.void]:
+        packets = np.zeros(len(offsets), dtype=PACKET)
+        packets["samples"] = 1
+        packets["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
+        packets["damaged"] = broken
+        if self._arrival_ns is None:
+            packets["damaged"][0] = 0
+        if self._state[0]["restarting"]:
+            gap = self._rows_since(arrival_ns, len(offsets))
+            packets["damaged"][0] = min(gap, broken[0])
+            packets["missing"][0] = gap - packets["damaged"][0]
+        return packets
+
+    def _values(self, buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+        kind, size = self._layout.kind, self._layout.kind.size
+        starts = [self._layout.offset(channel) for channel in (self._layout.table, self._layout.relative)]
+        places = np.add.outer(offsets, np.add.outer(starts, np.arange(size)))
+        if kind is ValueKind.FLOAT32:
+            return buffer[places].view(">f4")[:, :, 0].astype(np.float64)
+        weights = 256.0 ** np.arange(size - 1, -1, -1)
+        values: NDArray[np.float64] = buffer[places] @ weights - _ZERO[kind]
+        return values
+
+
+FRAME_PATTERN = np.dtype(
+    [
+        ("header", np.int64),
+        ("kind", np.int64),  # high half of the status byte
+        ("length", np.int64),
+        ("table", np.int64),  # positions of the two values in a frame
+        ("relative", np.int64),
+        ("is_float", np.int64),
+    ],
+    align=True,
+)
+"""What a good frame looks like."""
+
+STATE = np.dtype(
+    [
+        *LOSS_FIELDS,
+        ("restarting", np.int64),  # the connection broke after the last good frame
+        ("garbage", np.int64),  # bytes since then
+        ("begun", np.int64),  # frames that began in them
+    ],
+    align=True,
+)
+"""What the decoder keeps between calls."""
+
+_KIND_BITS = 0xF0
+
+
+def frame_pattern(layout: FrameLayout) -> NDArray[np.void]:
+    """(1,) FRAME_PATTERN for frames of `layout`."""
+    pattern = np.zeros(1, dtype=FRAME_PATTERN)
+    pattern["header"] = layout.header
+    pattern["kind"] = INDICATOR | layout.kind << 4
+    pattern["length"] = layout.length
+    pattern["table"] = layout.offset(layout.table)
+    pattern["relative"] = layout.offset(layout.relative)
+    pattern["is_float"] = layout.kind is ValueKind.FLOAT32
+    return pattern
+
+
+@compiled
+def find_frames(
+    buffer: NDArray[np.uint8],
+    patterns: NDArray[np.void],
+    states: NDArray[np.void],
+    offsets: NDArray[np.int64],
+    broken: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Offsets of the good frames in `buffer`, and how many came broken before each.
+
+    In a good frame the header, the end, and the byte that begins the next frame match the pattern, and both
+    values are finite. A bad candidate costs one byte. Returns the number of frames and the number of bytes
+    that were used: the rest, at most a frame and the byte after, may become one. `states` (1,) is updated.
+    """
+    pattern, state = patterns[0], states[0]
+    at = 0
+    found = 0
+    while at + pattern.length < len(buffer):
+        if _is_header(buffer, at, pattern):
+            if _is_whole(buffer, at, pattern):
+                offsets[found] = at
+                by_bytes = (2 * state.garbage + pattern.length) // (2 * pattern.length)
+                broken[found] = max(state.begun, by_bytes)
+                state.garbage = state.begun = 0
+                found += 1
+                at += pattern.length
+                continue
+            state.begun += 1
+        elif state.garbage == 0 and buffer[at] == SYNC:
+            state.begun = 1
+        state.garbage += 1
+        at += 1
+    state.discarded_bytes += at - found * pattern.length
+    return found, at
+
+
+@compiled
+def count_packets(packets: NDArray[np.void], states: NDArray[np.void]) -> None:
+    """Add `packets` to the counts in `states` (1,)."""
+    state = states[0]
+    for packet in packets:
+        state.samples += packet.damaged + packet.missing + packet.samples
+        state.damaged += packet.damaged
+        state.missing_estimated += packet.missing
+        if packet.status:
+            state.overloaded += 1
+    state.restarts += state.restarting
+    state.restarting = 0
+
+
+@inlined
+def _is_header(buffer: NDArray[np.uint8], at: int, pattern: Record) -> bool:
+    is_begun = buffer[at] == SYNC and buffer[at + 1] == pattern.header
+    return bool(is_begun and buffer[at + 2] & _KIND_BITS == pattern.kind)
+
+
+@inlined
+def _is_whole(buffer: NDArray[np.uint8], at: int, pattern: Record) -> bool:
+    end = at + pattern.length
+    if buffer[end - 1] != END or buffer[end] != SYNC:
+        return False
+    if pattern.is_float:
+        return _is_finite(buffer, at + pattern.table) and _is_finite(buffer, at + pattern.relative)
+    return True
+
+
+@inlined
+def _is_finite(buffer: NDArray[np.uint8], at: int) -> bool:
+    """Whether a big-endian 32-bit float is finite: its exponent is not all ones."""
+    return not (buffer[at] & 0x7F == 0x7F and buffer[at + 1] & 0x80)

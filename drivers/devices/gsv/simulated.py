@@ -1,0 +1,140 @@
+"""A simulated GSV-8: sends from the moment its port is opened, and answers every request."""
+
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.devices.gsv import DRIVER
+from drivers.devices.gsv.codec import FrameLayout, ValueKind, encode_frames
+from drivers.devices.gsv.commands import (
+    END,
+    LENGTH,
+    OK,
+    REQUEST,
+    SYNC,
+    UNKNOWN_COMMAND,
+    WRONG_VALUE,
+    Code,
+    InputType,
+    encode_response,
+    set_float,
+)
+from drivers.devices.gsv.source import GsvSettings
+from drivers.samples import SampleStatus
+from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
+from drivers.stream import parse_settings
+
+SERIAL_NUMBER = b"15060001"
+FIRMWARE = bytes([0, 1, 0, 45])
+MAX_RATE_HZ = 48_000.0
+_MIN_REQUEST_BYTES = 4
+_FLOAT = set_float()[3:-1]
+_KINDS = {Code.START: CommandKind.START, Code.STOP: CommandKind.STOP, Code.WRITE_RATE: CommandKind.RATE}
+
+
+class GsvCommandParser:
+    """Requests in bytes in any cut; other bytes are skipped."""
+
+    def __init__(self) -> None:
+        self._unfinished = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Requests completed by `data`."""
+        data = self._unfinished + data
+        commands = []
+        at = data.find(SYNC)
+        while 0 <= at <= len(data) - _MIN_REQUEST_BYTES:
+            end = at + _MIN_REQUEST_BYTES + (data[at + 1] & LENGTH)
+            if data[at + 1] & ~LENGTH != REQUEST:
+                at = data.find(SYNC, at + 1)
+            elif end > len(data):
+                break
+            elif data[end - 1] != END:
+                at = data.find(SYNC, at + 1)
+            else:
+                commands.append(_command(data[at + 2], data[at + 3 : end - 1]))
+                at = data.find(SYNC, end)
+        self._unfinished = data[at:] if at >= 0 else b""
+        return commands
+
+
+def _command(code: int, parameters: bytes) -> Command:
+    is_rate = code == Code.WRITE_RATE and len(parameters) == struct.calcsize(">f")
+    rate_hz = float(struct.unpack(">f", parameters)[0]) if is_rate else 0.0
+    kind = next((kind for known, kind in _KINDS.items() if known == code), CommandKind.OTHER)
+    return Command(kind, rate_hz, code, parameters)
+
+
+class SimulatedGsv(SimulatedProtocol):
+    """Sends a frame a sample. With `format=device` it sends whole numbers of 24 bits.
+
+    `SET_ZERO` makes the last reading the zero of what it sends from then on.
+    """
+
+    streams_on_open = True
+    max_rate_hz = MAX_RATE_HZ
+    flags_overload = True
+
+    def __init__(self, settings: GsvSettings) -> None:
+        self._channels = (settings.table, settings.relative)
+        self._kind = ValueKind.FLOAT32 if settings.format == "float32" else ValueKind.INT24
+        self._last = np.zeros(2)
+        self._zero = np.zeros(2)
+
+    def command_parser(self) -> GsvCommandParser:
+        """See `SimulatedProtocol`."""
+        return GsvCommandParser()
+
+    def encode(
+        self,
+        first_sequence: int,  # noqa: ARG002 - frames have no number
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],
+        times_s: NDArray[np.float64],  # noqa: ARG002 - and no time
+    ) -> list[bytes]:
+        """Frames; an overload of either gauge sets the same flag."""
+        self._last = counts[-1].astype(np.float64)
+        overloads = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
+        flags = np.where(status & overloads, np.uint8(1), np.uint8(0))
+        return [row.tobytes() for row in encode_frames(self._layout, counts - self._zero, flags)]
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+        """Response to a request; for `GET_VALUE` a frame of the last reading."""
+        match command.code:
+            case Code.START | Code.STOP | Code.WRITE_RATE:
+                return encode_response(OK if is_done else WRONG_VALUE)
+            case Code.READ_RATE:
+                return encode_response(OK, struct.pack(">f", rate_hz))
+            case Code.SERIAL_NUMBER:
+                return encode_response(OK, SERIAL_NUMBER)
+            case Code.FIRMWARE:
+                return encode_response(OK, FIRMWARE)
+            case Code.GET_VALUE:
+                return encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
+            case Code.SET_FORMAT | Code.SET_ZERO | Code.SET_INPUT:
+                return encode_response(OK if self._set(command) else WRONG_VALUE)
+        return encode_response(UNKNOWN_COMMAND)
+
+    @property
+    def _layout(self) -> FrameLayout:
+        return FrameLayout(max(self._channels), self._kind, *self._channels)
+
+    def _set(self, command: Command) -> bool:
+        given = command.parameters
+        match command.code:
+            case Code.SET_FORMAT if given == _FLOAT:
+                self._kind = ValueKind.FLOAT32
+            case Code.SET_ZERO if len(given) == 1 and given[0] <= max(self._channels):
+                chosen = np.array([given[0] in (0, channel) for channel in self._channels])
+                self._zero = np.where(chosen, self._last, self._zero)
+            case Code.SET_INPUT:
+                return len(given) == 2 and given[1] in tuple(InputType)
+            case _:
+                return False
+        return True
+
+
+def make_protocol(settings: dict[str, str]) -> SimulatedGsv:
+    """The simulated device with its own settings. Raises SettingsError."""
+    return SimulatedGsv(parse_settings(GsvSettings, settings, DRIVER.name))

@@ -1,0 +1,233 @@
+"""A GSV-8 or GSV-6 as a `SampleSource`."""
+
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from drivers.devices.gsv import DRIVER
+from drivers.devices.gsv.codec import (
+    MAX_CHANNELS,
+    FrameDecoder,
+    FrameLayout,
+    ValueKind,
+    encode_frames,
+    find_layout,
+)
+from drivers.devices.gsv.commands import (
+    OK,
+    Code,
+    InputType,
+    Response,
+    encode_request,
+    encode_response,
+    find_response,
+    rate_from_response,
+    set_float,
+    set_input,
+    text_from_response,
+    write_rate,
+)
+from drivers.errors import NoDataError, ProtocolError
+from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.samples import DeviceIdentity
+from drivers.source import LineSettings, Link
+from drivers.stream import RATE_TOLERANCE, StreamSource, check_gauge_channels, parse_settings
+from messages.message import EMPTY, Message, message
+
+_TRIES = 2
+_INPUTS = {
+    "bridge-8.75v": InputType.BRIDGE_8_75_V,
+    "bridge-5v": InputType.BRIDGE_5_V,
+    "bridge-2.5v": InputType.BRIDGE_2_5_V,
+    "single-ended": InputType.SINGLE_ENDED,
+}
+
+
+class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give. Raises SettingsError."""
+
+    table: int = 1
+    relative: int = 2
+    """Channels that the two gauges are wired to, from 1."""
+    format: Literal["float32", "device"] = "float32"
+    """`float32` sets the device to it; `device` leaves it, and accepts int16 and int24 too."""
+    input: Literal["device", "bridge-8.75v", "bridge-5v", "bridge-2.5v", "single-ended"] = "device"
+    """Input range of both channels; `device` leaves it."""
+
+    def __post_init__(self) -> None:
+        check_gauge_channels(self.table, self.relative, range(1, MAX_CHANNELS + 1))
+
+
+class GsvSource(StreamSource):
+    """Conversation: stop, identify, set format, input and rate, start.
+
+    Parameters
+    ----------
+    settings : GsvSettings
+    rate_hz : float or None
+        Samples a second to set; None accepts those of the device.
+    """
+
+    stop_command = encode_request(Code.STOP)
+
+    def __init__(self, settings: GsvSettings, rate_hz: float | None = None) -> None:
+        super().__init__(DeviceIdentity(DRIVER.name, "ME-Systeme GSV"), DRIVER.default_baud, rate_hz)
+        self._settings = settings
+        self._layout: FrameLayout | None = None
+
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        layout = FrameLayout(2)
+        list(FrameDecoder(layout, 1.0).feed(encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
+
+    def start(self, link: Link) -> bytes:
+        """Stop the device, which sends from power-on, set it up, and wait for the first frames.
+
+        Raises
+        ------
+        NoDataError
+            If the device does not answer, or no good frames came within 3 s.
+        ProtocolError
+            If the device does not take a setting, or has not the gauges' channels.
+        """
+        self.prepare()
+        self._stop(link)
+        self._set_up(link)
+        link.write(encode_request(Code.START))
+        received, good = self.await_data(link, self.timeout_s, lambda data: find_layout(data) is not None)
+        if not good:
+            raise self.no_data_error(received)
+        received = received.removeprefix(encode_response(OK))
+        self._set_layout(received)
+        return received
+
+    def make_decoder(self, data: bytes) -> FrameDecoder | None:
+        """Decoder once the rate is known and `data` tell how frames are laid out.
+
+        Raises
+        ------
+        ProtocolError
+            If a gauge's channel is not in the frames.
+        """
+        if self._rate_hz is None:
+            return None
+        if self._layout is None:
+            self._set_layout(data)
+        return FrameDecoder(self._layout, self._rate_hz) if self._layout else None
+
+    def _stop(self, link: Link) -> None:
+        """Stop the device and see that it answers."""
+        received = self.silence(link)
+        if self.request(link, self.stop_command, find_response, _TRIES) is not None:
+            return
+        if find_layout(received) is None:
+            raise self.no_data_error(received)
+        raise NoDataError(
+            "the device sends and does not answer: check the line from this computer to the device"
+        )
+
+    def _ask(self, link: Link, command: bytes) -> Response | None:
+        return self.request(link, command, find_response)
+
+    def _require(self, link: Link, command: bytes, what: Message) -> None:
+        response = self._ask(link, command)
+        if response is None or not response.is_ok:
+            raise ProtocolError(
+                "the device does not take {what} ({fault}): choose what this model can do",
+                what=what,
+                fault=response.fault if response else message("no answer"),
+            )
+
+    def _set_up(self, link: Link) -> None:
+        serial_number = self._ask(link, encode_request(Code.SERIAL_NUMBER))
+        firmware = self._ask(link, encode_request(Code.FIRMWARE))
+        self._identity = DeviceIdentity(
+            DRIVER.name,
+            self._identity.name,
+            firmware=text_from_response(firmware) if firmware else "",
+            serial_number=text_from_response(serial_number) if serial_number else "",
+        )
+        if self._settings.format == "float32":
+            self._require(link, set_float(), message("the format float32"))
+        if self._settings.input in _INPUTS:
+            for channel in (self._settings.table, self._settings.relative):
+                what = message(
+                    "input {input} on channel {channel}", input=self._settings.input, channel=channel
+                )
+                self._require(link, set_input(channel, _INPUTS[self._settings.input]), what)
+        self._set_rate(link)
+
+    def _set_rate(self, link: Link) -> None:
+        if self._rate_hz is not None:
+            self._require(link, write_rate(self._rate_hz), message("{rate_hz:g} Hz", rate_hz=self._rate_hz))
+        response = self._ask(link, encode_request(Code.READ_RATE))
+        actual_hz = rate_from_response(response) if response else None
+        if actual_hz is None:
+            raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
+        if self._rate_hz is not None and abs(actual_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+            raise ProtocolError(
+                "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
+                "ask for --rate {actual_hz:g} or one that it can do",
+                rate_hz=self._rate_hz,
+                actual_hz=actual_hz,
+            )
+        self._rate_hz = actual_hz
+
+    def _set_layout(self, data: bytes) -> None:
+        found = find_layout(data)
+        if found is None:
+            return
+        channels, kind = found
+        if self._settings.format == "float32" and kind is not ValueKind.FLOAT32:
+            raise ProtocolError(
+                "the device sends {kind} where float32 was asked for: set format to device",
+                kind=kind.name.lower(),
+            )
+        self._layout = FrameLayout(channels, kind, self._settings.table, self._settings.relative)
+
+
+def make_source(settings: dict[str, str], rate_hz: float | None) -> GsvSource:
+    """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
+    parsed = parse_settings(GsvSettings, settings, DRIVER.name)
+    if rate_hz is not None:
+        write_rate(rate_hz)
+    return GsvSource(parsed, rate_hz)
+
+
+def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
+    """What `data` are; see `drivers.recognition.recognise`."""
+    found = find_layout(data)
+    if found is None or found[0] < DRIVER.channels:
+        return None
+    channels, kind = found
+    layout = FrameLayout(channels, kind)
+    frames = sum(map(len, FrameDecoder(layout, 1.0).feed(data, 0)))
+    share = frames * layout.length / max(len(data), 1)
+    if not is_recognised(frames, share, has_checksum=False):
+        return None
+    remark = message(
+        "of its {channels} channels say which the gauges are: --set table=N --set relative=N",
+        channels=channels,
+    )
+    return Recognition(
+        DRIVER.name,
+        share,
+        frames,
+        settings={} if kind is ValueKind.FLOAT32 else {"format": "device"},
+        rate_hz=rate_from_count(frames, duration_s),
+        remark=remark if channels > DRIVER.channels else EMPTY,
+    )
+
+
+def _parse_firmware(received: bytes) -> Message | None:
+    response = find_response(received)
+    if response is None:
+        return None
+    version = text_from_response(response)
+    return message("firmware {version}", version=version) if version else message("firmware unknown")
+
+
+IDENTITY_QUERY = IdentityQuery(
+    3, encode_request(Code.FIRMWARE), (LineSettings(115200), LineSettings(230400)), _parse_firmware
+)

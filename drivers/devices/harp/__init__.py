@@ -1,0 +1,14 @@
+"""Harp LoadCells, an interface for eight load cells that sends at 1 kHz with the time of each sample."""
+
+from drivers.driver import UNVERIFIED, DeviceDriver
+from messages.i18n import N_
+
+DRIVER = DeviceDriver(
+    name="harp",
+    title=N_("Harp LoadCells"),
+    rank=100,
+    default_baud=1_000_000,
+    verified=f"{UNVERIFIED}; harp-python 0.4.2 reads the simulated device's bytes",
+    package=__name__,
+    frames_title=N_("Harp events"),
+)

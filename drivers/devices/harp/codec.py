@@ -1,0 +1,385 @@
+"""Messages of the Harp protocol and load cell events, encoded and decoded.
+
+`type | length | address | port | payload type | [seconds u32 | 32 us u16] | payload | checksum`,
+little-endian; the length counts the bytes after it, the checksum is the sum of all bytes before it
+(harp-tech protocol, device.loadcells/device.yml).
+"""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import rate_from_steps
+from drivers.compiled import compiled, inlined
+from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
+from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder, Packets, Record
+
+READ, WRITE, EVENT = 1, 2, 3
+ERROR = 0x08
+"""Bit of the type of a reply: the device refuses."""
+PORT = 0xFF
+U8, U16, S16 = 0x01, 0x02, 0x82
+HAS_TIMESTAMP = 0x10
+"""Bit of the payload type: a timestamp comes first."""
+MIN_MESSAGE_BYTES = 6
+MAX_MESSAGE_BYTES = 256
+WHO_AM_I = 1232
+TICKS_PER_S = 31_250
+_TIME = 6
+_HEAD = 5
+_ACTIVE = 0x01
+_MODE_AND_MUTE = 0x13
+_LOAD_CELL_EVENTS = 0x01
+
+
+class Register(IntEnum):
+    """Addresses."""
+
+    WHO_AM_I = 0
+    FIRMWARE_HIGH = 6
+    FIRMWARE_LOW = 7
+    OPERATION = 10
+    SERIAL_NUMBER = 13
+    ACQUISITION = 32
+    LOAD_CELLS = 33
+    EVENTS = 90
+
+
+PAYLOAD_TYPES = {
+    Register.WHO_AM_I: U16,
+    Register.FIRMWARE_HIGH: U8,
+    Register.FIRMWARE_LOW: U8,
+    Register.OPERATION: U8,
+    Register.SERIAL_NUMBER: U16,
+    Register.ACQUISITION: U8,
+    Register.EVENTS: U8,
+}
+"""Payload type of the registers that are read and written here."""
+
+
+@dataclass(frozen=True, slots=True)
+class HarpMessage:
+    """A message without its time."""
+
+    kind: int
+    address: int
+    payload: bytes = b""
+
+    @property
+    def number(self) -> int:
+        """The payload as a whole number."""
+        return int.from_bytes(self.payload, "little")
+
+
+def encode(message: HarpMessage, payload_type: int, time_ticks: int | None = None) -> bytes:
+    """One message; devices send it with a time (in 32 us)."""
+    payload = message.payload
+    if time_ticks is not None:
+        payload_type |= HAS_TIMESTAMP
+        payload = struct.pack("<IH", *divmod(time_ticks, TICKS_PER_S)) + payload
+    data = bytes([message.kind, 4 + len(payload), message.address, PORT, payload_type]) + payload
+    return data + bytes([sum(data) & 0xFF])
+
+
+def encode_read(register: Register) -> bytes:
+    """Request for the value of a register."""
+    return encode(HarpMessage(READ, register), PAYLOAD_TYPES[register])
+
+
+def encode_write(register: Register, value: int) -> bytes:
+    """Request that writes a whole number into a register."""
+    payload = value.to_bytes(PAYLOAD_TYPES[register], "little")
+    return encode(HarpMessage(WRITE, register, payload), PAYLOAD_TYPES[register])
+
+
+def encode_start() -> bytes:
+    """Request that starts the samples."""
+    return encode_write(Register.ACQUISITION, 1)
+
+
+def encode_stop() -> bytes:
+    """Request that stops the samples."""
+    return encode_write(Register.ACQUISITION, 0)
+
+
+def with_active_mode(operation: int) -> int:
+    """Value of `OPERATION` at which events are sent and requests answered."""
+    return operation & ~_MODE_AND_MUTE | _ACTIVE
+
+
+def with_load_cells(events: int) -> int:
+    """Value of `EVENTS` at which samples are sent; other events are left as they are."""
+    return events | _LOAD_CELL_EVENTS
+
+
+def find_messages(data: bytes) -> tuple[list[HarpMessage], int]:
+    """Whole messages in `data`, garbage skipped, and the number of bytes that were used."""
+    messages = []
+    at = 0
+    while at + MIN_MESSAGE_BYTES <= len(data):
+        end = at + 2 + data[at + 1]
+        if data[at] & ~ERROR not in (READ, WRITE, EVENT) or data[at + 1] < MIN_MESSAGE_BYTES - 2:
+            at += 1
+        elif end > len(data):
+            break
+        elif sum(data[at : end - 1]) & 0xFF != data[end - 1]:
+            at += 1
+        else:
+            start = at + _HEAD + (_TIME if data[at + 4] & HAS_TIMESTAMP else 0)
+            messages.append(HarpMessage(data[at], data[at + 2], data[start : end - 1]))
+            at = end
+    return messages, at
+
+
+def find_reply(received: bytes, register: Register) -> HarpMessage | None:
+    """Reply of the device about a register, done or refused; None while there is none."""
+    for message in find_messages(received)[0]:
+        if message.address == register and message.kind & ~ERROR in (READ, WRITE):
+            return message
+    return None
+
+
+CHANNELS = 8
+EVENT_BYTES = 28
+"""Bytes of a load cell event."""
+VALUES_OFFSET = 11
+"""Place of its first value."""
+
+LINE = np.dtype(
+    [
+        ("discarded", np.int64),  # bytes of this call that were discarded before it
+        ("start", np.int64),
+        ("end", np.int64),
+        ("good", np.int64),
+        ("time", np.float64),  # in 32 us
+        ("sequence", np.float64),  # there is none
+        ("table", np.float64),
+        ("relative", np.float64),
+    ],
+    align=True,
+)
+"""A good event, or up to `LENGTH` bytes of garbage; see `drivers.line_counting`."""
+
+_LENGTH_BYTE = EVENT_BYTES - 2
+_ADDRESS = int(Register.LOAD_CELLS)
+_PAYLOAD = S16 | HAS_TIMESTAMP
+_ERROR_MASK = 0xF7
+
+
+@compiled
+def find_events(
+    buffer: NDArray[np.uint8],
+    channels: NDArray[np.int64],
+    garbage: int,
+    lines: NDArray[np.void],
+) -> tuple[int, int, int, int]:
+    """Events in `buffer` and what is none, as `lines`.
+
+    `garbage` is the number of bytes since the last whole message. After a whole message any whole message is
+    skipped; after garbage only an event is believed, because a checksum of eight bits passes too much.
+    Returns the number of lines, the numbers of bytes used and discarded, and the garbage until then.
+    """
+    at = 0
+    found = 0
+    discarded = 0
+    while at + MIN_MESSAGE_BYTES <= len(buffer):
+        size = 0
+        if _may_begin(buffer, at, garbage):
+            size = 2 + int(buffer[at + 1])
+            if at + size > len(buffer):
+                break
+            if not _is_whole(buffer, at, size):
+                size = 0
+        if size == 0:
+            if garbage % EVENT_BYTES == 0:
+                _break_line(lines[found], at)
+                found += 1
+            garbage += 1
+            discarded += 1
+            at += 1
+            continue
+        if _is_event(buffer, at):
+            _fill_line(lines[found], buffer, at, channels, discarded)
+            found += 1
+        garbage = 0
+        at += size
+    return found, at, discarded, garbage
+
+
+@inlined
+def _may_begin(buffer: NDArray[np.uint8], at: int, garbage: int) -> bool:
+    if garbage:
+        return _is_event(buffer, at)
+    kind = buffer[at] & _ERROR_MASK
+    return bool(1 <= kind <= EVENT and buffer[at + 1] >= MIN_MESSAGE_BYTES - 2)
+
+
+@inlined
+def _is_event(buffer: NDArray[np.uint8], at: int) -> bool:
+    return bool(
+        buffer[at] == EVENT
+        and buffer[at + 1] == _LENGTH_BYTE
+        and buffer[at + 2] == _ADDRESS
+        and buffer[at + 3] == PORT
+        and buffer[at + 4] == _PAYLOAD
+    )
+
+
+@inlined
+def _is_whole(buffer: NDArray[np.uint8], at: int, size: int) -> bool:
+    total = 0
+    for place in range(at, at + size - 1):
+        total += buffer[place]
+    return bool(total & 0xFF == buffer[at + size - 1])
+
+
+@inlined
+def _break_line(line: Record, at: int) -> None:
+    line.start = line.end = at
+    line.good = 0
+
+
+@inlined
+def _fill_line(
+    line: Record, buffer: NDArray[np.uint8], at: int, channels: NDArray[np.int64], discarded: int
+) -> None:
+    line.start = at
+    line.end = at + EVENT_BYTES
+    line.good = 1
+    seconds = 0
+    for place in range(3, -1, -1):
+        seconds = seconds << 8 | int(buffer[at + 5 + place])
+    line.time = float(seconds * TICKS_PER_S + (int(buffer[at + 9]) | int(buffer[at + 10]) << 8))
+    line.table = _value(buffer, at + VALUES_OFFSET + 2 * channels[0])
+    line.relative = _value(buffer, at + VALUES_OFFSET + 2 * channels[1])
+    line.discarded = discarded
+
+
+@inlined
+def _value(buffer: NDArray[np.uint8], at: int) -> float:
+    value = int(buffer[at]) | int(buffer[at + 1]) << 8
+    return float(value - 65536 if value >= 32768 else value)
+
+
+FULL_SCALE = 32767
+"""Largest reading."""
+_MAX_HELD_BYTES = 1024
+
+
+def encode_events(
+    times_s: NDArray[np.float64],
+    counts: NDArray[np.int32] | NDArray[np.float64],
+    table: int = 0,
+    relative: int = 1,
+) -> NDArray[np.uint8]:
+    """Events as a device without faults sends them; channels without a gauge are 0.
+
+    Parameters
+    ----------
+    times_s : (n,)
+        Device time (s), sent in steps of 32 us.
+    counts : (n, 2)
+        Table and relative, limited to 16 bits.
+    table, relative : int
+        Channels of the gauges, 0 to 7.
+
+    Returns
+    -------
+    (n, 28) uint8
+        An event a row; `.tobytes()` is what is sent.
+    """
+    wire = np.zeros((len(counts), EVENT_BYTES), dtype=np.uint8)
+    wire[:, :5] = EVENT, EVENT_BYTES - 2, Register.LOAD_CELLS, PORT, S16 | HAS_TIMESTAMP
+    seconds, ticks = np.divmod(np.rint(np.asarray(times_s) * TICKS_PER_S).astype(np.int64), TICKS_PER_S)
+    wire[:, 5:9] = seconds.astype("<u4").view(np.uint8).reshape(-1, 4)
+    wire[:, 9:11] = ticks.astype("<u2").view(np.uint8).reshape(-1, 2)
+    values = np.zeros((len(counts), CHANNELS), dtype="<i2")
+    values[:, [table, relative]] = np.clip(counts, -FULL_SCALE - 1, FULL_SCALE)
+    wire[:, VALUES_OFFSET:-1] = values.view(np.uint8)
+    wire[:, -1] = wire.sum(axis=1)
+    return wire
+
+
+class EventDecoder(PacketDecoder):
+    """Bytes to sample blocks; the device's times tell lost samples.
+
+    An event that comes k periods after the one before says that k - 1 are lost (`missing_estimated`); as
+    many of them as the bytes between can have held are damaged. Other messages are skipped. A time out of
+    sequence is believed only if the next event confirms it, because a checksum of eight bits passes one in
+    256 damaged events.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal rate, > 0.
+    table, relative : int
+        Channels of the gauges, 0 to 7.
+    overload_count : float
+        Readings of this size and more are marked as overloaded.
+    max_gap_s : float
+        Longest gap that is believed.
+    """
+
+    def __init__(
+        self,
+        rate_hz: float,
+        table: int = 0,
+        relative: int = 1,
+        overload_count: float = FULL_SCALE,
+        max_gap_s: float = MAX_GAP_S,
+    ) -> None:
+        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
+        self._state["period_s"] = 1 / rate_hz
+        self._channels = np.array([table, relative])
+        self._rules = make_rules(
+            BY_TIME,
+            rate_hz,
+            unit_s=1 / TICKS_PER_S,
+            clock_step_s=1 / TICKS_PER_S,
+            time_wrap=float((1 << 32) * TICKS_PER_S),
+            overload_count=overload_count,
+            max_gap_s=max_gap_s,
+        )
+        self._garbage = 0
+
+    def expect_restart(self) -> None:
+        """See `PacketDecoder`."""
+        self._state["broken"] += self._state["started"] * bool(self._unfinished)
+        self._garbage = 0
+        super().expect_restart()
+
+    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+        lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        found, used, discarded, self._garbage = find_events(buffer, self._channels, self._garbage, lines)
+        self._unfinished = data[used:]
+        packets = np.empty(found, dtype=PACKET)
+        counts = np.empty((found, 2))
+        before = self._position()
+        self._state["restart_rows"] = self._rows_since(arrival_ns, found)
+        hold_from = len(data) - _MAX_HELD_BYTES
+        good, done = count_lines(lines[:found], hold_from, self._state, self._rules, packets, counts)
+        if done < found:
+            self._unfinished = data[int(lines[done]["start"]) :]
+            discarded = int(lines[done]["discarded"])
+            self._garbage = 0
+        self._state["discarded_bytes"] += discarded
+        return self._packets(packets[:good], counts[:good], before, arrival_ns)
+
+
+def count_events(data: bytes) -> tuple[int, NDArray[np.float64]]:
+    """Number of good events in `data`, and their times (in 32 us)."""
+    lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
+    buffer = np.frombuffer(data, dtype=np.uint8)
+    found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
+    times: NDArray[np.float64] = lines["time"][:found][lines["good"][:found] != 0]
+    return len(times), times
+
+
+def rate_from_events(data: bytes) -> float | None:
+    """Samples a second by the device's own times; None while there are too few events."""
+    _, times = count_events(data)
+    return rate_from_steps(np.diff(times) / TICKS_PER_S, 1 / TICKS_PER_S)

@@ -1,0 +1,107 @@
+"""A simulated Harp LoadCells: registers that can be read and written, and an event a sample."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.devices.harp import DRIVER
+from drivers.devices.harp.codec import (
+    ERROR,
+    MAX_MESSAGE_BYTES,
+    PAYLOAD_TYPES,
+    READ,
+    TICKS_PER_S,
+    U8,
+    WHO_AM_I,
+    WRITE,
+    HarpMessage,
+    Register,
+    encode,
+    encode_events,
+    find_messages,
+    with_active_mode,
+)
+from drivers.devices.harp.source import HarpSettings
+from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
+from drivers.stream import parse_settings
+
+FIRMWARE = (1, 1)
+SERIAL_NUMBER = 7
+MAX_RATE_HZ = 10_000.0
+_WRITABLE = (Register.OPERATION, Register.EVENTS, Register.ACQUISITION)
+_STANDBY = 0xE0
+_ALL_EVENTS = 0x0F
+
+
+class HarpCommandParser:
+    """Requests in bytes in any cut; other bytes are skipped."""
+
+    def __init__(self) -> None:
+        self._unfinished = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Requests completed by `data`; `parameters` are their type and payload."""
+        data = self._unfinished + data
+        messages, used = find_messages(data)
+        self._unfinished = data[used:][-MAX_MESSAGE_BYTES:]
+        return [_command(message) for message in messages if message.kind in (READ, WRITE)]
+
+
+def _command(message: HarpMessage) -> Command:
+    kind = CommandKind.OTHER
+    if message.kind == WRITE and message.address == Register.ACQUISITION:
+        kind = CommandKind.START if message.number else CommandKind.STOP
+    return Command(kind, code=message.address, parameters=bytes([message.kind]) + message.payload)
+
+
+class SimulatedHarp(SimulatedProtocol):
+    """Sends an event a sample. Readings are limited to 16 bits and show as overload there."""
+
+    max_rate_hz = MAX_RATE_HZ
+
+    def __init__(self, settings: HarpSettings) -> None:
+        self._channels = (settings.table, settings.relative)
+        self._ticks = 0
+        self._registers = {
+            Register.WHO_AM_I: WHO_AM_I,
+            Register.FIRMWARE_HIGH: FIRMWARE[0],
+            Register.FIRMWARE_LOW: FIRMWARE[1],
+            Register.OPERATION: _STANDBY,
+            Register.SERIAL_NUMBER: SERIAL_NUMBER,
+            Register.ACQUISITION: 0,
+            Register.EVENTS: _ALL_EVENTS,
+        }
+
+    def command_parser(self) -> HarpCommandParser:
+        """See `SimulatedProtocol`."""
+        return HarpCommandParser()
+
+    def encode(
+        self,
+        first_sequence: int,  # noqa: ARG002 - events have no number
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],  # noqa: ARG002 - and no flags
+        times_s: NDArray[np.float64],
+    ) -> list[bytes]:
+        """An event for each sample; none in standby."""
+        self._ticks = round(float(times_s[-1]) * TICKS_PER_S)
+        if with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:
+            return [b""] * len(counts)
+        return [row.tobytes() for row in encode_events(times_s, counts, *self._channels)]
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Reply to a request, with the new value of the register."""
+        kind, given = command.parameters[0], command.parameters[1:]
+        if command.code not in self._registers:
+            return encode(HarpMessage(kind | ERROR, command.code), U8, self._ticks)
+        register = Register(command.code)
+        if kind == WRITE and (register not in _WRITABLE or len(given) != PAYLOAD_TYPES[register]):
+            kind |= ERROR
+        elif kind == WRITE:
+            self._registers[register] = int.from_bytes(given, "little")
+        payload = self._registers[register].to_bytes(PAYLOAD_TYPES[register], "little")
+        return encode(HarpMessage(kind, register, payload), PAYLOAD_TYPES[register], self._ticks)
+
+
+def make_protocol(settings: dict[str, str]) -> SimulatedHarp:
+    """The simulated device with its own settings. Raises SettingsError."""
+    return SimulatedHarp(parse_settings(HarpSettings, settings, DRIVER.name))

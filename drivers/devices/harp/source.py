@@ -1,0 +1,198 @@
+"""Harp LoadCells as a `SampleSource`."""
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+
+from drivers.devices.harp import DRIVER
+from drivers.devices.harp.codec import (
+    CHANNELS,
+    ERROR,
+    EVENT_BYTES,
+    FULL_SCALE,
+    TICKS_PER_S,
+    WHO_AM_I,
+    EventDecoder,
+    HarpMessage,
+    Register,
+    count_events,
+    encode_events,
+    encode_read,
+    encode_start,
+    encode_stop,
+    encode_write,
+    find_messages,
+    find_reply,
+    rate_from_events,
+    with_active_mode,
+    with_load_cells,
+)
+from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.samples import DeviceIdentity
+from drivers.source import LineSettings, Link
+from drivers.stream import RATE_TOLERANCE, StreamSource, check_gauge_channels, parse_settings
+from messages.message import EMPTY, Message, message
+
+RATE_HZ = 1000.0
+_TRIES = 2
+
+
+class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give. Raises SettingsError."""
+
+    table: int = 0
+    relative: int = 1
+    """Channels that the two gauges are wired to, 0 to 7."""
+    overload_count: float = FULL_SCALE
+    """Readings of this size and more are marked as overloaded."""
+
+    def __post_init__(self) -> None:
+        check_gauge_channels(self.table, self.relative, range(CHANNELS))
+        if not self.overload_count > 0:
+            raise SettingsError("overload_count {count:g} must be positive", count=self.overload_count)
+
+
+class HarpSource(StreamSource):
+    """Conversation: stop, identify, enable events, start. The rate is fixed and shown by the device's times.
+
+    Parameters
+    ----------
+    settings : HarpSettings
+    rate_hz : float
+        Samples a second that are expected.
+    """
+
+    stop_command = encode_stop()
+
+    def __init__(self, settings: HarpSettings, rate_hz: float = RATE_HZ) -> None:
+        super().__init__(DeviceIdentity(DRIVER.name, "Harp LoadCells"), DRIVER.default_baud, rate_hz)
+        self._settings = settings
+
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        list(EventDecoder(1.0).feed(encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
+
+    def start(self, link: Link) -> bytes:
+        """Stop the device, identify it, start it, and wait for as many events as show the rate.
+
+        Raises
+        ------
+        NoDataError
+            If the device does not answer, or too few events came within 3 s.
+        ProtocolError
+            If it is another Harp device, does not start, or sends at another rate.
+        """
+        self.prepare()
+        self._identify(link)
+        self._write(link, Register.OPERATION, with_active_mode)
+        self._write(link, Register.EVENTS, with_load_cells)
+        link.write(encode_start())
+        received, good = self.await_data(
+            link, self.timeout_s, lambda data: rate_from_events(data) is not None
+        )
+        reply = find_reply(received, Register.ACQUISITION)
+        if reply is not None and reply.kind & ERROR:
+            raise ProtocolError("the device refuses to start: switch it off and on, and try again")
+        if not good:
+            raise self.no_data_error(received)
+        self._check_rate(rate_from_events(received))
+        return received
+
+    def make_decoder(self, data: bytes) -> EventDecoder:  # noqa: ARG002 - all is known
+        """Decoder at the rate of the device."""
+        settings = self._settings
+        return EventDecoder(self.rate_hz, settings.table, settings.relative, settings.overload_count)
+
+    def _identify(self, link: Link) -> None:
+        received = self.silence(link)
+        who = self._read(link, Register.WHO_AM_I)
+        if who is None and not find_messages(received)[0]:
+            raise self.no_data_error(received)
+        if who is None:
+            raise NoDataError(
+                "the device sends and does not answer: check the line from this computer to the device"
+            )
+        if who != WHO_AM_I:
+            raise ProtocolError(
+                "the device is Harp {number}, and LoadCells is {expected}: choose its port",
+                number=who,
+                expected=WHO_AM_I,
+            )
+        high, low = (self._read(link, r) for r in (Register.FIRMWARE_HIGH, Register.FIRMWARE_LOW))
+        serial_number = self._read(link, Register.SERIAL_NUMBER)
+        self._identity = DeviceIdentity(
+            DRIVER.name,
+            "Harp LoadCells",
+            firmware="" if high is None or low is None else f"{high}.{low}",
+            serial_number="" if serial_number is None else str(serial_number),
+        )
+
+    def _read(self, link: Link, register: Register) -> int | None:
+        """Value of a register; None where the device refuses or does not answer."""
+
+        def find(received: bytes) -> HarpMessage | None:
+            return find_reply(received, register)
+
+        reply = self.request(link, encode_read(register), find, _TRIES)
+        return None if reply is None or reply.kind & ERROR else reply.number
+
+    def _write(self, link: Link, register: Register, wanted: Callable[[int], int]) -> None:
+        """Write the wanted value, made of the present one; a register that cannot be read is left alone."""
+        present = self._read(link, register)
+        if present is None or wanted(present) == present:
+            return
+        link.write(encode_write(register, wanted(present)))
+        if self._read(link, register) != wanted(present):
+            raise ProtocolError(
+                "the device does not take {value} in register {register}: switch it off and on",
+                value=wanted(present),
+                register=register,
+            )
+
+    def _check_rate(self, measured_hz: float | None) -> None:
+        if measured_hz is not None and abs(measured_hz / self.rate_hz - 1) > RATE_TOLERANCE:
+            raise ProtocolError(
+                "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
+                "ask for --rate {actual_hz:.4g}",
+                actual_hz=measured_hz,
+                rate_hz=self.rate_hz,
+            )
+
+
+def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
+    """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
+    parsed = parse_settings(HarpSettings, settings, DRIVER.name)
+    if rate_hz is not None and not 0 < rate_hz <= TICKS_PER_S:
+        raise SettingsError(
+            "rate {rate_hz:g} Hz cannot be: LoadCells sends {usual_hz:g} Hz, leave --rate out",
+            rate_hz=rate_hz,
+            usual_hz=RATE_HZ,
+        )
+    return HarpSource(parsed, rate_hz or RATE_HZ)
+
+
+def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
+    """What `data` are; see `drivers.recognition.recognise`."""
+    events, _ = count_events(data)
+    share = events * EVENT_BYTES / max(len(data), 1)
+    if not is_recognised(events, share, has_checksum=True):
+        return None
+    rate_hz = rate_from_events(data) or rate_from_count(events, duration_s)
+    remark = message("say which channels the gauges are: --set table=N --set relative=N")
+    return Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
+
+
+def _parse_who_am_i(received: bytes) -> Message | None:
+    reply = find_reply(received, Register.WHO_AM_I)
+    if reply is None:
+        return None
+    if reply.number == WHO_AM_I:
+        return EMPTY
+    return message("it is Harp {number}, and LoadCells is {expected}", number=reply.number, expected=WHO_AM_I)
+
+
+IDENTITY_QUERY = IdentityQuery(
+    2, encode_read(Register.WHO_AM_I), (LineSettings(DRIVER.default_baud),), _parse_who_am_i
+)

@@ -1,0 +1,15 @@
+"""Modbus RTU transmitters: polled, their registers described by a map in TOML."""
+
+from drivers.driver import UNVERIFIED, DeviceDriver, SingleGauge
+from messages.i18n import N_
+
+DRIVER = DeviceDriver(
+    name="modbus",
+    title=N_("Modbus RTU transmitters (Laumas TLB4, Scaime eNod4, others by their registers)"),
+    rank=50,
+    default_baud=115200,
+    verified=f"{UNVERIFIED}; reads pymodbus 3.16 as server, and minimalmodbus 2.1 reads the simulated device",
+    package=__name__,
+    frames_title=N_("Modbus frames"),
+    single_gauge=SingleGauge.OWN_COLUMN,
+)

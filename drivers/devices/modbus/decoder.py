@@ -1,0 +1,173 @@
+"""Responses of a polled transmitter, in envelopes with their time, decoded to sample blocks."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from drivers.clock import Skew, SkewStatistics
+from drivers.devices.modbus.frames import ExceptionResponse, RegisterResponse, parse_response
+from drivers.devices.modbus.registers import ChannelValue, Poll
+from drivers.envelope import StampedRead, Unwrapper, wrap
+from drivers.packets import MAX_GAP_S, PACKET, Packets, sample_blocks
+from drivers.samples import Losses, SampleBlock, SampleStatus
+
+LATE = 0x80
+"""Bit of an envelope's port: the time of the measurement is not known."""
+_NS = 1_000_000_000
+_OVERLOADS = (int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE))
+
+
+def sample_period_ns(rate_hz: float) -> int:
+    """Time between two samples (ns); their grid begins at 0 of the host's clock."""
+    return round(_NS / rate_hz)
+
+
+def wrap_response(request: int, measured_ns: int, data: bytes, *, is_late: bool = False) -> bytes:
+    """Envelope of a response as received, with the number of its request and the time of measurement."""
+    return wrap(request | (LATE if is_late else 0), measured_ns, data)
+
+
+class ResponseDecoder:
+    """Bytes to sample blocks; the time of each response gives its row.
+
+    The host's time is divided into cells of one sample period, and each poll is made at the beginning of a
+    cell. So the cell of a measurement is the number of its row, and a cell without one is certainly missing.
+    The row of a response that is damaged, has a fault bit, or has no known time is damaged; the row of a
+    Modbus exception is missing.
+
+    `device_time_s` of the blocks is the time of measurement, `arrival_ns` that of the last row.
+
+    Parameters
+    ----------
+    poll : Poll
+    columns : tuple of int
+        Column of each of its channels: 0 is table, 1 relative.
+    rate_hz : float
+    max_gap_s : float
+        Longest gap that is believed.
+    """
+
+    def __init__(
+        self, poll: Poll, columns: tuple[int, ...], rate_hz: float, max_gap_s: float = MAX_GAP_S
+    ) -> None:
+        self.losses = Losses()
+        """Counts until now."""
+        self._poll = poll
+        self._columns = columns
+        self._period_ns = sample_period_ns(rate_hz)
+        self._max_gap = round(max_gap_s * rate_hz)
+        self._unwrapper = Unwrapper()
+        self._responses: list[bytes] | None = None
+        self._measured_ns = 0
+        self._request_times_ns: list[int] = []
+        self._gauge_requests = (poll.values[0].request, poll.values[-1].request)
+        self._skew_statistics = (
+            SkewStatistics(rate_hz) if self._gauge_requests[0] != self._gauge_requests[1] else None
+        )
+        self._last_ns: int | None = None
+        self._broken = 0
+        self._row_time_s = 0.0
+        self._rows: list[tuple[int, int, float, int, int]] = []
+        self._counts: list[tuple[float, float]] = []
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes kept for the next call, fewer than the longest envelope."""
+        return self._unwrapper.unfinished_bytes
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """See `drivers.clock.HasSkew`; None where one request reads both gauges."""
+        return self._skew_statistics.skew(first_index, end_index) if self._skew_statistics else None
+
+    def expect_restart(self) -> None:
+        """The connection broke: an unfinished poll is discarded. The grid goes on with the host's clock."""
+        self._responses = None
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in the envelopes
+        """Blocks that `data` completes; bytes of an unfinished envelope are kept. Exhaust it."""
+        first_index, last_time_s = self.losses.samples, self._row_time_s
+        discarded = self._unwrapper.discarded_bytes
+        for read in self._unwrapper.feed(data):
+            self._add_response(read)
+        self.losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
+        if self._rows:
+            yield from sample_blocks(self._packets(first_index, last_time_s))
+
+    def _packets(self, first_index: int, last_time_s: float) -> Packets:
+        rows, counts = np.array(self._rows, dtype=PACKET), np.array(self._counts)
+        self._rows, self._counts = [], []
+        return Packets(
+            packets=rows,
+            counts=counts,
+            first_index=first_index,
+            rows=self.losses.samples - first_index,
+            last_time_s=last_time_s,
+            period_s=self._period_ns / _NS,
+            has_time=True,
+            arrival_ns=self._last_ns or 0,
+        )
+
+    def _add_response(self, read: StampedRead) -> None:
+        number = read.port & ~LATE
+        if number == 0:
+            self._responses, self._request_times_ns, self._measured_ns = [], [], read.arrival_ns
+        if self._responses is None or number != len(self._responses):
+            self.losses.discarded_bytes += len(read.data)
+            return
+        self._request_times_ns.append(read.arrival_ns)
+        response = parse_response(self._poll.requests[number], read.data)
+        if isinstance(response, RegisterResponse) and not read.port & LATE:
+            self._responses.append(response.data)
+        else:
+            self._leave_out(read.data, is_refused=isinstance(response, ExceptionResponse))
+        if self._responses is not None and len(self._responses) == len(self._poll.requests):
+            self._add_sample(self._poll.channel_values(self._responses))
+
+    def _leave_out(self, data: bytes, *, is_refused: bool) -> None:
+        self._responses = None
+        if not is_refused:
+            self._broken += 1
+            self.losses.discarded_bytes += len(data)
+
+    def _add_sample(self, values: list[ChannelValue]) -> None:
+        self._responses = None
+        if any(value.is_faulty for value in values):
+            self._broken += 1
+            return
+        gap = self._gap()
+        if gap is None:
+            self.losses.repeated += 1
+            return
+        status, counts = 0, [0.0, 0.0]
+        for column, value in zip(self._columns, values, strict=True):
+            counts[column] = value.counts
+            status |= _OVERLOADS[column] if value.is_overloaded else 0
+        self._append_row(gap, status, (counts[0], counts[1]))
+
+    def _gap(self) -> int | None:
+        """Rows between the last one and this; None where both are in one cell. Updates the row time."""
+        last_ns, self._last_ns = self._last_ns, self._measured_ns
+        if last_ns is None:
+            return 0
+        step = self._measured_ns // self._period_ns - last_ns // self._period_ns
+        if step == 0:
+            return None
+        if not 0 < step <= self._max_gap + 1:
+            self.losses.restarts += 1
+            self._row_time_s += self._period_ns / _NS
+            return 0
+        self._row_time_s += (self._measured_ns - last_ns) / _NS
+        return step - 1
+
+    def _append_row(self, gap: int, status: int, counts: tuple[float, float]) -> None:
+        damaged = min(gap, self._broken)
+        if self._skew_statistics is not None:
+            first, last = (self._request_times_ns[request] for request in self._gauge_requests)
+            self._skew_statistics.add(self.losses.samples + gap, np.array([(last - first) / _NS]), 0.0)
+        self._rows.append((damaged, gap - damaged, self._row_time_s, 1, status))
+        self._counts.append(counts)
+        self.losses.samples += gap + 1
+        self.losses.damaged += damaged
+        self.losses.missing += gap - damaged
+        self.losses.overloaded += bool(status)
+        self._broken = 0

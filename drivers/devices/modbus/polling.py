@@ -1,0 +1,207 @@
+"""Polling: one request and its response, the schedule of polls, and the timing of a device."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivers.devices.modbus.decoder import sample_period_ns
+from drivers.devices.modbus.frames import LONGEST, Request, is_complete
+from drivers.host_time import host_ns
+from drivers.source import Link
+
+_NS = 1_000_000_000
+_MAX_WAIT_NS = 50_000_000
+"""Threads that poll are stopped within this time."""
+_RATE_MARGIN = 1.25
+"""Period of polls over the duration that nine in ten trial polls keep to; less loses polls to jitter."""
+_TOLERANCE = 0.15
+_TOLERANCE_NS = 750_000
+"""How far a measurement may be from its place in the grid: the greater of a share of the poll period and a
+time. At 100 Hz that is 1.5 ms, 0.15 % of a period of 1 s of the stand."""
+_STALE_SHARE = 0.5
+_WIRE_S = 0.001
+"""A response in less than this share of the shortest time is that of an earlier request, where the shortest
+time is that of a wire: request and response of 8 bytes at 115200 baud take longer than 1 ms."""
+_SMOOTHING = 0.05
+"""Weight of a new response in the mean phase; twenty polls follow a change of the device."""
+_WINDOW_NS = 2_000_000_000
+_BUSY_SHARE = 0.1
+"""Share of late wake-ups within 2 s at which this computer counts as busy."""
+_MAX_DRAIN_READS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Transaction:
+    """A request on the wire, and what came after it.
+
+    Attributes
+    ----------
+    data : bytes
+        All that came; b"" after a time-out.
+    sent_ns, received_ns : int
+        Host's time before the request was written and after the last byte was read.
+    """
+
+    data: bytes
+    sent_ns: int
+    received_ns: int
+
+    @property
+    def measured_ns(self) -> int:
+        """Best estimate of the time of the measurement: the middle of the transaction.
+
+        A transmitter measures between the end of the request and the beginning of its response, which take
+        about equally long on the wire and in this computer. The standard uncertainty is at most
+        `duration_s / sqrt(12)`.
+        """
+        return (self.sent_ns + self.received_ns) // 2
+
+    @property
+    def duration_s(self) -> float:
+        """From the request to the end of the response (s)."""
+        return (self.received_ns - self.sent_ns) / _NS
+
+
+def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
+    """Send a request and read its response.
+
+    Reading ends when the response is complete, after `timeout_s`, or in an incomplete response after one read
+    without bytes (50 ms on a port).
+    Raises DeviceLostError.
+    """
+    received = b""
+    sent_ns = host_ns()
+    deadline_s = time.monotonic() + timeout_s
+    link.write(request.encode())
+    while not is_complete(request, received) and time.monotonic() < deadline_s:
+        data = link.read()
+        if received and not data:
+            break
+        received += data
+    return Transaction(received, sent_ns, host_ns())
+
+
+def drain(link: Link) -> bytes:
+    """Read until the line is silent, so that the next response is that of the next request.
+
+    Ends after 8 reads: a device that sends all the time is no transmitter. Raises DeviceLostError.
+    """
+    received = b""
+    for _ in range(_MAX_DRAIN_READS):
+        data = link.read()
+        if not data:
+            break
+        received = (received + data)[-LONGEST:]
+    return received
+
+
+class PollSchedule:
+    """Schedule of polls: one at the beginning of each cell of the host's time, or none.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Cells a second.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = sample_period_ns(rate_hz)
+        self._cell = host_ns() // self._period_ns + 1
+        self.tolerance_ns = max(round(_TOLERANCE * self._period_ns), _TOLERANCE_NS)
+        """How far measurements may be from their places in the grid."""
+        self._window_ns = self.due_ns
+        self._wakeups = self._late_wakeups = 0
+        self.is_computer_busy = False
+        """Whether this computer woke up too late for one poll in ten within the last seconds."""
+
+    @property
+    def due_ns(self) -> int:
+        """Host's time of the next poll."""
+        return self._cell * self._period_ns
+
+    def wait(self) -> bool:
+        """Sleep until the next poll is due, 50 ms at most; returns whether it is due now."""
+        self._skip_missed()
+        wait_ns = self.due_ns - host_ns()
+        time.sleep(max(0, min(wait_ns, _MAX_WAIT_NS)) / _NS)
+        late_ns = host_ns() - self.due_ns
+        if late_ns >= 0:
+            self._update_load(late_ns > self.tolerance_ns)
+        return 0 <= late_ns <= self.tolerance_ns
+
+    def mark_used(self, measured_ns: int) -> None:
+        """Go on to the cell after the due one and after that of the measurement."""
+        self._cell = max(self._cell, measured_ns // self._period_ns) + 1
+
+    def _update_load(self, is_late: bool) -> None:
+        self._wakeups += 1
+        self._late_wakeups += is_late
+        if self.due_ns - self._window_ns > _WINDOW_NS:
+            self.is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
+            self._window_ns, self._wakeups, self._late_wakeups = self.due_ns, 0, 0
+
+    def _skip_missed(self) -> None:
+        now_ns = host_ns()
+        if now_ns - self.due_ns > self.tolerance_ns:
+            self._cell = now_ns // self._period_ns + 1
+
+
+class ResponseTiming:
+    """How quickly a device answers the requests of a poll, measured in trials and during the stream.
+
+    Parameters
+    ----------
+    trials : sequence of sequence of Transaction
+        Polls in immediate succession.
+    """
+
+    def __init__(self, trials: Sequence[Sequence[Transaction]]) -> None:
+        durations_s = sorted(sum(transaction.duration_s for transaction in poll) for poll in trials)
+        self.poll_s = durations_s[len(durations_s) // 2]
+        """Median duration of a poll (s)."""
+        self._slow_s = durations_s[len(durations_s) * 9 // 10]
+        self._shortest_s = min(transaction.duration_s for poll in trials for transaction in poll)
+        self._phases_ns = [
+            _median([poll[i].measured_ns - poll[0].sent_ns for poll in trials]) for i in range(len(trials[0]))
+        ]
+
+    @property
+    def max_rate_hz(self) -> float:
+        """Highest rate at which the device answers nearly all polls."""
+        return round_down(1 / (_RATE_MARGIN * self._slow_s))
+
+    def skew_s(self, first: int, last: int) -> float:
+        """Time from the measurement of one request to that of another (s)."""
+        return (self._phases_ns[last] - self._phases_ns[first]) / _NS
+
+    def is_stale(self, transaction: Transaction) -> bool:
+        """Whether a response came too quickly to be that of its request."""
+        return self._shortest_s > _WIRE_S and transaction.duration_s < _STALE_SHARE * self._shortest_s
+
+    def is_on_schedule(self, request: int, transaction: Transaction, schedule: PollSchedule) -> bool:
+        """Whether a measurement is at its place in the grid.
+
+        A row has the time of its cell, so a measurement that is much earlier or later in its cell than the
+        others would be wrong.
+        """
+        return abs(self._deviation_ns(request, transaction, schedule)) <= schedule.tolerance_ns
+
+    def update(self, request: int, transaction: Transaction, schedule: PollSchedule) -> None:
+        """Add a response to the timing; one off schedule too, because the device may have become slower."""
+        self._shortest_s = min(self._shortest_s, transaction.duration_s)
+        off_ns, most_ns = self._deviation_ns(request, transaction, schedule), schedule.tolerance_ns
+        self._phases_ns[request] += round(_SMOOTHING * max(-most_ns, min(off_ns, most_ns)))
+
+    def _deviation_ns(self, request: int, transaction: Transaction, schedule: PollSchedule) -> int:
+        return transaction.measured_ns - schedule.due_ns - self._phases_ns[request]
+
+
+def round_down(rate_hz: float) -> float:
+    """A rate of two digits, or a multiple of five."""
+    step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
+    return float(f"{math.floor(rate_hz / step) * step:.6g}")
+
+
+def _median(values: list[int]) -> int:
+    return sorted(values)[len(values) // 2]

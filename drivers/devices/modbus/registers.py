@@ -1,0 +1,258 @@
+"""Registers of a transmitter: channels, their values, and the requests that read them."""
+
+import struct
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.devices.modbus.frames import MAX_REGISTERS, Function, Request
+
+WORD_BITS = 16
+
+
+class ValueType(StrEnum):
+    """Format of a value."""
+
+    INT16 = "int16"
+    UINT16 = "uint16"
+    INT32 = "int32"
+    UINT32 = "uint32"
+    FLOAT32 = "float32"
+
+
+class ByteOrder(StrEnum):
+    """Order of the bytes of two registers, A the most significant; one register has the first two."""
+
+    ABCD = "ABCD"
+    CDAB = "CDAB"
+    BADC = "BADC"
+    DCBA = "DCBA"
+
+
+_CODES = {
+    ValueType.INT16: ">h",
+    ValueType.UINT16: ">H",
+    ValueType.INT32: ">i",
+    ValueType.UINT32: ">I",
+    ValueType.FLOAT32: ">f",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroCommand:
+    """The command that sets the value to zero."""
+
+    register: int
+    value: int
+    function: Function = Function.WRITE_SINGLE
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The register with the state of a value.
+
+    Attributes
+    ----------
+    register : int
+    overload_bits, fault_bits : tuple of int
+        From 0, the least significant. One of the first marks an overload, one of the second an invalid value.
+    sign_bit : int or None
+        Marks a negative value, whose own sign is then ignored.
+    """
+
+    register: int
+    overload_bits: tuple[int, ...] = ()
+    fault_bits: tuple[int, ...] = ()
+    sign_bit: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One gauge.
+
+    Attributes
+    ----------
+    unit : int
+        Address of the transmitter, 1 to 247.
+    function : Function
+        Function that reads it, 3 or 4.
+    register : int
+        First register, counted from 0.
+    kind : ValueType
+    order : ByteOrder
+    scale : float
+        Counts for one step of the value.
+    status : Status or None
+    zeroing : Zeroing or None
+    """
+
+    unit: int
+    function: Function
+    register: int
+    kind: ValueType = ValueType.INT32
+    order: ByteOrder = ByteOrder.ABCD
+    scale: float = 1.0
+    status: Status | None = None
+    zero_command: ZeroCommand | None = None
+
+    @property
+    def registers(self) -> int:
+        """Number of registers."""
+        return struct.calcsize(_CODES[self.kind]) // 2
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelValue:
+    """Value of a channel: counts, whether they are clipped, and whether they are invalid."""
+
+    counts: float
+    is_overloaded: bool = False
+    is_faulty: bool = False
+
+
+def decode_channel(channel: Channel, value: bytes, status_word: int) -> ChannelValue:
+    """Value in the bytes of its registers and its status register (0 where there is none)."""
+    (raw,) = struct.unpack(_CODES[channel.kind], reorder_bytes(value, channel.order))
+    status = channel.status or Status(0)
+    if status.sign_bit is not None and status_word >> status.sign_bit & 1:
+        raw = -abs(raw)
+    return ChannelValue(
+        counts=raw * channel.scale,
+        is_overloaded=_any(status_word, status.overload_bits) or raw in _limits(channel.kind),
+        is_faulty=_any(status_word, status.fault_bits) or raw - raw != 0,  # neither nan nor infinite
+    )
+
+
+def encode_channel(channel: Channel, reading: ChannelValue) -> tuple[bytes, int]:
+    """Bytes of the registers and status register for a value, limited to their range."""
+    raw = reading.counts / channel.scale
+    status, word = channel.status or Status(0), 0
+    if status.sign_bit is not None and raw < 0:
+        raw, word = -raw, 1 << status.sign_bit
+    if channel.kind is not ValueType.FLOAT32:
+        low, high = _limits(channel.kind)
+        raw = min(max(round(raw), low), high)
+    if reading.is_overloaded:
+        word |= _mask(status.overload_bits)
+    if reading.is_faulty:
+        word |= _mask(status.fault_bits)
+    return reorder_bytes(struct.pack(_CODES[channel.kind], raw), channel.order), word
+
+
+def reorder_bytes(data: bytes, order: ByteOrder) -> bytes:
+    """Bytes of one or two registers from `order` to `ABCD`, or back: each order is its own inverse."""
+    if order in (ByteOrder.BADC, ByteOrder.DCBA):
+        data = b"".join(data[at : at + 2][::-1] for at in range(0, len(data), 2))
+    if order in (ByteOrder.CDAB, ByteOrder.DCBA):
+        data = data[2:] + data[:2]
+    return data
+
+
+def _limits(kind: ValueType) -> tuple[int, ...]:
+    """Least and largest whole number of a type; a value there is clipped."""
+    bits = 8 * struct.calcsize(_CODES[kind])
+    match kind:
+        case ValueType.FLOAT32:
+            return ()
+        case ValueType.INT16 | ValueType.INT32:
+            return -(1 << bits - 1), (1 << bits - 1) - 1
+    return 0, (1 << bits) - 1
+
+
+def _mask(bits: tuple[int, ...]) -> int:
+    return sum(1 << bit for bit in bits)
+
+
+def _any(word: int, bits: tuple[int, ...]) -> bool:
+    return bool(word & _mask(bits))
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterLocation:
+    """Position of registers: number of the request, and byte in its response."""
+
+    request: int
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Poll:
+    """One sample of all channels.
+
+    Attributes
+    ----------
+    requests : tuple of Request
+        In the order in which they are sent; one where all registers are adjacent in one unit. The time of
+        the first is that of the sample.
+    channels : tuple of Channel
+    values, states : tuple of Place
+        Of each channel's value and status register (None where it has none).
+    """
+
+    requests: tuple[Request, ...]
+    channels: tuple[Channel, ...]
+    values: tuple[RegisterLocation, ...]
+    states: tuple[RegisterLocation | None, ...]
+
+    def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
+        """Values of all channels, from the responses to all requests."""
+        return [
+            decode_channel(
+                channel, self._bytes(answers, value, channel.registers), self._word(answers, state)
+            )
+            for channel, value, state in zip(self.channels, self.values, self.states, strict=True)
+        ]
+
+    def _word(self, answers: list[bytes], place: RegisterLocation | None) -> int:
+        return 0 if place is None else int.from_bytes(self._bytes(answers, place, 1), "big")
+
+    @staticmethod
+    def _bytes(answers: list[bytes], place: RegisterLocation, registers: int) -> bytes:
+        return answers[place.request][place.start : place.start + 2 * registers]
+
+
+def plan_poll(channels: tuple[Channel, ...]) -> Poll:
+    """The fewest requests that read only the needed registers."""
+    spans: dict[tuple[int, Function], list[tuple[int, int]]] = {}
+    for channel in channels:
+        spans.setdefault((channel.unit, channel.function), []).extend(_spans(channel))
+    requests = tuple(
+        Request(unit, function, first, end - first)
+        for (unit, function), parts in spans.items()
+        for first, end in _merge_spans(parts)
+    )
+    return Poll(
+        requests=requests,
+        channels=channels,
+        values=tuple(_find(requests, channel, channel.register) for channel in channels),
+        states=tuple(
+            None if channel.status is None else _find(requests, channel, channel.status.register)
+            for channel in channels
+        ),
+    )
+
+
+def _spans(channel: Channel) -> list[tuple[int, int]]:
+    """Registers of a channel, as (first, end)."""
+    spans = [(channel.register, channel.register + channel.registers)]
+    if channel.status is not None:
+        spans.append((channel.status.register, channel.status.register + 1))
+    return spans
+
+
+def _merge_spans(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Join spans that touch or overlap, while one request may read them."""
+    joined: list[tuple[int, int]] = []
+    for first, end in sorted(spans):
+        if joined and first <= joined[-1][1] and end - joined[-1][0] <= MAX_REGISTERS:
+            joined[-1] = (joined[-1][0], max(end, joined[-1][1]))
+        else:
+            joined.append((first, end))
+    return joined
+
+
+def _find(requests: tuple[Request, ...], channel: Channel, register: int) -> RegisterLocation:
+    for i, request in enumerate(requests):
+        holds = request.register <= register < request.register + request.count
+        if holds and (request.unit, request.function) == (channel.unit, channel.function):
+            return RegisterLocation(i, 2 * (register - request.register))
+    raise LookupError(f"register {register} is in no request")

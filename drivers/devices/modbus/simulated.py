@@ -1,0 +1,153 @@
+"""A simulated Modbus RTU transmitter: the units of a register map, which answer requests."""
+
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.devices.modbus import DRIVER
+from drivers.devices.modbus.frames import (
+    LONGEST,
+    MAX_REGISTERS,
+    READ_FUNCTIONS,
+    WRITE_FUNCTIONS,
+    Function,
+    encode_exception,
+    encode_read_response,
+    with_crc,
+)
+from drivers.devices.modbus.maps import RegisterMap
+from drivers.devices.modbus.registers import Channel, ChannelValue, encode_channel
+from drivers.devices.modbus.source import read_modbus_settings
+from drivers.driver import GAUGES
+from drivers.samples import SampleStatus
+from drivers.simulated.protocol import Command, CommandKind, PolledProtocol
+
+MAX_RATE_HZ = 10_000.0
+_BITS_PER_BYTE = 10
+_TURNAROUND_S = 0.0004
+"""At least 3.5 bytes of silence (MODBUS over Serial Line V1.02, 2.5.1.1), 0.3 ms at 115200 baud, and the time
+of a microcontroller."""
+_ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _ILLEGAL_VALUE = 1, 2, 3
+_READ_BYTES = 8
+_OVERLOADS = {"table": SampleStatus.OVERLOAD_TABLE, "relative": SampleStatus.OVERLOAD_RELATIVE}
+
+
+class ModbusCommandParser:
+    """Requests in bytes in any cut; other bytes are skipped one by one."""
+
+    def __init__(self) -> None:
+        self._unfinished = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Requests completed by `data`: `code` is the unit, `parameters` are all from the function on."""
+        data = self._unfinished + data
+        commands, at = [], 0
+        while (size := _request_bytes(data, at)) and at + size <= len(data):
+            frame = data[at : at + size]
+            if with_crc(frame[:-2]) == frame:
+                commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
+                at += size
+            else:
+                at += 1
+        self._unfinished = data[at:][-LONGEST:]
+        return commands
+
+
+def _request_bytes(data: bytes, at: int) -> int:
+    """Length of the request at `at`; 0 while it cannot be told."""
+    if len(data) < at + _READ_BYTES:
+        return 0
+    return 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES
+
+
+class SimulatedModbus(PolledProtocol):
+    """Registers with the latest sample, of one unit or two, on a line of 115200 baud.
+
+    Parameters
+    ----------
+    register_map : RegisterMap
+        Its channels alone exist.
+    """
+
+    max_rate_hz = MAX_RATE_HZ
+    byte_s = _BITS_PER_BYTE / DRIVER.default_baud
+    turnaround_s = _TURNAROUND_S
+
+    def __init__(self, register_map: RegisterMap) -> None:
+        self._channels = register_map.channels
+        self._registers: dict[tuple[int, int], dict[int, int]] = {}
+        self._latest = dict.fromkeys(GAUGES, 0)
+        self._zero = dict.fromkeys(GAUGES, 0)
+        self.store_sample(np.zeros(2, dtype=np.int32), 0)
+
+    def command_parser(self) -> ModbusCommandParser:
+        """See `SimulatedProtocol`."""
+        return ModbusCommandParser()
+
+    def request_bytes(self, command: Command) -> int:
+        """See `PolledProtocol`."""
+        return len(command.parameters) + 3
+
+    def store_sample(self, counts: NDArray[np.int32], status: int) -> None:
+        """See `PolledProtocol`."""
+        self._latest = dict(zip(GAUGES, counts.tolist(), strict=True))
+        states: dict[tuple[int, int, int], int] = {}
+        for gauge, channel in self._channels.items():
+            reading = ChannelValue(self._latest[gauge] - self._zero[gauge], bool(status & _OVERLOADS[gauge]))
+            self._put(channel, reading, states)
+        for (unit, function, register), word in states.items():
+            self._registers[unit, function][register] = word
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Response or exception of the requested unit; nothing where there is no such unit."""
+        unit, function = command.code, command.parameters[0]
+        if unit not in {channel.unit for channel in self._channels.values()}:
+            return b""
+        if function in READ_FUNCTIONS:
+            return self._read(unit, function, command.parameters)
+        if function in WRITE_FUNCTIONS:
+            return self._write(unit, function, command.parameters)
+        return encode_exception(unit, function, _ILLEGAL_FUNCTION)
+
+    def _put(self, channel: Channel, reading: ChannelValue, states: dict[tuple[int, int, int], int]) -> None:
+        held = self._registers.setdefault((channel.unit, channel.function), {})
+        value, status = encode_channel(channel, reading)
+        held.update(enumerate(struct.unpack(f">{channel.registers}H", value), channel.register))
+        if channel.status is not None:
+            place = (channel.unit, channel.function, channel.status.register)
+            states[place] = states.get(place, 0) | status  # two channels may share it
+
+    def _read(self, unit: int, function: int, asked: bytes) -> bytes:
+        first, count = struct.unpack_from(">HH", asked, 1)
+        held = self._registers.get((unit, function))
+        if held is None:
+            return encode_exception(unit, function, _ILLEGAL_FUNCTION)
+        if not 1 <= count <= MAX_REGISTERS:
+            return encode_exception(unit, function, _ILLEGAL_VALUE)
+        values = [held.get(register) for register in range(first, first + count)]
+        if None in values:
+            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
+        return encode_read_response(unit, function, struct.pack(f">{count}H", *values))
+
+    def _write(self, unit: int, function: int, asked: bytes) -> bytes:
+        (register,) = struct.unpack_from(">H", asked, 1)
+        (value,) = struct.unpack_from(">H", asked, 6 if function == Function.WRITE_MULTIPLE else 3)
+        known = [
+            (gauge, channel.zero_command)
+            for gauge, channel in self._channels.items()
+            if channel.unit == unit and channel.zero_command and channel.zero_command.register == register
+        ]
+        if not known:
+            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
+        zeroed = [gauge for gauge, zeroing in known if zeroing and zeroing.value == value]
+        if not zeroed:
+            return encode_exception(unit, function, _ILLEGAL_VALUE)
+        for gauge in zeroed:
+            self._zero[gauge] = self._latest[gauge]
+        return with_crc(struct.pack(">B", unit) + asked[:5])
+
+
+def make_protocol(settings: dict[str, str]) -> SimulatedModbus:
+    """The simulated device with its own settings. Raises SettingsError."""
+    return SimulatedModbus(read_modbus_settings(settings)[1])

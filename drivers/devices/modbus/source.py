@@ -1,0 +1,391 @@
+"""A transmitter that is polled by Modbus RTU, as a `SampleSource`."""
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from typing import Literal
+
+import msgspec
+
+from drivers.clock import Skew
+from drivers.devices.modbus import DRIVER
+from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.devices.modbus.frames import (
+    ExceptionResponse,
+    Function,
+    InvalidResponse,
+    RegisterResponse,
+    Request,
+    encode_read_response,
+    find_exception,
+    parse_response,
+)
+from drivers.devices.modbus.maps import RegisterMap, is_map_key, map_keys, read_map
+from drivers.devices.modbus.polling import PollSchedule, ResponseTiming, Transaction, drain, transact
+from drivers.devices.modbus.registers import Poll, plan_poll
+from drivers.driver import GAUGES
+from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.recognition import IdentityQuery, describe_unreadable
+from drivers.samples import DeviceIdentity
+from drivers.source import LineSettings, Link
+from drivers.stream import StreamSource, parse_settings
+from messages.message import Message, joined, message
+
+MAX_RATE_HZ = 1000.0
+QUASI_STATIC_HZ = 500.0
+"""Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
+_TRIALS = 24
+"""Trial polls before the stream; the slowest two in ten of them set the rate."""
+_QUERY = Request(1, Function.READ_HOLDING, 0)
+
+
+class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give, beside the keys of a register map."""
+
+    map: str = "generic"
+    """A shipped register map, or a file that ends in `.toml`."""
+    channel: Literal["both", "table", "relative"] = "both"
+    """Gauges on this port; the column of another gauge is 0."""
+    zero: bool = False
+    """Whether to send the zero command of the map at the start."""
+    timeout_s: float = 0.2
+    """How long a response is waited for."""
+
+    def __post_init__(self) -> None:
+        if not 0.005 <= self.timeout_s <= 1.0:
+            raise SettingsError(
+                "timeout_s {timeout_s:g} is out of range: give 0.005 to 1", timeout_s=self.timeout_s
+            )
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """Gauges to read."""
+        return GAUGES if self.channel == "both" else (self.channel,)
+
+
+class ModbusSource(StreamSource):
+    """Conversation: ask until there is a response, measure the response time, then poll at the rate.
+
+    Rows lie on a grid of the host's clock (`drivers.devices.modbus.decoder`). A poll is made at the beginning
+    of its cell, or not at all.
+
+    Parameters
+    ----------
+    settings : ModbusSettings
+    register_map : RegisterMap
+    rate_hz : float or None
+        Polls a second; None polls as often as the device answers.
+    """
+
+    def __init__(
+        self, settings: ModbusSettings, register_map: RegisterMap, rate_hz: float | None = None
+    ) -> None:
+        identity = DeviceIdentity(DRIVER.name, register_map.title, settings={"map": register_map.name})
+        super().__init__(identity, DRIVER.default_baud, rate_hz)
+        self._settings = settings
+        self._map = register_map
+        self._poll: Poll = plan_poll(tuple(register_map.channels[gauge] for gauge in settings.gauges))
+        self._schedule: PollSchedule | None = None
+        self._timing: ResponseTiming | None = None
+        self._response_overdue = False
+        """The last request got no response: it may still come."""
+        self._was_invalid = False
+        """What came last was no response."""
+        self._warnings: deque[Message] = deque()
+        self._was_busy = False
+
+    @property
+    def skew_s(self) -> float:
+        """How much later gauge 2 is measured than gauge 1 in one poll (s); 0 before the start."""
+        first, last = self._poll.values[0].request, self._poll.values[-1].request
+        return self._timing.skew_s(first, last) if self._timing else 0.0
+
+    @property
+    def channels(self) -> int:
+        """As set."""
+        return len(self._settings.gauges)
+
+    @property
+    def run_note(self) -> Message:
+        """That the rate is quasi-static, the caution of the map, and the skew of two requests."""
+        parts: list[Message] = []
+        if self.rate_hz < QUASI_STATIC_HZ:
+            parts.append(
+                message(
+                    "polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely",
+                    rate_hz=self.rate_hz,
+                )
+            )
+        if self._map.caution:
+            parts.append(message("{caution}", caution=self._map.caution))
+        if self.skew_s:
+            parts.append(
+                message(
+                    "gauge 2 is asked {skew_ms:.2g} ms after gauge 1, one request after the other",
+                    skew_ms=1e3 * self.skew_s,
+                )
+            )
+        return joined(parts, "; ")
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """See `drivers.clock.HasSkew`; None where one request reads both gauges."""
+        decoder = self._decoder
+        return decoder.skew(first_index, end_index) if isinstance(decoder, ResponseDecoder) else None
+
+    def prepare(self) -> None:
+        """Compile what makes rows, which takes a second on the very first use."""
+        decoder = self._decoder_at(1.0)
+        for number, request in enumerate(self._poll.requests):
+            data = encode_read_response(request.unit, request.function, bytes(2 * request.count))
+            list(decoder.feed(wrap_response(number, 0, data), 0))
+
+    def start(self, link: Link) -> bytes:
+        """Wait for a response, zero the device if asked to, and choose or check the rate.
+
+        Raises
+        ------
+        NoDataError
+            If nothing intelligible comes within 3 s.
+        ProtocolError
+            If the device refuses, another one answers, or it is too slow for the rate.
+        """
+        self.prepare()
+        self._await_responses(link)
+        if self._settings.zero:
+            self._zero(link)
+            self._await_responses(link)
+        self._measure_timing(link)
+        return b""
+
+    def resume(self, link: Link) -> bytes:
+        """Continue with a device that answers again, at the same rate."""
+        self._await_responses(link)
+        self._response_overdue = self._was_invalid = False
+        return b""
+
+    def set_poll_rate(self, rate_hz: float) -> None:
+        """Change the rate of polls after the start and before anything is decoded.
+
+        `rate_hz` must not be above the one of the start.
+        """
+        self._rate_hz, self._schedule = rate_hz, PollSchedule(rate_hz)
+
+    def read(self, link: Link) -> bytes:
+        """Wait for the next poll and make it; b"" where it is not due within 50 ms, or nothing came.
+
+        Each response is wrapped with the time of measurement (`Transaction.measured_ns`).
+        """
+        schedule, timing = self._schedule, self._timing
+        if schedule is None or timing is None:
+            raise ProtocolError("the device was not started: start it before it is read")
+        is_due = schedule.wait()
+        self._report_load(schedule.is_computer_busy)
+        if not is_due:
+            return b""
+        wrapped, measured_ns = b"", 0
+        for number, request in enumerate(self._poll.requests):
+            transaction = transact(link, request, self._settings.timeout_s)
+            measured_ns = measured_ns or transaction.measured_ns
+            is_stale = self._response_overdue or timing.is_stale(transaction)
+            is_late = is_stale or not timing.is_on_schedule(number, transaction, schedule)
+            if transaction.data:
+                wrapped += wrap_response(number, transaction.measured_ns, transaction.data, is_late=is_late)
+            is_response = self._resynchronise(link, request, transaction, is_stale=is_stale)
+            if is_response and not is_stale:
+                timing.update(number, transaction, schedule)
+            if is_late or not is_response:
+                break
+        schedule.mark_used(measured_ns)
+        return wrapped
+
+    def take_warnings(self) -> list[Message]:
+        """Warning that this computer is too busy to poll in time, each time that it becomes so."""
+        return [self._warnings.popleft() for _ in range(len(self._warnings))]
+
+    def make_decoder(self, data: bytes) -> ResponseDecoder:  # noqa: ARG002 - settings and rate are enough
+        """Decoder at the rate of the polls."""
+        return self._decoder_at(self.rate_hz)
+
+    def _decoder_at(self, rate_hz: float) -> ResponseDecoder:
+        columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
+        return ResponseDecoder(self._poll, columns, rate_hz)
+
+    def _report_load(self, is_busy: bool) -> None:
+        if is_busy and not self._was_busy:
+            self._warnings.append(
+                message(
+                    "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
+                    " out: close other programs, or ask for a lower rate",
+                    rate_hz=self.rate_hz,
+                )
+            )
+        self._was_busy = is_busy
+
+    def _resynchronise(
+        self, link: Link, request: Request, transaction: Transaction, *, is_stale: bool
+    ) -> bool:
+        """Make sure that the next bytes belong to the next request; returns whether these were a response.
+
+        One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
+        """
+        response = parse_response(request, transaction.data)
+        was_invalid, self._was_invalid = self._was_invalid, isinstance(response, InvalidResponse)
+        if transaction.data and (is_stale or (was_invalid and self._was_invalid)):
+            drain(link)
+        self._response_overdue = not transaction.data
+        return isinstance(response, RegisterResponse)
+
+    def _await_responses(self, link: Link) -> None:
+        """Send all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
+        deadline_s = time.monotonic() + self.timeout_s
+        received = drain(link)
+        for request in self._poll.requests:
+            last: ExceptionResponse | InvalidResponse | None = None
+            while True:
+                transaction = transact(link, request, self._settings.timeout_s)
+                response = parse_response(request, transaction.data)
+                if isinstance(response, RegisterResponse):
+                    break
+                received += transaction.data + drain(link)
+                last = response if last is None or transaction.data else last
+                if time.monotonic() > deadline_s:
+                    raise self._no_response_error(request, last, received)
+
+    def _no_response_error(
+        self, request: Request, response: ExceptionResponse | InvalidResponse, received: bytes
+    ) -> Exception:
+        if isinstance(response, ExceptionResponse):
+            return ProtocolError(
+                "unit {unit} refuses {request}: {fault}. Hold register map {map} against the device's manual",
+                unit=request.unit,
+                request=request.description,
+                fault=response.description,
+                map=self._map.name,
+            )
+        if not received:
+            return NoDataError(
+                "unit {unit} does not answer {request}: check baud rate, parity and unit,"
+                " cable and power, and whether A and B are swapped",
+                unit=request.unit,
+                request=request.description,
+            )
+        return NoDataError(
+            "no answer of unit {unit} to {request} ({reason}); {what}",
+            unit=request.unit,
+            request=request.description,
+            reason=response.reason,
+            what=describe_unreadable(received, DRIVER.name, DRIVER.default_baud),
+        )
+
+    def _zero(self, link: Link) -> None:
+        for gauge, channel in self._map.channels.items():
+            command = channel.zero_command
+            if command is None:
+                continue
+            request = Request(channel.unit, command.function, command.register, 1, (command.value,))
+            response = parse_response(request, transact(link, request, self._settings.timeout_s).data)
+            if not isinstance(response, RegisterResponse):
+                raise ProtocolError(
+                    "the {gauge} gauge was not set to zero: {reason}. Try again, or without zero",
+                    gauge=gauge,
+                    reason=_fault(response),
+                )
+
+    def _measure_timing(self, link: Link) -> None:
+        """Measure the response time; choose the rate, or compare the one asked for with it."""
+        timing = ResponseTiming([self._trial_poll(link) for _ in range(_TRIALS)])
+        if self._rate_hz is None:
+            self._rate_hz = min(MAX_RATE_HZ, timing.max_rate_hz)
+        elif timing.poll_s * self._rate_hz > 1:
+            raise ProtocolError(
+                "rate {rate_hz:g} Hz cannot be: a poll takes {poll_ms:.2g} ms, ask for"
+                " --rate {possible_hz:g} or leave it out",
+                rate_hz=self._rate_hz,
+                poll_ms=1e3 * timing.poll_s,
+                possible_hz=timing.max_rate_hz,
+            )
+        self._timing, self._schedule = timing, PollSchedule(self._rate_hz)
+
+    def _trial_poll(self, link: Link) -> list[Transaction]:
+        transactions = []
+        for request in self._poll.requests:
+            transactions.append(transact(link, request, self._settings.timeout_s))
+            if not isinstance(parse_response(request, transactions[-1].data), RegisterResponse):
+                drain(link)
+        return transactions
+
+
+def _fault(response: ExceptionResponse | InvalidResponse) -> Message:
+    return response.description if isinstance(response, ExceptionResponse) else response.reason
+
+
+def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSource:
+    """Source of the device. Raises SettingsError for a setting, map or rate that cannot be."""
+    if rate_hz is not None and not 0 < rate_hz <= MAX_RATE_HZ:
+        raise SettingsError(
+            "rate {rate_hz:g} Hz cannot be polled: give one up to {most:g}, or leave it out",
+            rate_hz=rate_hz,
+            most=MAX_RATE_HZ,
+        )
+    parsed, register_map = read_modbus_settings(settings)
+    return ModbusSource(parsed, register_map, rate_hz)
+
+
+def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str]:
+    """Settings of a device with one gauge."""
+    return settings | {"channel": gauge}
+
+
+def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, RegisterMap]:
+    """Settings of the driver, and the register map that they choose and change.
+
+    Raises
+    ------
+    SettingsError
+        For one that is unknown or cannot be.
+    """
+    own = {key: value for key, value in settings.items() if not is_map_key(key)}
+    known = {field.name for field in msgspec.structs.fields(ModbusSettings)}
+    for key in own:
+        if key not in known:
+            raise SettingsError(
+                "setting {key!r} is not known to {protocol}: allowed are {allowed}, the keys of a map also"
+                " for one gauge, such as table_register",
+                key=key,
+                protocol=DRIVER.name,
+                allowed=[*sorted(known), *map_keys()],
+            )
+    parsed = parse_settings(ModbusSettings, own, DRIVER.name)
+    given = {key: value for key, value in settings.items() if is_map_key(key)}
+    register_map = read_map(parsed.map, given, parsed.gauges)
+    if parsed.zero and not any(channel.zero_command for channel in register_map.channels.values()):
+        raise SettingsError(
+            "zero is asked for, but map {map} has no zero command: leave zero out, or give"
+            " zero_register and zero_value from the device's manual",
+            map=parsed.map,
+        )
+    return parsed, register_map
+
+
+def explain(received: bytes) -> Message | None:
+    """What a Modbus exception in `received` says; None without one."""
+    refused = find_exception(received)
+    if refused is None:
+        return None
+    return message(
+        "the device refuses, {fault}: hold its registers against its manual", fault=refused.description
+    )
+
+
+def _parse_response(received: bytes) -> Message | None:
+    if isinstance(parse_response(_QUERY, received), InvalidResponse):
+        return None
+    return message("unit {unit} answers: choose its register map with --set map=NAME", unit=_QUERY.unit)
+
+
+IDENTITY_QUERY = IdentityQuery(
+    4,
+    _QUERY.encode(),
+    tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
+    _parse_response,
+)

@@ -1,0 +1,440 @@
+"""Frames and commands of the Slipstand binary protocol, encoded and decoded.
+
+`AA 55 | version u8 | flags u8 | seq u32 | t_us u32 | n u8 | n x (i32, i32) | crc u16`, little-endian;
+the CRC covers version to last sample.
+"""
+
+import re
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import MIN_SPAN_S, MIN_STEPS
+from drivers.compiled import compiled, inlined
+from drivers.crc import crc16, crc16_slice
+from drivers.errors import ProtocolError, SettingsError
+from drivers.packets import (
+    LOSS_FIELDS,
+    MAX_GAP_S,
+    PACKET,
+    PacketDecoder,
+    Packets,
+    Record,
+    is_plausible_gap,
+)
+
+START = b"S"
+STOP = b"P"
+IDENTIFY = b"I"
+
+SYNC = b"\xaa\x55"
+VERSION = 1
+HEADER_BYTES = 13
+"""Before the first sample: sync, version, flags, seq, t_us, n."""
+SAMPLE_BYTES = 8
+"""Two int32."""
+MAX_SAMPLES = 32
+MIN_FRAME_BYTES = HEADER_BYTES + SAMPLE_BYTES + 2
+
+_IDENTITY = re.compile(rb"slipstand-fw (\S+) (\d+(?:\.\d+)?) (\d+)\r?\n")
+_FRAMES_PER_S = 200.0
+"""Frames a second below 6.4 kHz: a sample waits for its frame for 5 ms at most."""
+_MAX_RATE_HZ = 1_000_000
+_HALF = 1 << 31
+_HEADER = np.dtype(
+    {
+        "names": ["seq", "t_us", "n"],
+        "formats": ["<u4", "<u4", "u1"],
+        "offsets": [4, 8, 12],
+        "itemsize": HEADER_BYTES,
+    }
+)
+
+
+class FrameFlags(IntFlag):
+    """The flags byte of a frame."""
+
+    OVERLOAD_TABLE = 0x01
+    OVERLOAD_RELATIVE = 0x02
+    DROPPED_BEFORE = 0x80
+    """The device lost samples before this frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareIdentity:
+    """The answer to `IDENTIFY`."""
+
+    version: str
+    rate_hz: float
+    channels: int
+
+
+def encode_rate(rate_hz: float) -> bytes:
+    r"""Command that sets the sample rate: `R<hz>\n`, whole hertz.
+
+    Raises
+    ------
+    SettingsError
+        If `rate_hz` is no whole number from 1 to 1,000,000.
+    """
+    if not (1 <= rate_hz <= _MAX_RATE_HZ and rate_hz == int(rate_hz)):
+        raise SettingsError(
+            "rate {rate_hz:g} Hz cannot be set: give whole hertz from 1 to {most}",
+            rate_hz=rate_hz,
+            most=_MAX_RATE_HZ,
+        )
+    return b"R%d\n" % int(rate_hz)
+
+
+def encode_identity(identity: FirmwareIdentity) -> bytes:
+    """Answer of a device to `IDENTIFY`."""
+    return f"slipstand-fw {identity.version} {identity.rate_hz:g} {identity.channels}\n".encode("ascii")
+
+
+def find_identity(received: bytes) -> FirmwareIdentity | None:
+    """The identity line in `received`, wherever it is; None while it is not complete.
+
+    Raises
+    ------
+    ProtocolError
+        If the device has not two channels.
+    """
+    match = _IDENTITY.search(received)
+    if match is None:
+        return None
+    identity = FirmwareIdentity(match[1].decode("ascii", "replace"), float(match[2]), int(match[3]))
+    if identity.channels != 2:
+        raise ProtocolError(
+            "the device has {channels} channels and 2 are needed (table, relative): "
+            "flash firmware for two channels",
+            channels=identity.channels,
+        )
+    return identity
+
+
+def samples_per_frame(rate_hz: float) -> int:
+    """Samples the device puts into a frame: at most 32, and below 6.4 kHz at most 5 ms of them."""
+    return int(min(max(rate_hz / _FRAMES_PER_S, 1), MAX_SAMPLES))
+
+
+def frame_length(samples: int) -> int:
+    """Bytes of a frame that carries `samples` samples."""
+    return HEADER_BYTES + SAMPLE_BYTES * samples + 2
+
+
+def encode_frame(first_index: int, time_us: int, counts: NDArray[np.int32], flags: int = 0) -> bytes:
+    """One frame of counts (n, 2); see `encode_frames`."""
+    return encode_frames(first_index, np.array([time_us]), np.asarray(counts).reshape(-1, 2), flags).tobytes()
+
+
+def encode_frames(
+    first_index: int,
+    times_us: NDArray[np.int64],
+    counts: NDArray[np.int32],
+    flags: int | NDArray[np.uint8] = 0,
+) -> NDArray[np.uint8]:
+    """Many frames of equal length, as a device without faults sends them.
+
+    Parameters
+    ----------
+    first_index : int
+        Index of the very first sample, sent modulo 2**32; each sample has the next index.
+    times_us : (frames,) int
+        Device time (us) of the first sample of each frame, sent modulo 2**32.
+    counts : (frames * n, 2) int32
+        Readings of both channels, n of them a frame, 1 <= n <= 32.
+    flags : int or (frames,) uint8
+        `FrameFlags` of all or of each frame.
+
+    Returns
+    -------
+    (frames, 15 + 8 n) uint8
+        A frame a row; `.tobytes()` is what is sent.
+
+    Raises
+    ------
+    ValueError
+        If the samples do not fill the frames.
+    """
+    frames = len(times_us)
+    n, rest = divmod(len(counts), max(frames, 1))
+    if rest or (frames and not 1 <= n <= MAX_SAMPLES):
+        raise ValueError(
+            f"{len(counts)} samples do not fill {frames} frames evenly with 1 to {MAX_SAMPLES} each"
+        )
+    table = np.zeros(frames, dtype=_frame_dtype(n))
+    table["sync"] = np.frombuffer(SYNC, dtype="<u2")
+    table["version"] = VERSION
+    table["flags"] = flags
+    table["seq"] = (first_index + n * np.arange(frames, dtype=np.int64)) & 0xFFFFFFFF
+    table["t_us"] = np.asarray(times_us, dtype=np.int64) & 0xFFFFFFFF
+    table["n"] = n
+    table["counts"] = np.asarray(counts).reshape(frames, n, 2)
+    wire = table.view(np.uint8).reshape(frames, frame_length(n))
+    table["crc"] = [crc16(row[2:-2].tobytes()) for row in wire]
+    return wire
+
+
+def _frame_dtype(n: int) -> np.dtype[np.void]:
+    return np.dtype(
+        [
+            ("sync", "<u2"),
+            ("version", "u1"),
+            ("flags", "u1"),
+            ("seq", "<u4"),
+            ("t_us", "<u4"),
+            ("n", "u1"),
+            ("counts", "<i4", (n, 2)),
+            ("crc", "<u2"),
+        ]
+    )
+
+
+class FrameDecoder(PacketDecoder):
+    """Bytes to sample blocks with every lost sample counted.
+
+    Between two good frames the sequence proves how many samples are lost. As many of them as the bytes in
+    between can have held are damaged, the others missing. A sequence that goes back, leaps by more than
+    `max_gap_s`, or contradicts the host's clock after a broken connection is a restart of the device: the
+    rows until it are estimated from the host's clock (`missing_estimated`), and the index goes on. A frame
+    that comes twice counts once. Losses before the first and after the last good frame cannot be known.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal rate, > 0.
+    max_gap_s : float
+        Longest gap that a sequence number is believed to prove.
+    """
+
+    _piece_bytes = 1 << 18
+
+    def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
+        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
+        self._state["period_s"] = 1 / rate_hz
+        self._state["max_gap"] = self._max_gap
+
+    def expect_restart(self) -> None:
+        """See `PacketDecoder`."""
+        self._state["garbage"] += len(self._unfinished)
+        super().expect_restart()
+
+    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
+        frames, samples, used = find_frames(buffer, offsets)
+        self._unfinished = data[used:]
+        packets = np.empty(frames, dtype=PACKET)
+        counts = np.empty((samples, 2), dtype=np.int32)
+        before = self._position()
+        self._state["restart_rows"] = self._rows_since(arrival_ns, samples)
+        found, samples = count_frames(buffer, offsets[:frames], used, self._state, packets, counts)
+        return self._packets(packets[:found], counts[:samples], before, arrival_ns)
+
+
+def find_frame_headers(data: bytes) -> NDArray[np.void]:
+    """Headers of the good frames in `data`: (frames,) with fields seq, t_us and n."""
+    buffer = np.frombuffer(data, dtype=np.uint8)
+    offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
+    found, _, _ = find_frames(buffer, offsets)
+    headers: NDArray[np.void] = buffer[offsets[:found, None] + np.arange(HEADER_BYTES)].view(_HEADER)[:, 0]
+    return headers
+
+
+def rate_from_frames(data: bytes) -> float | None:
+    """Samples a second by the device's own times; None while there are too few frames.
+
+    Only frames after the last restart of the device count.
+    """
+    frames = find_frame_headers(data)
+    steps = _differences(frames["seq"])
+    steps_us = _differences(frames["t_us"])
+    is_ahead = (steps < _HALF) & (steps_us < _HALF)
+    first = len(is_ahead) - int(np.argmin(is_ahead[::-1])) if not is_ahead.all() else 0
+    span_us = int(steps_us[first:].sum())
+    if len(steps) - first < MIN_STEPS or span_us < MIN_SPAN_S * 1e6:
+        return None
+    return float(steps[first:].sum()) / (span_us * 1e-6)
+
+
+def _differences(counter: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Steps of a counter that wraps."""
+    return (counter[1:] - counter[:-1]).astype(np.int64)
+
+
+_SYNC_0, _SYNC_1 = SYNC
+_DROPPED_BEFORE = int(FrameFlags.DROPPED_BEFORE)
+_OVERLOADS = int(FrameFlags.OVERLOAD_TABLE | FrameFlags.OVERLOAD_RELATIVE)
+_OVERLOAD_SHIFT = 2
+"""Shifts the overload bits of the frame onto those of `SampleStatus`."""
+_U32 = 0xFFFFFFFF
+
+STATE = np.dtype(
+    [
+        *LOSS_FIELDS,
+        ("period_s", np.float64),  # nominal, between samples
+        ("max_gap", np.int64),  # a larger step of the sequence, or a negative one, is a restart
+        ("started", np.int64),
+        ("restarting", np.int64),  # the connection broke, and the device may have restarted
+        ("restart_rows", np.int64),  # rows for the time of a restart, by the host's clock
+        ("next_seq", np.int64),  # sequence number that follows without a loss
+        ("last_seq", np.int64),
+        ("last_t_us", np.int64),
+        ("packet_us", np.int64),  # unwrapped device time of the last frame, from 0 at the first
+        ("row_time_s", np.float64),  # and of its last sample
+        ("garbage", np.int64),  # bytes since the last good frame
+    ],
+    align=True,
+)
+"""What the decoder keeps between calls."""
+
+
+@compiled
+def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Offsets of the good frames in `buffer`.
+
+    A bad candidate costs one byte. Returns the number of frames, the number of their samples, and the number
+    of bytes that were used: the rest (at most 270) may become a frame.
+    """
+    at = 0
+    frames = 0
+    samples = 0
+    while at + MIN_FRAME_BYTES <= len(buffer):
+        if buffer[at] == _SYNC_0 and buffer[at + 1] == _SYNC_1 and buffer[at + 2] == VERSION:
+            n = int(buffer[at + 12])
+            end = at + HEADER_BYTES + SAMPLE_BYTES * n + 2
+            if 1 <= n <= MAX_SAMPLES:
+                if end > len(buffer):
+                    break
+                crc = buffer[end - 2] | (np.uint64(buffer[end - 1]) << 8)
+                if crc16_slice(buffer, at + 2, end - 2) == crc:
+                    offsets[frames] = at
+                    frames += 1
+                    samples += n
+                    at = end
+                    continue
+        at += 1
+    return frames, samples, at
+
+
+@compiled
+def count_frames(
+    buffer: NDArray[np.uint8],
+    offsets: NDArray[np.int64],
+    used: int,
+    states: NDArray[np.void],
+    packets: NDArray[np.void],
+    counts: NDArray[np.int32],
+) -> tuple[int, int]:
+    """Fill packets (frames,) and counts (samples, 2) of the frames at `offsets`; returns how many.
+
+    `used` bytes of the buffer will not be passed again; `states` (1,) is updated.
+    """
+    state = states[0]
+    found = 0
+    sample = 0
+    end = 0
+    for at in offsets:
+        _discard(state, at - end)
+        n = int(buffer[at + 12])
+        end = at + HEADER_BYTES + SAMPLE_BYTES * n + 2
+        if _is_repeated(state, buffer, at):
+            state.repeated += 1
+            state.discarded_bytes += end - at
+            continue
+        gap, is_restart = _gap_before(state, buffer, at)
+        damaged = min(gap, -(-state.garbage // (end - at)) * n)
+        packet = packets[found]
+        packet.damaged = damaged
+        packet.missing = gap - damaged
+        packet.time_s = _time_s(state, buffer, at, gap, is_restart)
+        packet.samples = n
+        packet.status = (buffer[at + 3] & _OVERLOADS) << _OVERLOAD_SHIFT
+        _count(state, packet, is_restart)
+        _update(state, buffer, at, packet)
+        _read_samples(buffer, at + HEADER_BYTES, counts[sample : sample + n])
+        sample += n
+        found += 1
+    _discard(state, used - end)
+    return found, sample
+
+
+@inlined
+def _discard(state: Record, size: int) -> None:
+    state.garbage += size
+    state.discarded_bytes += size
+
+
+@inlined
+def _is_repeated(state: Record, buffer: NDArray[np.uint8], at: int) -> bool:
+    """Whether the frame is the last one again."""
+    if not state.started or state.restarting:
+        return False
+    return bool(_u32(buffer, at + 4) == state.last_seq and _u32(buffer, at + 8) == state.last_t_us)
+
+
+@inlined
+def _gap_before(state: Record, buffer: NDArray[np.uint8], at: int) -> tuple[int, bool]:
+    """Rows lost before the frame, and whether a restart makes that an estimate."""
+    if not state.started:
+        return 0, False
+    gap = (_u32(buffer, at + 4) - state.next_seq) & _U32
+    if gap > state.max_gap or (state.restarting and not is_plausible_gap(state, gap)):
+        absent = state.restart_rows
+        state.restart_rows = 0  # two restarts in one read share their time
+        return absent, True
+    if gap == 0 and buffer[at + 3] & _DROPPED_BEFORE:
+        state.unexplained_drops += 1
+    return gap, False
+
+
+@inlined
+def _time_s(state: Record, buffer: NDArray[np.uint8], at: int, gap: int, is_restart: bool) -> float:
+    """Unwrapped device time of the frame; it goes on over a restart."""
+    if not state.started:
+        state.packet_us = 0
+    elif is_restart:
+        state.packet_us = np.int64(np.rint((state.row_time_s + (gap + 1) * state.period_s) * 1e6))
+    else:
+        step = (_u32(buffer, at + 8) - state.last_t_us) & _U32
+        state.packet_us += step if step < _U32 // 2 else step - _U32 - 1
+    return float(state.packet_us * 1e-6)
+
+
+@inlined
+def _count(state: Record, packet: Record, is_restart: bool) -> None:
+    state.damaged += packet.damaged
+    if is_restart:
+        state.restarts += 1
+        state.missing_estimated += packet.missing
+    else:
+        state.missing += packet.missing
+    if packet.status:
+        state.overloaded += packet.samples
+    state.samples += packet.damaged + packet.missing + packet.samples
+
+
+@inlined
+def _update(state: Record, buffer: NDArray[np.uint8], at: int, packet: Record) -> None:
+    state.started = 1
+    state.restarting = 0
+    state.garbage = 0
+    state.last_seq = _u32(buffer, at + 4)
+    state.last_t_us = _u32(buffer, at + 8)
+    state.next_seq = (state.last_seq + packet.samples) & _U32
+    state.row_time_s = packet.time_s + (packet.samples - 1) * state.period_s
+
+
+@inlined
+def _read_samples(buffer: NDArray[np.uint8], at: int, counts: NDArray[np.int32]) -> None:
+    for k in range(len(counts)):
+        counts[k, 0] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k))
+        counts[k, 1] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k + 4))
+
+
+@inlined
+def _u32(buffer: NDArray[np.uint8], at: int) -> int:
+    low = np.int64(buffer[at]) | np.int64(buffer[at + 1]) << 8
+    return int(low | np.int64(buffer[at + 2]) << 16 | np.int64(buffer[at + 3]) << 24)

@@ -1,0 +1,81 @@
+"""A simulated device with the reference firmware."""
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.devices.slipstand_binary import DRIVER
+from drivers.devices.slipstand_binary.codec import (
+    FirmwareIdentity,
+    FrameFlags,
+    encode_frames,
+    encode_identity,
+    samples_per_frame,
+)
+from drivers.devices.slipstand_binary.source import BinarySettings
+from drivers.samples import SampleStatus
+from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
+from drivers.stream import parse_settings
+
+FIRMWARE = "simulated-1"
+_MAX_COMMAND_BYTES = 16
+_COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
+_KINDS = {b"S": CommandKind.START, b"P": CommandKind.STOP, b"I": CommandKind.IDENTIFY}
+
+
+class FirmwareCommandParser:
+    """Commands of the reference firmware in bytes in any cut; other bytes are skipped."""
+
+    def __init__(self) -> None:
+        self._unfinished = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Commands completed by `data`."""
+        text = self._unfinished + data
+        matches = list(_COMMAND.finditer(text))
+        end = matches[-1].end() if matches else 0
+        unfinished = text.rfind(b"R", end)
+        self._unfinished = text[unfinished:][:_MAX_COMMAND_BYTES] if unfinished >= 0 else b""
+        return [Command(CommandKind.RATE, float(m[1])) if m[1] else Command(_KINDS[m[0]]) for m in matches]
+
+
+class SimulatedBinary(SimulatedProtocol):
+    """Sends frames with index, device time and CRC once it is started; obeys commands."""
+
+    flags_overload = True
+
+    def command_parser(self) -> FirmwareCommandParser:
+        """See `SimulatedProtocol`."""
+        return FirmwareCommandParser()
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Answer `IDENTIFY`; other commands have no answer."""
+        if command.kind is CommandKind.IDENTIFY:
+            return encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
+        return b""
+
+    def samples_per_frame(self, rate_hz: float) -> int:
+        """As the reference firmware: at most 5 ms and at most 32 samples."""
+        return samples_per_frame(rate_hz)
+
+    def encode(
+        self,
+        first_sequence: int,
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],
+        times_s: NDArray[np.float64],
+    ) -> list[bytes]:
+        """Frames; one is flagged as overloaded when one of its samples is."""
+        seen = np.bitwise_or.reduce(status.reshape(len(times_s), -1), axis=1)
+        table = np.where(seen & SampleStatus.OVERLOAD_TABLE, np.uint8(FrameFlags.OVERLOAD_TABLE), np.uint8(0))
+        relative = seen & SampleStatus.OVERLOAD_RELATIVE
+        flags = np.where(relative, table | np.uint8(FrameFlags.OVERLOAD_RELATIVE), table)
+        times_us = np.rint(times_s * 1e6).astype(np.int64)
+        return [row.tobytes() for row in encode_frames(first_sequence, times_us, counts, flags)]
+
+
+def make_protocol(settings: dict[str, str]) -> SimulatedBinary:
+    """The simulated device with its own settings. Raises SettingsError."""
+    parse_settings(BinarySettings, settings, DRIVER.name)
+    return SimulatedBinary()

@@ -1,0 +1,168 @@
+"""A device that speaks Slipstand binary, as a `SampleSource`."""
+
+import time
+
+import msgspec
+import numpy as np
+
+from drivers.devices.slipstand_binary import DRIVER
+from drivers.devices.slipstand_binary.codec import (
+    IDENTIFY,
+    START,
+    STOP,
+    FirmwareIdentity,
+    FrameDecoder,
+    encode_frame,
+    encode_rate,
+    find_frame_headers,
+    find_identity,
+    frame_length,
+    rate_from_frames,
+)
+from drivers.errors import ProtocolError
+from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.samples import DeviceIdentity
+from drivers.source import LineSettings, Link
+from drivers.stream import RATE_TOLERANCE, StreamSource, parse_settings
+from messages.message import Message, message
+
+_TRIES = 4
+"""A board that is reset by opening its port (an Arduino) answers nothing for the first second or two."""
+_LISTEN_S = 0.5
+"""How long a device is listened to that may still be sending; ten frames at 20 Hz."""
+_RATE_S = 0.8
+"""How long its rate is measured, which needs 0.5 s of frames."""
+
+
+class BinarySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The protocol has no settings."""
+
+
+class SlipstandBinarySource(StreamSource):
+    """Conversation: stop, identify, set the rate where another is asked for, start."""
+
+    answer_timeout_s = 0.5
+    stop_command = STOP
+
+    def __init__(self, rate_hz: float | None = None) -> None:
+        super().__init__(DeviceIdentity(DRIVER.name, "Slipstand binary"), DRIVER.default_baud, rate_hz)
+
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        frame = encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))
+        list(FrameDecoder(1.0).feed(frame, 0))
+
+    def start(self, link: Link) -> bytes:
+        """Stop the device, set it up, start it, and wait for the first good frame.
+
+        A device that does not answer `IDENTIFY` is accepted if its frames come; its rate is then measured.
+
+        Raises
+        ------
+        NoDataError
+            If no good frame came within 3 s.
+        ProtocolError
+            If the device does not take the rate, or has not two channels.
+        """
+        self.prepare()
+        deadline_s = time.monotonic() + self.timeout_s
+        self.silence(link)
+        device = self._identify(link)
+        if device is not None:
+            device = self._with_rate(link, device)
+            self._rate_hz = device.rate_hz
+            self._identity = DeviceIdentity(DRIVER.name, "slipstand-fw", firmware=device.version)
+        link.write(START)
+        return self._await_frames(link, deadline_s - time.monotonic(), measure=device is None)
+
+    def resume(self, link: Link) -> bytes:
+        """Continue; see `drivers.source.SampleSource`. Raises like `start`."""
+        received, sends = self.await_data(link, _LISTEN_S, lambda data: len(find_frame_headers(data)) > 0)
+        if sends:
+            more, _ = self.await_data(
+                link, _RATE_S, lambda data: rate_from_frames(received + data) is not None
+            )
+            received += more
+        rate_hz = rate_from_frames(received)
+        if self._rate_hz and rate_hz and abs(rate_hz / self._rate_hz - 1) <= RATE_TOLERANCE:
+            return received
+        return self.start(link)
+
+    def make_decoder(self, data: bytes) -> FrameDecoder | None:
+        """Decoder at the known rate, else at the one that the frames in `data` show."""
+        if self._rate_hz is None:
+            self._rate_hz = rate_from_frames(data)
+        return FrameDecoder(self._rate_hz) if self._rate_hz else None
+
+    def _identify(self, link: Link) -> FirmwareIdentity | None:
+        return self.request(link, IDENTIFY, find_identity, _TRIES)
+
+    def _with_rate(self, link: Link, device: FirmwareIdentity) -> FirmwareIdentity:
+        """Set the rate where another is asked for, and let the device confirm it."""
+        if self._rate_hz is None or device.rate_hz == self._rate_hz:
+            return device
+        link.write(encode_rate(self._rate_hz))
+        confirmed = self._identify(link)
+        if confirmed is None or confirmed.rate_hz != self._rate_hz:
+            raise ProtocolError(
+                "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
+                "ask for --rate {actual_hz:g} or one that it can do",
+                rate_hz=self._rate_hz,
+                actual_hz=device.rate_hz,
+            )
+        return confirmed
+
+    def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
+        def is_enough(received: bytes) -> bool:
+            return bool(rate_from_frames(received)) if measure else len(find_frame_headers(received)) > 0
+
+        received, good = self.await_data(link, timeout_s, is_enough)
+        if not good:
+            raise self.no_data_error(received)
+        if measure:
+            self._set_measured_rate(rate_from_frames(received))
+        return received
+
+    def _set_measured_rate(self, rate_hz: float | None) -> None:
+        if self._rate_hz is None or rate_hz is None:
+            self._rate_hz = rate_hz
+        elif abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+            raise ProtocolError(
+                "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is asked for, and cannot be "
+                "set: leave --rate out",
+                actual_hz=rate_hz,
+                rate_hz=self._rate_hz,
+            )
+
+
+def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBinarySource:
+    """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
+    parse_settings(BinarySettings, settings, DRIVER.name)
+    if rate_hz is not None:
+        encode_rate(rate_hz)
+    return SlipstandBinarySource(rate_hz)
+
+
+def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
+    """What `data` are; see `drivers.recognition.recognise`."""
+    frames = find_frame_headers(data)
+    share = sum(frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
+    if not is_recognised(len(frames), share, has_checksum=True):
+        return None
+    rate_hz = rate_from_frames(data) or rate_from_count(int(frames["n"].sum()), duration_s)
+    return Recognition(DRIVER.name, share, len(frames), rate_hz=rate_hz)
+
+
+def _parse_identity(received: bytes) -> Message | None:
+    try:
+        device = find_identity(received)
+    except ProtocolError as error:
+        return error.message
+    if device is None:
+        return None
+    return message("firmware {version}, {rate_hz:g} Hz", version=device.version, rate_hz=device.rate_hz)
+
+
+IDENTITY_QUERY = IdentityQuery(
+    1, IDENTIFY, tuple(LineSettings(baud) for baud in (460800, 500000, 115200)), _parse_identity
+)

@@ -1,0 +1,138 @@
+"""What a device folder says of itself; its modules are imported when they are used."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from drivers.errors import SettingsError
+from messages.message import Message
+
+if TYPE_CHECKING:
+    from drivers.recognition import IdentityQuery, Recognition
+    from drivers.simulated.protocol import SimulatedProtocol
+    from drivers.source import SampleSource
+
+UNVERIFIED = "not verified on hardware"
+RESERVED = "reserved, comes later"
+GAUGES = ("table", "relative")
+
+
+class SingleGauge(Enum):
+    """Where a device with one gauge puts its readings."""
+
+    FIRST_COLUMN = "first-column"
+    """In column 0 of a block, whichever gauge it is."""
+    OWN_COLUMN = "own-column"
+    """In the column of its gauge."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceDriver:
+    """Description of a device folder, which is its `DRIVER`.
+
+    The folder holds `source.py` with `make_source(settings, rate_hz)` and, where they apply,
+    `recognise(data, duration_s)`, `IDENTITY_QUERY`, `explain(received)` and
+    `single_gauge_settings(gauge, settings)`; and `simulated.py` with `make_protocol(settings)`.
+
+    Attributes
+    ----------
+    name : str
+        As given to `--protocol`.
+    title : str
+        For people.
+    rank : int
+        Place in lists of devices; by how often the device is used.
+    default_baud : int
+        0 where none is usual.
+    channels : int
+        Gauges on one port.
+    verified : str
+        What it was tested against.
+    package : str
+        The folder as a package (`__name__`); "" for a name that is only reserved.
+    format_bauds : mapping of str to int
+        Usual baud rates of a device that is chosen by its setting `format`.
+    frames_title : str
+        What its bytes are called in messages; "" where they are lines of text.
+    single_gauge : SingleGauge or None
+        For a device that can be set to one gauge of two.
+    """
+
+    name: str
+    title: str
+    rank: int
+    default_baud: int = 0
+    channels: int = 2
+    verified: str = RESERVED
+    package: str = ""
+    format_bauds: Mapping[str, int] = field(default_factory=dict)
+    frames_title: str = ""
+    single_gauge: SingleGauge | None = None
+
+    @property
+    def available(self) -> bool:
+        """Whether the device is built."""
+        return bool(self.package)
+
+    def default_baud_for(self, settings: Mapping[str, str]) -> int:
+        """Baud rate of a device with its own `settings`; 0 where none is usual."""
+        return self.format_bauds.get(settings.get("format", ""), self.default_baud)
+
+    def make_source(self, settings: Mapping[str, str], rate_hz: float | None) -> "SampleSource":
+        """Source of a device with its own `settings`. Raises SettingsError."""
+        source: SampleSource = self._source().make_source(dict(settings), rate_hz)
+        return source
+
+    def make_simulated(self, settings: Mapping[str, str]) -> "SimulatedProtocol":
+        """The simulated device's side of the protocol. Raises SettingsError."""
+        self._source()
+        simulated = import_module(f"{self.package}.simulated")
+        protocol: SimulatedProtocol = simulated.make_protocol(dict(settings))
+        return protocol
+
+    def recognise(self, data: bytes, duration_s: float | None) -> "Recognition | None":
+        """What `data` are, received within `duration_s`; None where they are not of this device."""
+        recognise = getattr(self._source(), "recognise", None)
+        return recognise(data, duration_s) if recognise else None
+
+    @property
+    def identity_query(self) -> "IdentityQuery | None":
+        """The question that asks a silent device who it is; None where there is none."""
+        return getattr(self._source(), "IDENTITY_QUERY", None)
+
+    def explain(self, received: bytes) -> Message | None:
+        """Why the device sent `received` instead of samples, where its own bytes say it."""
+        explain = getattr(self._source(), "explain", None)
+        return explain(received) if explain else None
+
+    def single_gauge_settings(self, gauge: str, settings: Mapping[str, str]) -> tuple[dict[str, str], int]:
+        """Settings of a device that has only this gauge, and the column of its readings.
+
+        Raises
+        ------
+        SettingsError
+            For a device that has both gauges on one port, or settings that contradict a single gauge.
+        """
+        if self.single_gauge is not None:
+            own = self.single_gauge is SingleGauge.OWN_COLUMN
+            return (
+                self._source().single_gauge_settings(gauge, dict(settings)),
+                GAUGES.index(gauge) if own else 0,
+            )
+        if self.channels > 1:
+            raise SettingsError(
+                "protocol {protocol} has both gauges on one port: leave the port of gauge 2 out",
+                protocol=self.name,
+            )
+        return dict(settings), 0
+
+    def _source(self) -> Any:
+        if not self.available:
+            raise SettingsError(
+                "protocol {name!r} ({title}) comes later: choose another one",
+                name=self.name,
+                title=self.title,
+            )
+        return import_module(f"{self.package}.source")

@@ -1,1 +1,0 @@
-"""ME-Systeme GSV-8 and GSV-6, multi-channel bridge amplifiers."""

@@ -1,1 +1,0 @@
-"""Modbus RTU transmitters: polled, their registers described by a map in TOML."""

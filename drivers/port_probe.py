@@ -1,0 +1,282 @@
+"""Probing a port: who uses it, what it sends at which line settings, and what answers a question."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.errors import DriverError, SettingsError
+from drivers.host_checks import PortHint, port_hints, usb_chip_name
+from drivers.port import Port, PortInfo, PortUser, open_port, other_port_users
+from drivers.recognition import IdentityQuery, Recognition, describe_unrecognised, is_text, recognise
+from drivers.registry import AVAILABLE
+from drivers.source import ConfigurableLink, LineSettings, Link
+from messages.message import EMPTY, Message, message
+
+FIRST_WAIT_S = 3.5
+"""A board that is reset by opening its port is silent for two seconds and more."""
+_WINDOW_S = 0.8
+_SLOW_WINDOW_S = 1.2
+"""How long is listened at one setting: to a stream, and to a device of few bytes."""
+_TEXT_WINDOW_S = 6.0
+"""Slow loggers and scales send a line or two a second, after a banner."""
+_ENOUGH_BYTES = 600
+_SURE_SHARE = 0.9
+"""Share of good bytes at which no other line settings are tried."""
+_MAX_BYTES = 1 << 18
+_ANSWER_S = 0.4
+"""How long an answer is waited for; serial devices answer within 100 ms."""
+
+_BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
+_BAUDS_WITH_PARITY = (115200, 9600, 19200, 38400, 57600)
+COMMON_LINE_SETTINGS = (
+    *(LineSettings(baud) for baud in _BAUDS),
+    *(LineSettings(baud, parity) for baud in _BAUDS_WITH_PARITY for parity in "EO"),
+)
+"""The likely ones first: of the built devices, then what loggers and transmitters are shipped with."""
+
+
+class ProbeOutcome(StrEnum):
+    """How probing a port ended."""
+
+    RECOGNISED = "recognised"
+    UNREADABLE = "unreadable"
+    """Bytes come that no device folder knows."""
+    SILENT = "silent"
+    IN_USE = "held"
+    UNAVAILABLE = "unavailable"
+
+
+@dataclass(frozen=True, slots=True)
+class PortReport:
+    """What was found on a port.
+
+    Attributes
+    ----------
+    port : PortInfo
+    chip : str
+        Known name of the USB chip or board; "" for others.
+    outcome : ProbeOutcome
+    message : Message
+        What is wrong and what to do, where nothing was recognised.
+    users : tuple of PortUser
+        Other programs that have it open.
+    recognition : Recognition or None
+    line_settings : LineSettings or None
+        At which it was recognised; None where they have no effect.
+    hints : tuple of PortHint
+        What hinders reading this port.
+    """
+
+    port: PortInfo
+    chip: str
+    outcome: ProbeOutcome
+    message: Message = EMPTY
+    users: tuple[PortUser, ...] = ()
+    recognition: Recognition | None = None
+    line_settings: LineSettings | None = None
+    hints: tuple[PortHint, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ListenResult:
+    """What was received, and at which line settings.
+
+    Attributes
+    ----------
+    recognition : Recognition or None
+        What the bytes are, if a device folder knows them.
+    line_settings : LineSettings or None
+        None where they have no effect.
+    received : bytes
+        What came at the settings that were recognised, else at those that looked most like text.
+    """
+
+    recognition: Recognition | None
+    line_settings: LineSettings | None
+    received: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifiedDevice:
+    """A device that answered a question."""
+
+    recognition: Recognition
+    line_settings: LineSettings | None
+
+
+def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], None]) -> PortReport:
+    """Find out who uses a port, then what it sends by itself, then, if `write`, what it answers.
+
+    A port that another program has open is not opened: reading would take bytes from that program.
+    """
+    chip = usb_chip_name(port.vendor_id, port.product_id)
+    hints = tuple(port_hints(port))
+    users = tuple(other_port_users(port.device))
+    if users:
+        what = message("in use by {users}: close that program, and look again", users=users)
+        return PortReport(port, chip, ProbeOutcome.IN_USE, what, users, hints=hints)
+    try:
+        first = COMMON_LINE_SETTINGS[0]
+        with open_port(port.device, first.baud, first.parity) as link:
+            outcome, what, recognition, line_settings = _probe_link(link, write, on_progress)
+    except DriverError as error:
+        return PortReport(port, chip, ProbeOutcome.UNAVAILABLE, error.message, hints=hints)
+    return PortReport(port, chip, outcome, what, (), recognition, line_settings, hints)
+
+
+def _probe_link(
+    link: Port, write: bool, on_progress: Callable[[Message], None]
+) -> tuple[ProbeOutcome, Message, Recognition | None, LineSettings | None]:
+    heard = listen(link, on_progress)
+    if heard.recognition is not None:
+        return ProbeOutcome.RECOGNISED, EMPTY, heard.recognition, heard.line_settings
+    if heard.received:
+        what = describe_unrecognised(heard.received, has_baud=link.has_baud)
+        return ProbeOutcome.UNREADABLE, what, None, heard.line_settings
+    if not write:
+        what = message("nothing sends by itself: try --write, which asks the device who it is")
+        return ProbeOutcome.SILENT, what, None, None
+    answered = query_identity(link, on_progress)
+    if answered is not None:
+        return ProbeOutcome.RECOGNISED, EMPTY, answered.recognition, answered.line_settings
+    what = message(
+        "nothing is sent and nothing answers: check cable and power, and that the device is switched on"
+    )
+    return ProbeOutcome.SILENT, what, None, None
+
+
+def listen(
+    link: ConfigurableLink,
+    on_progress: Callable[[Message], None],
+    candidates: Sequence[LineSettings] = COMMON_LINE_SETTINGS,
+    clock: Callable[[], float] = time.monotonic,
+) -> ListenResult:
+    """Listen until what comes is recognised; nothing is sent.
+
+    A device that is silent at the first settings is silent at all.
+
+    Parameters
+    ----------
+    link : ConfigurableLink
+        Open, set to the first of `candidates`.
+    on_progress : callable (Message)
+    candidates : sequence of LineSettings
+        To be tried in this order.
+    clock : callable
+        Seconds, as of `time.monotonic`.
+
+    Raises
+    ------
+    DeviceLostError
+        If the port is gone.
+    """
+    best = ListenResult(None, None, b"")
+    for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
+        if link.has_baud:
+            on_progress(message("listening at {line_settings}", line_settings=settings))
+        else:
+            on_progress(message("listening"))
+        try:
+            if number:
+                link.configure(settings)
+        except SettingsError:
+            continue  # no device on this port can use settings that the port has not
+        received, recognition = _listen_once(link, _SLOW_WINDOW_S if number else FIRST_WAIT_S, clock)
+        if not received and not number:
+            break
+        best = max(
+            best,
+            ListenResult(recognition, settings if link.has_baud else None, received),
+            key=_informativeness,
+        )
+        if best.recognition is not None and best.recognition.share >= _SURE_SHARE:
+            break
+    return best
+
+
+def query_identity(
+    link: ConfigurableLink,
+    on_progress: Callable[[Message], None],
+    queries: Iterable[tuple[str, IdentityQuery]] | None = None,
+    clock: Callable[[], float] = time.monotonic,
+) -> IdentifiedDevice | None:
+    """Ask the question of one device after the other, by default of all, until one is answered.
+
+    Raises
+    ------
+    DeviceLostError
+        If the port is gone.
+    """
+    for protocol, query in queries or identity_queries():
+        for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
+            if link.has_baud:
+                on_progress(
+                    message(
+                        "asking for {protocol} at {line_settings}", protocol=protocol, line_settings=settings
+                    )
+                )
+            else:
+                on_progress(message("asking for {protocol}", protocol=protocol))
+            remark = _query_once(link, query, settings, clock)
+            if remark is not None:
+                found = Recognition(protocol, 1.0, 1, remark=remark)
+                return IdentifiedDevice(found, settings if link.has_baud else None)
+    return None
+
+
+def identity_queries() -> list[tuple[str, IdentityQuery]]:
+    """Protocol and question of each device that has one."""
+    queries = [(driver.name, query) for driver in AVAILABLE if (query := driver.identity_query) is not None]
+    return sorted(queries, key=lambda named: named[1].order)
+
+
+def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple[bytes, Recognition | None]:
+    """What comes within `wait_s` and a window after it, and what it is; unknown text is heard for longer."""
+    began_s = clock()
+    received = b""
+    while not received and clock() - began_s < wait_s:
+        received = link.read()
+    first_s = last_s = clock()
+    recognition = None
+    while received and recognition is None:
+        data = link.read()
+        now_s = clock()
+        received, last_s = received + data, now_s if data else last_s
+        if not _is_enough(received, now_s - first_s):
+            continue
+        recognition = recognise(received, last_s - first_s)
+        may_tell_more = is_text(received) and len(received) < _MAX_BYTES
+        if not may_tell_more or now_s - first_s > _TEXT_WINDOW_S:
+            break
+    return received, recognition
+
+
+def _is_enough(received: bytes, duration_s: float) -> bool:
+    window_s = _WINDOW_S if len(received) >= _ENOUGH_BYTES else _SLOW_WINDOW_S
+    return duration_s >= window_s or len(received) >= _MAX_BYTES
+
+
+def _informativeness(result: ListenResult) -> tuple[float, bool, float]:
+    share = result.recognition.share if result.recognition else 0.0
+    printable = sum(0x20 <= byte < 0x7F or byte in b"\r\n\t" for byte in result.received)
+    return share, bool(result.received), printable / max(len(result.received), 1)
+
+
+def _query_once(
+    link: ConfigurableLink, query: IdentityQuery, settings: LineSettings, clock: Callable[[], float]
+) -> Message | None:
+    if link.has_baud:
+        try:
+            link.configure(settings)
+        except SettingsError:
+            return None
+    link.write(query.data)
+    deadline_s = clock() + _ANSWER_S
+    received = b""
+    while clock() < deadline_s:
+        received += link.read()
+        remark = query.parse(received)
+        if remark is not None:
+            return remark
+    return None

@@ -1,0 +1,207 @@
+"""What received bytes are, or look like where no device folder knows them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from drivers.envelope import Unwrapper
+from drivers.registry import AVAILABLE, DRIVERS
+from drivers.source import LineSettings
+from messages.message import EMPTY, Message, message
+
+MIN_PACKETS = 3
+"""Fewer frames or lines do not tell a protocol: one can be a coincidence, and the first is often cut."""
+CHECKED_SHARE = 0.25
+UNCHECKED_SHARE = 0.7
+"""Share of the bytes that must be in good frames: with a checksum, which rejects garbage, or without."""
+_SHOWN_BYTES = 8
+_SHOWN_OF_LINE = 40
+_TEXT = frozenset(b"\t\r\n" + bytes(range(0x20, 0x7F)))
+_TEXT_SHARE = 0.95
+"""Lines with a damaged character in twenty are still recognised as text."""
+_PARITY_SHARES = (0.1, 0.9)
+"""Share of the bytes that a wrong parity turns into 0: those whose parity bit differs from a stop bit."""
+_EXAMINED_BYTES = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """A protocol that bytes belong to, and how to record from the device.
+
+    Attributes
+    ----------
+    protocol : str
+    share : float
+        Share of the bytes that is in good frames or lines, 0 to 1.
+    packets : int
+        Good frames or lines.
+    channels : int
+        Gauges that the device has.
+    settings : dict
+        The device's own, as `--set` takes them.
+    rate_hz : float or None
+        Samples a second by the device's own times, else by when the bytes came; None if neither tells.
+    needs_rate : bool
+        Whether `--rate` must be given, because the device does not tell its rate.
+    remark : Message
+        What to check before recording.
+    """
+
+    protocol: str
+    share: float
+    packets: int
+    channels: int = 2
+    settings: dict[str, str] = field(default_factory=dict)
+    rate_hz: float | None = None
+    needs_rate: bool = False
+    remark: Message = EMPTY
+
+    @property
+    def rate_option(self) -> str:
+        """Value of `--rate` to three digits, without an exponent; "" where none is needed or known."""
+        return f"{float(f'{self.rate_hz:.3g}'):.6g}" if self.needs_rate and self.rate_hz else ""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityQuery:
+    """A question that asks a silent device who it is, and changes nothing.
+
+    No query holds a character that another known device takes for a command: OpenScale takes x and !, the
+    reference firmware S, P and R.
+
+    Attributes
+    ----------
+    order : int
+        Place among the queries of all devices: those with few line settings first.
+    data : bytes
+    line_settings : tuple of LineSettings
+        Usual ones of such devices.
+    parse : callable (bytes) -> Message or None
+        What the answer says of the device, maybe nothing; None while there is no answer.
+    """
+
+    order: int
+    data: bytes
+    line_settings: tuple[LineSettings, ...]
+    parse: Callable[[bytes], Message | None]
+
+
+def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:
+    """The most likely protocol of `data`; None if no device folder knows them.
+
+    Parameters
+    ----------
+    data : bytes
+        As received; the first and the last frame or line may be cut.
+    duration_s : float, optional
+        Time from the first to the last of them.
+    """
+    found = [one for driver in AVAILABLE if (one := driver.recognise(data, duration_s)) is not None]
+    return max(found, key=lambda one: one.share, default=None)
+
+
+def is_recognised(packets: int, share: float, *, has_checksum: bool) -> bool:
+    """Whether so many good packets, in such a share of the bytes, are no coincidence."""
+    return packets >= MIN_PACKETS and share >= (CHECKED_SHARE if has_checksum else UNCHECKED_SHARE)
+
+
+def rate_from_count(samples: int, duration_s: float | None) -> float | None:
+    """Samples a second to three digits, from how many came in `duration_s`; None where that is unknown."""
+    return float(f"{(samples - 1) / duration_s:.3g}") if duration_s and samples > 1 else None
+
+
+def describe_unreadable(received: bytes, protocol: str, baud: int | None = None) -> Message:
+    """Say what came instead of good data of `protocol` (usual baud rate `baud`), and what to do.
+
+    Envelopes of the host are removed first.
+    """
+    received = b"".join(read.data for read in Unwrapper().feed(received)) or received
+    if not received:
+        return message("nothing came, check cable and power, and that the device is sending")
+    return message(
+        "received {count} bytes, first {first}, nothing that {protocol} knows: {remedy}",
+        count=len(received),
+        first=received[:_SHOWN_BYTES].hex(" "),
+        protocol=protocol,
+        remedy=_remedy(received[:_EXAMINED_BYTES], protocol, baud),
+    )
+
+
+def describe_unrecognised(received: bytes, *, has_baud: bool) -> Message:
+    """Say what bytes look like that no device folder knows, and what to do.
+
+    `has_baud`: all likely baud rates of the port were tried; else the port has none.
+    """
+    return message(
+        "{count} bytes came, first {first}, which no built protocol knows{remedy}",
+        count=len(received),
+        first=received[:_SHOWN_BYTES].hex(" "),
+        remedy=_remedy_for_unrecognised(received, has_baud=has_baud),
+    )
+
+
+def is_text(data: bytes) -> bool:
+    """Whether nearly all of `data` can be printed."""
+    return bool(data) and sum(byte in _TEXT for byte in data) >= _TEXT_SHARE * len(data)
+
+
+def has_parity_errors(data: bytes) -> bool:
+    """Whether `data` are text in which a wrong parity turned many characters into 0."""
+    low, high = _PARITY_SHARES
+    return bool(data) and low <= data.count(0) / len(data) <= high and is_text(data.replace(b"\0", b""))
+
+
+def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
+    driver = DRIVERS[protocol]
+    explained = driver.explain(received)
+    if explained is not None:
+        return explained
+    found = recognise(received)
+    if found is not None and found.protocol != protocol and DRIVERS[found.protocol].frames_title:
+        return message(
+            "these are {frames}, choose protocol {protocol}",
+            frames=message(DRIVERS[found.protocol].frames_title),
+            protocol=found.protocol,
+        )
+    if is_text(received):
+        settings = found.settings if found is not None and found.protocol == protocol else {}
+        return _remedy_for_text(received, settings, sends_text=not driver.frames_title)
+    if has_parity_errors(received):
+        return message(
+            "this looks like text read with a wrong parity: try --parity N, E or O as the device is set"
+        )
+    if baud:
+        return message(
+            "check the baud rate (usual is {baud}) and the protocol, or the parity;"
+            " `slipstand device probe` tries them",
+            baud=baud,
+        )
+    return message("check the baud rate and the protocol, or the parity; `slipstand device probe` tries them")
+
+
+def _remedy_for_text(received: bytes, settings: dict[str, str], *, sends_text: bool) -> Message:
+    line = _second_line(received)
+    if not sends_text:
+        return message("these are lines of text such as {line!r}, choose protocol csv", line=line)
+    if settings:
+        given = " ".join(f"--set {key}={value}" for key, value in settings.items())
+        return message("these are lines such as {line!r}, try {settings}", line=line, settings=given)
+    return message("these are lines such as {line!r}, set columns, separator and decimal to match", line=line)
+
+
+def _remedy_for_unrecognised(received: bytes, *, has_baud: bool) -> Message:
+    if is_text(received):
+        return message(
+            ": these are lines such as {line!r}, give --protocol csv and its columns",
+            line=_second_line(received),
+        )
+    if has_parity_errors(received):
+        return message(": every other one is 0, as with a wrong parity, try --parity E or O")
+    if has_baud:
+        return message(" at any usual baud rate: look up rate and protocol in the device's manual")
+    return message(": set the baud rate where this address gets its bytes from")
+
+
+def _second_line(received: bytes) -> str:
+    """The second line, because the first is often cut."""
+    lines = received.splitlines()
+    return lines[min(1, len(lines) - 1)][:_SHOWN_OF_LINE].decode("ascii", "replace")

@@ -1,1 +1,0 @@
-"""The Slipstand binary protocol, spoken by any microcontroller with the reference firmware."""
