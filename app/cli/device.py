@@ -11,12 +11,11 @@ import typer
 import config
 from app.cli import output as out
 from app.cli.options import Json
-from drivers.port import PortInfo, port_info
+from drivers.host_checks import usb_chip_name
+from drivers.port import PortInfo, other_port_users, port_info
 from drivers.port import list_ports as present_ports
-from drivers.port_users import other_port_users
-from drivers.probe.host_checks import usb_chip_name
-from drivers.probe.report import PortReport, probe_port
-from drivers.registry import PROTOCOLS
+from drivers.port_probe import PortReport, probe_port
+from drivers.registry import DRIVERS
 
 UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
 
@@ -26,14 +25,14 @@ def list_devices(as_json: Json = False) -> None:
     rows = [
         {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,
          "verified": p.verified}
-        for p in PROTOCOLS.values()
+        for p in DRIVERS.values()
     ]  # fmt: skip
     if as_json:
         out.print_json(rows)
         return
     out.print_table(
         ("protocol", "device", "baud", "verified"),
-        [(p.name, p.title, str(p.default_baud or ""), p.verified) for p in PROTOCOLS.values()],
+        [(p.name, p.title, str(p.default_baud or ""), p.verified) for p in DRIVERS.values()],
     )
 
 
@@ -85,8 +84,8 @@ def probe(
         out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
 
 
-def _status_printer(port: PortInfo) -> Callable[[str], None]:
-    """Tells on stderr what is done on a port."""
+def _status_printer(port: PortInfo) -> Callable[[object], None]:
+    """Print progress on stderr."""
     return lambda doing: out.print_status(f"{port.device}: {doing}")
 
 
@@ -100,7 +99,7 @@ def report_lines(report: PortReport) -> Iterator[str]:
     yield " ".join(part for part in (report.port.device, _what(report)) if part)
     found = report.recognition
     if found is not None:
-        info = PROTOCOLS[found.protocol]
+        info = DRIVERS[found.protocol]
         gauges = "1 gauge" if found.channels == 1 else f"{found.channels} gauges"
         rate = f", {found.rate_hz:.4g} Hz" if found.rate_hz else ""
         tuning = f" at {report.line_settings}" if report.line_settings else ""
@@ -129,7 +128,7 @@ def record_command(report: PortReport) -> str:
     if found is None:
         return ""
     words = ["slipstand", "record", "--port", report.port.device, "--protocol", found.protocol]
-    usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
+    usual = DRIVERS[found.protocol].default_baud_for(found.settings)
     if report.line_settings is not None and report.line_settings.baud != usual:
         words += ["--baud", str(report.line_settings.baud)]
     if report.line_settings is not None and report.line_settings.parity != "N":
@@ -150,14 +149,14 @@ def port_document(report: PortReport) -> dict[str, Any]:
     if found is not None:
         speaks = {
             "protocol": found.protocol,
-            "verified": PROTOCOLS[found.protocol].verified,
+            "verified": DRIVERS[found.protocol].verified,
             "baud": report.line_settings.baud if report.line_settings else None,
             "parity": report.line_settings.parity if report.line_settings else None,
             "rate_hz": found.rate_hz,
             "channels": found.channels,
             "settings": found.settings,
             "share": found.share,
-            "remark": found.remark,
+            "remark": str(found.remark),
             "command": record_command(report),
         }
     return {
@@ -168,10 +167,10 @@ def port_document(report: PortReport) -> dict[str, Any]:
         "product_id": report.port.product_id,
         "serial_number": report.port.serial_number,
         "outcome": report.outcome,
-        "message": report.message,
+        "message": str(report.message),
         "holders": [{"process": one.process, "program": one.program} for one in report.users],
         "speaks": speaks,
-        "hints": [{"message": hint.message, "remedy": hint.remedy} for hint in report.hints],
+        "hints": [{"message": str(hint.message), "remedy": str(hint.remedy)} for hint in report.hints],
     }
 
 

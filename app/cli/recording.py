@@ -15,7 +15,7 @@ from app.cli.progress_printer import ProgressPrinter, StatusLine
 from app.runs.analysis_json import calibration_warnings, gauge_check_warnings
 from app.runs.metadata import create_metadata
 from config.files import load_checks, load_gauges, load_stand, settings_file
-from drivers.registry import PROTOCOLS
+from drivers.registry import DRIVERS
 
 
 def record_with_progress(
@@ -27,7 +27,7 @@ def record_with_progress(
     simulated: bool = False,
 ) -> Iterator[RunEnded]:
     """Record runs over one connection, telling what goes on; yield each at its end, like `record_runs`."""
-    verified = "" if simulated or port.protocol not in PROTOCOLS else PROTOCOLS[port.protocol].verified
+    verified = "" if simulated or port.protocol not in DRIVERS else DRIVERS[port.protocol].verified
     on_base = load_gauges(gauges_file).relative.measures == "plate"
     with StatusLine() as line:
         printer = ProgressPrinter(

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from app.cli.device import install_rule
 from app.cli.doctor import Finding, ok, warn
-from drivers.port import PortInfo, list_ports
-from drivers.port_users import other_port_users
-from drivers.probe.host_checks import PortHint, modem_manager_runs, port_hints, usb_chip_name
-from drivers.registry import PROTOCOLS, UNVERIFIED
+from drivers.driver import UNVERIFIED
+from drivers.host_checks import PortHint, modem_manager_runs, port_hints, usb_chip_name
+from drivers.port import PortInfo, list_ports, other_port_users
+from drivers.registry import AVAILABLE
 
 
 def check_ports() -> Iterator[Finding]:
@@ -45,8 +45,7 @@ def check_port(port: PortInfo, hints: list[PortHint]) -> Iterator[Finding]:
 
 def check_protocols() -> Finding:
     """Say which protocols were never tried on the device itself."""
-    built = [info for info in PROTOCOLS.values() if info.available]
-    untried = [info.name for info in built if UNVERIFIED in info.verified]
+    untried = [driver.name for driver in AVAILABLE if UNVERIFIED in driver.verified]
     if not untried:
-        return ok("devices", f"{len(built)} protocols, all verified on hardware")
+        return ok("devices", f"{len(AVAILABLE)} protocols, all verified on hardware")
     return ok("devices", f"{UNVERIFIED}: {', '.join(untried)}; see: slipstand device list")

@@ -7,12 +7,10 @@ from typing import Any
 import pytest
 
 from app.cli import device
-from drivers.port import PortInfo
-from drivers.port_users import PortUser
-from drivers.probe.host_checks import PortHint
-from drivers.probe.listening import LineSettings
-from drivers.probe.recognition import Recognition
-from drivers.probe.report import PortReport, ProbeOutcome
+from drivers.host_checks import PortHint
+from drivers.port import PortInfo, PortUser
+from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
+from drivers.recognition import Recognition
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
