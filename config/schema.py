@@ -295,6 +295,8 @@ class Settings(_Checked, frozen=True):
     """Who records, unless said otherwise."""
     sounds: bool = False
     """Whether each state of a pullback is heard."""
+    log_level: Literal["error", "warning", "info", "debug"] = "info"
+    """What the log holds."""
 
     def __post_init__(self) -> None:
         if not SCALE_MIN <= self.scale <= SCALE_MAX:

@@ -1,6 +1,7 @@
 """Shared by all tests: no window system is needed, and warnings are errors (pyproject.toml)."""
 
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 
 import hypothesis
@@ -12,6 +13,7 @@ hypothesis.settings.register_profile("house", deadline=None)  # a busy machine i
 hypothesis.settings.load_profile("house")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ["SLIPSTAND_LOGS"] = tempfile.mkdtemp(prefix="slipstand-logs-")
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")  # small matrices: more threads only wait for each other
 

@@ -64,6 +64,7 @@ from app.child_process import (
     ignore_session_signals,
     reserve_stdout,
 )
+from app.log import start_log
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
@@ -432,6 +433,7 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
 
 def main() -> int:
     """Run the process. Whatever ends it early is told in one `Failed` event."""
+    start_log("engine")
     ignore_session_signals()
     sys.setswitchinterval(_SWITCH_S)
     events: EventSender[Event] = EventSender(

@@ -16,6 +16,7 @@ from app.child_process import (
     ignore_session_signals,
     reserve_stdout,
 )
+from app.log import start_log
 
 _NICE = 5
 """The engine, at 0, gets about three times the processor time of this process where both want it (Linux)."""
@@ -23,6 +24,7 @@ _NICE = 5
 
 def main() -> None:
     """Run until stdin ends."""
+    start_log("live")
     ignore_session_signals()
     if hasattr(os, "nice"):
         os.nice(_NICE)

@@ -1,11 +1,15 @@
 """The command line: words in, words and JSON out."""
 
 import io
+import logging
 import os
 import sys
 
 from app.cli.commands import app
-from app.cli.errors import error_text
+from app.cli.errors import error_text, is_expected
+from app.log import start_log
+
+_log = logging.getLogger(__name__)
 
 
 def run() -> None:
@@ -18,9 +22,11 @@ def run() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
+    start_log("command")
     try:
         app()
     except Exception as error:
+        _log.log(logging.INFO if is_expected(error) else logging.ERROR, "failed", exc_info=True)
         if os.environ.get("SLIPSTAND_DEBUG"):
             raise
         sys.stderr.write(f"error: {error_text(error)}\n")

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from app.log import start_log
 from app.version import __version__
 
 
@@ -155,8 +156,13 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def main_options(
-    version: Annotated[
+    version: Annotated[  # noqa: ARG001 - its callback shows it
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Write the log in detail, and to stderr as well.")
     ] = False,
 ) -> None:
     """Hold the options that stand before the command."""
+    if verbose:
+        start_log("command", "debug", on_stderr=True)

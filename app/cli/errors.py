@@ -1,7 +1,7 @@
 """Which exceptions are the user's or the machine's to mend, rather than faults of the program."""
 
-from app.presenters import error_reports  # only needed once something went wrong
 from app.runs.errors import internal_error
+from messages.message import MessageError
 
 
 class CommandError(Exception):
@@ -17,4 +17,4 @@ def error_text(error: Exception) -> str:
 
 def is_expected(error: Exception) -> bool:
     """Tell whether the error's own message is written for the user."""
-    return isinstance(error, CommandError) or error_reports.is_user_error(error)
+    return isinstance(error, CommandError | MessageError | OSError)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
+from app.log import start_log
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
@@ -272,6 +273,7 @@ class _TaskProcess:
 
 def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
     """Carry out tasks until the other end of the pipe is closed."""
+    start_log("worker")
     use_language(language_code)
     exit_with_parent(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):

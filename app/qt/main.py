@@ -8,6 +8,7 @@ import sys
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from app.log import start_log
 from app.presenters.composition import make_window_presenter, read_personal
 from app.presenters.error_reports import ErrorReporter, error_report, log_file
 from app.presenters.window import WindowPresenter
@@ -37,6 +38,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
     errors, personal = ErrorReporter(log_file()), read_personal()
+    start_log("window", personal.settings.log_level)
     errors.install_hooks()
     _use(personal.settings)
     app = QApplication(sys.argv[:1])

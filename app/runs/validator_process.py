@@ -21,6 +21,7 @@ from app.child_process import (
     json_decoder,
     reserve_stdout,
 )
+from app.log import start_log
 from app.runs.errors import NotARunError, RunError, being_recorded, damaged
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
@@ -33,6 +34,7 @@ _IDLE_S = 60.0
 
 def main() -> None:
     """Answer until stdin ends."""
+    start_log("validator")
     ignore_session_signals()
     _limit_memory()
     events: EventSender[ValidatorEvent] = EventSender(reserve_stdout())

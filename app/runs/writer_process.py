@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 
 from app.child_process import CommandReader, EventSender, ignore_session_signals, reserve_stdout
+from app.log import start_log
 from app.runs.blocks import RunBlock
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
@@ -21,6 +22,7 @@ _IDLE_S = 0.05
 
 def main() -> None:
     """Serve until stdin ends. Signals that end a session are left to the engine, whose end is seen here."""
+    start_log("writer")
     ignore_session_signals("SIGTERM")
     commands: CommandReader[WriterCommand] = CommandReader(0, FrameDecoder(), queue_size=_QUEUE_COMMANDS)
     WriterServer(commands, EventSender(reserve_stdout())).serve()

@@ -18,6 +18,7 @@ from app.child_process import (
     ignore_session_signals,
     reserve_stdout,
 )
+from app.log import start_log
 from app.simulated_stand.client import Ready, Refused, StandEvent, Started, TruthChanged
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.stand import SimulatedStandDevice
@@ -77,6 +78,7 @@ def serve(
 
 def main() -> int:
     """Run as `python -m app.simulated_stand OPTIONS`, for `SimulatedStand`."""
+    start_log("simulated-stand")
     ignore_session_signals()
     has_ended = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: has_ended.set())

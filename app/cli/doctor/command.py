@@ -3,19 +3,32 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 from importlib import import_module
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from app.cli import output as out
 from app.cli.doctor import Finding, FindingState, fail
-from app.cli.options import Json
+from app.cli.options import Force, Json
 
 
-def doctor(as_json: Json = False) -> None:
+def doctor(
+    bundle: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.zip",
+            help="Write findings, versions, ports, settings and log to one file for a bug report.",
+        ),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
     """Check installation, settings, gauges, ports and clocks.
 
     Recordings are checked too. Ends with 1 if something fails.
     """
+    target = out.output_file(bundle, force) if bundle else None
     findings = []
     for finding in _findings():
         findings.append(finding)
@@ -26,6 +39,10 @@ def doctor(as_json: Json = False) -> None:
     failed = sum(finding.state is FindingState.FAIL for finding in findings)
     if as_json:
         out.print_json({"ok": not failed, "checks": [asdict(finding) for finding in findings]})
+    if target is not None:
+        out.print_status(f"wrote {target}. It holds no recording, but:")
+        for line in import_module("app.cli.doctor.bundle").write_bundle(target, findings):
+            out.print_status(f"  {line}")
     if failed:
         raise typer.Exit(1)
 

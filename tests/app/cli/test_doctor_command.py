@@ -1,7 +1,9 @@
 """`slipstand doctor`: what is well is said to be, what is not has a remedy."""
 
 import datetime
+import json
 import shlex
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -239,3 +241,25 @@ def test_where_compiled_code_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert installation.check_compiled_code(tmp_path).state is FindingState.WARN
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     assert "minutes" in installation.check_compiled_code(tmp_path).message
+
+
+def test_a_bundle_holds_what_a_bug_report_needs_and_says_so(
+    slipstand: Any, own_folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SLIPSTAND_LOGS", str(own_folders / "logs"))
+    (own_folders / "settings" / "settings.toml").write_text('theme = "dark"\n')
+    (own_folders / "logs").mkdir()
+    (own_folders / "logs" / "engine.log").write_text("lost the port\n")
+    target = own_folders / "report.zip"
+    outcome = slipstand("doctor", "--bundle", target)
+    with zipfile.ZipFile(target) as bundle:
+        names = set(bundle.namelist())
+        assert {"findings.json", "versions.json", "ports.json", "settings/settings.toml"} <= names
+        assert bundle.read("log/engine.log") == b"lost the port\n"
+        readme = bundle.read("README.txt").decode()
+        subjects = {finding["subject"] for finding in json.loads(bundle.read("findings.json"))}
+    assert {"slipstand", "recordings", "gauges.toml"} <= subjects
+    for name in names - {"README.txt"}:
+        assert f"{name}: " in readme
+        assert f"{name}: " in outcome.err
+    assert slipstand("doctor", "--bundle", target).code == 1, "nothing is overwritten without --force"
