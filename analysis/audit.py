@@ -13,7 +13,7 @@ from messages.message import message
 
 KILOGRAM_FORCE_N: Final = 9.80665
 FRICTION_RANGE: Final = (0.03, 0.3)
-"""Dynamic friction coefficients among which one is looked for that reaches a residual displacement."""
+"""Range of f_d in which a residual displacement must be reachable (PHYSICS, the paper's range)."""
 _POSITIVE: Final = ("plate_mass_kg", "stiffness_as_printed", "period_s", "damping_n1_per_s")
 _FIGURES: Final = (
     *_POSITIVE,
@@ -25,15 +25,17 @@ _FIGURES: Final = (
     "acceleration_max_m_per_s2",
 )
 _FRICTION_STEP: Final = 0.0005
+"""Finds the extremes of the residual displacement to some micrometres."""
 _DURATION_S: Final = 30.0
+"""First simulated duration; doubled until the last slip has ended."""
 
 
 class AuditError(AnalysisError, ValueError):
-    """A row that cannot be checked; names the series."""
+    """A row that cannot be checked. The message names the series."""
 
 
 class PublishedRow(Protocol):
-    """What the audit needs of a row, as printed."""
+    """A row as printed."""
 
     @property
     def series(self) -> str:
@@ -82,7 +84,7 @@ class PublishedRow(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class AuditCheck:
-    """One figure of one row beside what it is held against, both in the same unit."""
+    """One printed value beside the expected one, in the same unit."""
 
     flag: str
     flagged: bool
@@ -99,7 +101,7 @@ class AuditedRow:
 
     @property
     def flags(self) -> list[str]:
-        """Names of the checks that found something."""
+        """Flags of the checks that failed."""
         return [check.flag for check in self.checks if check.flagged]
 
 
@@ -117,7 +119,7 @@ class AuditReport:
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """A row with what the stand adds to it."""
+    """A row with mass, pullback and gravity of the stand."""
 
     row: PublishedRow
     table_mass_kg: float
@@ -154,7 +156,7 @@ def audit(
 ) -> AuditReport:
     """Check every row of a published table by the rules of PHYSICS.md, "Checking the published table".
 
-    A figure that stands exactly at a limit is not flagged. The flags:
+    A value exactly at a limit is not flagged. The flags:
 
     stiffness_n_per_m, stiffness_kgf_per_m
         T differs by more than 5 % of 2 pi sqrt((m1 + m2) / c) from it; c read as N/m, and as kgf/m.
@@ -167,11 +169,10 @@ def audit(
     breakaway
         k1^2 u0 is below f_s g, with k1^2 = (2 pi / T)^2 + n1^2: the row could never have slipped.
     residual_within_1_mm, residual_within_2_mm
-        u_s is at most so far from the simulated one: findings, not faults. Within 1 mm is within 2 mm too.
+        u_s differs from the simulated one by no more: findings, not faults. Within 1 mm is within 2 mm too.
     residual_unreachable
-        u_s, as printed, lies outside all that f_s = f_d from 0.03 to 0.3 give without tilt. The residual
-        displacement is a continuous function of f_d; its range is scanned in steps of 0.0005, which finds
-        its ends to some micrometres.
+        u_s lies outside the range that f_s = f_d from 0.03 to 0.3 gives without tilt. u_s is a continuous
+        function of f_d, scanned in steps of 0.0005.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def audit(
     Raises
     ------
     AuditError
-        A row that describes no motion, or whose pullback is not given.
+        A row describes no motion, or its pullback is not given.
     """
     return AuditReport(
         tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows),
@@ -209,7 +210,7 @@ def _audit_row(
 
 
 def _check_figures(row: PublishedRow) -> None:
-    """Raise AuditError unless every figure is finite, and above zero where it is divided by."""
+    """Raise AuditError unless every value is finite, and above zero where it is a divisor."""
     for name in _FIGURES:
         value = getattr(row, name)
         if not math.isfinite(value) or (name in _POSITIVE and value <= 0.0):

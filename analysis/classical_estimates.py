@@ -1,7 +1,7 @@
-"""The paper's own ways to the same quantities, to stand beside the fitted ones.
+"""Estimates by the paper's own methods, as checks of the fitted ones.
 
-None of them is the estimate of record: peaks and crossings use a fraction of the readings, the residual
-displacement alone allows many values of f_d, and the paper's procedure judges by eye.
+None is the result of record. Peaks and zero crossings use a fraction of the readings. The residual
+displacement alone allows several values of f_d. The paper's procedure compares curves by eye.
 """
 
 from collections.abc import Callable
@@ -20,29 +20,31 @@ from analysis.preparation.mounting import relative_to_table
 from analysis.record import Record, RecordError
 
 FRICTION_GRID = np.linspace(0.03, 0.3, 541)
-"""Values of f_d that the residual displacement is asked about."""
+"""Values of f_d at which the residual displacement is simulated: the paper's range in steps of 0.0005."""
 _COARSE = np.round(np.arange(0.40, 0.02, -0.01), 2)
 _FINE = np.round(np.arange(0.010, -0.0105, -0.001), 3)
+"""Steps of the paper: by hundredths, then by thousandths about the best."""
 _COMPARED = 1500
+"""Readings compared with the paper's slow simulation; more change f_d by less than its last digit."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClassicalEstimates:
-    """Classical figures of one record; None where the record does not hold them.
+    """Estimates of one record; None where the record does not determine them.
 
     Attributes
     ----------
     period_s, log_decrement, log_decrement_uncertainty : float or None
         From the turning points of the stick tail.
     cycles : int
-        Cycles of the tail that were seen.
+        Full cycles of the tail.
     residual_displacement_m : Floats
         u_s simulated at each of `SCANNED`, the other parameters as fitted.
     frictions_of_residual : tuple of float
-        Every f_d in the scanned range whose u_s is the measured one; none where u_s is not known.
+        Every f_d of the grid range whose simulated u_s is the measured one; empty where u_s is not known.
     friction_of_paper : float or None
-        By the paper's procedure: f_d lowered step by step, simulated by the paper's algorithm, until the
-        curves coincide best.
+        By the paper's procedure: f_d is lowered step by step until the motion simulated by the paper's
+        algorithm coincides best with the record.
     """
 
     period_s: float | None
@@ -55,7 +57,7 @@ class ClassicalEstimates:
 
 
 def estimate_classically(record: Record, identification: Identification) -> ClassicalEstimates:
-    """Work out the classical figures of a two-mass record that was identified.
+    """Estimate a two-mass record that was identified, by the paper's methods.
 
     Raises
     ------
@@ -63,7 +65,7 @@ def estimate_classically(record: Record, identification: Identification) -> Clas
         The identification holds no fitted motion.
     """
     if "friction_dynamic" not in identification.parameters:
-        raise RecordError("nothing slipped in this record, so that there is no friction to check.")
+        raise RecordError("nothing slipped in this record: there is no friction to check.")
     decay = prepare(record)
     duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
     period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
@@ -81,7 +83,7 @@ def estimate_classically(record: Record, identification: Identification) -> Clas
 
 
 def zero_crossings(x: Floats, y: Floats) -> tuple[float, ...]:
-    """Where the polygon through the points (x, y), (n,) each, passes zero."""
+    """Abscissae at which the polygon through the points (x, y), (n,) each, crosses zero."""
     before = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     steps = y[before] - y[before + 1]
     share = np.divide(y[before], steps, out=np.zeros(len(before)), where=steps != 0.0)
@@ -112,7 +114,7 @@ def _turning_points(decay: FreeDecay) -> tuple[float | None, float | None, float
 
 
 def _parameters(identification: Identification, friction: float, *, plain: bool = False) -> TwoMassParameters:
-    """Fitted parameters with another f_d and f_s in proportion; level and with f_s = f_d if `plain`."""
+    """Fitted parameters with another f_d and f_s in proportion. `plain`: level plane, f_s = f_d."""
     fitted = identification.parameters
     ratio = 1.0 if plain else fitted["friction_static"] / fitted["friction_dynamic"]
     tilt = 0.0 if plain else fitted["tilt_rad"]
@@ -134,14 +136,13 @@ def _residual(identification: Identification, friction: float, duration_s: float
 
 
 def _friction_by_paper_method(decay: FreeDecay, identification: Identification) -> float:
-    """Lower f_d by hundredths, then by thousandths about the best of them."""
     misfit = _misfit(decay, identification)
     best = min(_COARSE, key=misfit)
     return float(min((best + step for step in _FINE if best + step > 0.0), key=misfit))
 
 
 def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float], float]:
-    """Mean square distance of the plate's (or without gauge 2 the table's) record from the paper's motion."""
+    """Mean square deviation of the record of gauge 2 (without it, of gauge 1) from the paper's motion."""
     release_s = float(decay.channels.from_record_time(np.array(identification.parameters["release_s"])))
     sign, channel = decay.sign, decay.table
     if decay.relative is not None:

@@ -1,8 +1,8 @@
-"""Before a test is made: the motion to expect, what it takes of the gauges, how well it will tell f_d.
+"""Plan of a test: expected motion, gauge ranges in use, and expected uncertainty of f_d.
 
-The uncertainty is that of the joint fit at its minimum: the Fisher information of readings with white noise
-about the exact motion, then every stated source by the law of propagation, as `identify` does it. Where
-chi-square is no parabola (f_s close to f_d) the uncertainty reported by a real test may be larger.
+The uncertainty is that of the joint fit at its minimum: Fisher information of readings with white noise about
+the exact motion, and every stated source by the law of propagation, as in `identify`. Where chi-square is no
+parabola (f_s close to f_d), a real test may report a larger uncertainty.
 """
 
 import math
@@ -32,31 +32,33 @@ CLOCK_UNCERTAINTY = 5e-5
 """Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
 _NOTHING_STATED = GaugeUncertainty()
 _RELEASE_PHASE = 0.3
-"""Where between two samples the release lies: not on one, which would be luck."""
+"""Position of the release between two samples: a real one hardly ever coincides with a sample."""
 _SETTLED_S = 60.0
+"""Simulated at least so long, so that the motion has ended whatever is recorded."""
 _NOISE_MIN_M = 1e-7
-"""With less, rounding decides what readings tell beside what is stated."""
+"""With less, rounding errors decide the normal equations."""
 _FRICTION_MIN = 1e-4
-"""Less is not looked for in a record."""
+"""The search does not look for less."""
 _PER_PERIOD = 400
+"""Points a period: extremes of a sine are then exact to 3e-5 of the amplitude."""
 _READINGS_MAX, _PERIODS_MAX = 1e7, 1e4
-"""More than a small computer holds, and than any test lasts."""
+"""More than the memory of a small computer holds, and than any test lasts."""
 _TESTS_MAX = 1000
-"""In a row without re-centring; more is as good as any number."""
+"""In a row without re-centring; more counts as any number."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest:
-    """A test that is to be made, and what will be known of stand and gauges.
+    """A planned test, with the stated uncertainties of stand and gauges.
 
     Attributes
     ----------
     parameters : TwoMassParameters
-        What is expected of stand, contact and pullback.
+        Expected stand, contact and pullback.
     rate_hz, duration_s, hold_s : float
-        Of the record: samples a second, seconds after the release and before it.
+        Sampling rate, and recorded time after and before the release.
     noise_m : float
-        Standard deviation of both gauges' readings; less than 0.1 µm counts as that.
+        Standard deviation of the readings of both gauges; at least 0.1 µm.
     table_mass_uncertainty_kg, plate_mass_uncertainty_kg, gravity_uncertainty_m_per_s2 : float
         Standard uncertainties.
     clock_scale_uncertainty : float
@@ -64,12 +66,12 @@ class PlannedTest:
     table_gauge, relative_gauge : GaugeUncertainty
         Of the calibration.
     gauge_2_measures_plate : bool
-        Against the base, instead of against the table.
+        Gauge 2 measures against the base instead of the table.
 
     Raises
     ------
     AnalysisError
-        A value that cannot be.
+        A value is impossible.
     """
 
     parameters: TwoMassParameters
@@ -115,7 +117,7 @@ class PlannedTest:
 
     @property
     def law(self) -> FrictionLaw:
-        """The friction law that the parameters stand for."""
+        """Simplest friction law that holds the parameters."""
         static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
         return compared_law(static_friction=static, tilt=self.parameters.tilt_rad != 0.0)
 
@@ -126,13 +128,13 @@ class PlannedTest:
         return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
 
     def motion(self) -> Motion:
-        """The motion to expect, until the plate lies still, however long it is recorded."""
+        """Expected motion until the plate rests, however long it is recorded."""
         return self.parameters.simulate(max(self.duration_s, _SETTLED_S))
 
 
 @dataclass(frozen=True, slots=True)
 class RangeUse:
-    """What a motion takes of a gauge's range: readings from `lowest_m` to `highest_m`, within +-`range_m`."""
+    """Readings of a gauge during a motion: from `lowest_m` to `highest_m`, within ±`range_m`."""
 
     lowest_m: float
     highest_m: float
@@ -140,18 +142,18 @@ class RangeUse:
 
     @property
     def share(self) -> float | None:
-        """Largest reading over the range; None where the range is not stated."""
+        """Largest absolute reading over the range; None where the range is not stated."""
         return None if self.range_m is None else max(abs(self.lowest_m), abs(self.highest_m)) / self.range_m
 
     def fits(self, shift_m: float = 0.0) -> bool:
-        """Whether the readings stay within the range from a start at `shift_m`."""
+        """Tell whether the readings stay within the range when they begin at `shift_m`."""
         limit = math.inf if self.range_m is None else self.range_m
         return -limit <= self.lowest_m + shift_m and self.highest_m + shift_m <= limit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """What a test will show.
+    """Expected outcome of a test.
 
     Attributes
     ----------
@@ -160,13 +162,13 @@ class Plan:
     msk64_degree : str
         Of the table's largest velocity.
     rest_s : float or None
-        When the swing will be as small as the noise, seconds after the release; None without damping.
+        Time after the release at which the swing is as small as the noise; None without damping.
     table_use, relative_use : GaugeUse
         Gauge 2 from a centred plate.
     tests_in_a_row : int or None
-        Tests that fit gauge 2 without re-centring the plate; None for any number.
+        Tests that fit the range of gauge 2 without re-centring the plate; None for any number.
     results : dict of Quantity
-        friction_dynamic, and friction_static of a law that has one; without what the test cannot tell.
+        friction_dynamic, and friction_static of a law that has one; absent where undetermined.
     budget : list of BudgetLine
     cautions : list of Caution
     """
@@ -184,7 +186,7 @@ class Plan:
 
 
 def plan(test: PlannedTest) -> Plan:
-    """Tell what a test will show. Raises AnalysisError where it cannot be."""
+    """Plan a test. Raises AnalysisError for an impossible one."""
     motion = test.motion()
     table_use, relative_use = range_use(test, motion)
     ledger = expected_budget(test)
@@ -203,7 +205,7 @@ def plan(test: PlannedTest) -> Plan:
 
 
 def range_use(test: PlannedTest, motion: Motion) -> tuple[RangeUse, RangeUse]:
-    """What the motion takes of both gauges."""
+    """Range in use of both gauges."""
     count = round(motion.duration_s / test.period_s * _PER_PERIOD) + 2
     times = np.union1d(np.linspace(0.0, motion.duration_s, count), motion.phase_starts_s)
     table, relative = motion.sample_displacements(times)
@@ -215,7 +217,7 @@ def range_use(test: PlannedTest, motion: Motion) -> tuple[RangeUse, RangeUse]:
 
 
 def expected_budget(test: PlannedTest) -> UncertaintyBudget:
-    """Friction with the standard uncertainty to expect, by source; empty where the test does not tell it."""
+    """Friction with its expected uncertainty by source; empty where the test does not determine it."""
     record, ledger = _record(test), UncertaintyBudget()
     if test.motion().slip_end_s == 0.0:
         return ledger
@@ -233,7 +235,7 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
 
 
 def smallest_pullback_m(parameters: TwoMassParameters) -> float:
-    """Pullback from which on the plate slips: its joint acceleration less the tilt's reaches g f_s."""
+    """Smallest pullback at which the plate slips: k1^2 u0 reaches g (f_s - |tilt|)."""
     k1, _ = _joint(parameters)
     limit = parameters.static_or_dynamic - abs(parameters.tilt_rad)
     return parameters.gravity_m_per_s2 * limit / k1**2
@@ -253,7 +255,7 @@ def _joint(parameters: TwoMassParameters) -> tuple[float, float]:
 
 
 def _record(test: PlannedTest) -> Record:
-    """The record of the motion to expect, without its noise, turned so that the pullback is positive."""
+    """Expected record without noise, with signs such that the pullback is positive."""
     held = round(test.hold_s * test.rate_hz)
     count = held + math.floor(test.duration_s * test.rate_hz)
     time_s = np.arange(count) / test.rate_hz
@@ -281,7 +283,7 @@ def _record(test: PlannedTest) -> Record:
 
 
 def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
-    """What there will be to fit; None where a gauge will hardly have a reading."""
+    """Fit problem of the expected record; None where a gauge has too few readings in its range."""
     relative_m = np.empty(0) if record.relative_displacement_m is None else record.relative_displacement_m
     channels = (
         _within(record.time_s, record.table_displacement_m, test.table_gauge.range_m),
@@ -296,13 +298,12 @@ def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
 
 
 def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
-    """Readings that the gauge does not clip."""
     kept = np.abs(value_m) <= (math.inf if range_m is None else range_m)
     return Channel(time_s[kept], value_m[kept])
 
 
 def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
-    """The fit that finds the truth."""
+    """Fit at the true parameters."""
     point = default_point()
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)
@@ -313,7 +314,7 @@ def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
 
 
 def _rest_s(test: PlannedTest) -> float | None:
-    """When the swing of the joint motion, taken from the release on, is as small as the noise."""
+    """Time after the release at which the swing of the joint motion is as small as the noise."""
     motion = test.motion()
     _, n1 = _joint(test.parameters)
     if n1 == 0.0:

@@ -1,4 +1,4 @@
-"""Standard uncertainties by the law of propagation (JCGM 100), and what each source adds to them."""
+"""Standard uncertainties by the law of propagation (JCGM 100, 5.1.2), with contributions by source."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,24 +25,25 @@ _SOURCES = {
     Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
 LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
-"""Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
+"""Of a plane set with a hydraulic level: within 2 mrad, rectangular (JCGM 100, 4.3.7)."""
 _SHARE_MIN = 1e-3
+"""A law less likely than this adds less than its last digit to a standard uncertainty."""
 COVERAGE_FACTOR_95 = 1.959963984540054
-"""Half of a 95 % interval of a normal distribution, in standard deviations."""
+"""Coverage factor of a 95 % interval of a normal distribution."""
 _CORRELATED = 3.5
-"""Block means must scatter by this many standard deviations more than white noise to count as correlated."""
+"""Excess scatter of block means, in standard deviations of white noise, from which noise is correlated."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParameterUncertainty:
-    """Linearised distribution of the parameters about the fit.
+    """Linearised distribution of the parameters about a fit.
 
     Attributes
     ----------
     columns : dict of (16,) float64
-        Per source, the shift of every parameter by one standard uncertainty of that source.
+        Shift of every parameter by one standard uncertainty of a source.
     noise : (16, 16) float64
-        Covariance from the readings' noise.
+        Covariance from the noise of the readings.
     """
 
     shifts: dict[Source, Floats]
@@ -53,7 +54,7 @@ class ParameterUncertainty:
         return float(np.sqrt(sum(share**2 for share in self.contributions(weights).values())))
 
     def contributions(self, weights: Floats) -> dict[Source, float]:
-        """Standard uncertainty of a linear form by source; "noise" is type A."""
+        """Standard uncertainty of a linear form by source; noise is of type A."""
         shares: dict[Source, float] = {
             BudgetSource.NOISE: float(np.sqrt(max(0.0, float(weights @ self.noise_covariance @ weights))))
         }
@@ -62,7 +63,7 @@ class ParameterUncertainty:
 
 
 def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
-    """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
+    """Distribution of the fitted parameters: noise as the residuals show it, and every stated source."""
     residuals = (fit.table_residual_m, fit.relative_residual_m)
     shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
     return _propagate(
@@ -73,7 +74,7 @@ def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncerta
 
 
 def propagate_expected(problem: FitProblem, fit: Fit) -> ParameterUncertainty:
-    """Distribution to expect of a fit whose readings have white noise of the stated size."""
+    """Expected distribution of a fit to readings with white noise of the stated size."""
     return _propagate(problem, fit, [1.0] * len(_times(problem)))
 
 
@@ -109,7 +110,7 @@ def propagate_with_model_choice(
 
 
 def unstated_gains(record: Record) -> list[BudgetLine]:
-    """Budget lines of gauges whose gain has no stated uncertainty: their share of f_d is not known (NaN)."""
+    """Budget lines (NaN) of gauges whose gain has no stated uncertainty."""
     gauges = {BudgetSource.GAUGE_1_GAIN_NOT_STATED: record.table_gauge}
     if record.relative_displacement_m is not None:
         gauges[BudgetSource.GAUGE_2_GAIN_NOT_STATED] = record.relative_gauge
@@ -121,10 +122,10 @@ def unstated_gains(record: Record) -> list[BudgetLine]:
 
 
 def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:
-    """Shift of every parameter by a plane out of level (one standard uncertainty), if the record cannot tell.
+    """Shift of every parameter by one standard uncertainty of the plane's tilt.
 
-    Slips that all go one way determine only f_d minus or plus the tilt. None where the record tells more
-    of the tilt than a hydraulic level does, or the law has a tilt of its own.
+    Slips in one direction alone determine only f_d minus or plus the tilt. None where the record determines
+    the tilt better than a hydraulic level, or the law has a tilt of its own.
     """
     if fit.law.has_tilt:
         return None
@@ -140,10 +141,10 @@ def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:
 
 
 def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
-    """Variance of a slow average of `residual` (in units of its stated noise) over that of white unit noise.
+    """Variance of slow averages of `residual` (in units of its stated noise) over that of white unit noise.
 
-    White residuals give their mean square; where means over blocks scatter significantly more than that,
-    their scatter counts.
+    White residuals give their mean square. Where block means scatter significantly more, their scatter
+    counts instead.
     """
     square = float(np.mean(residual**2))
     edges = np.arange(time_s[0], time_s[-1], block_s)[1:]
@@ -159,14 +160,14 @@ def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> f
 
 
 def numerical_gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
-    """Derivatives, by differences, of one or (m,) values by every parameter: (p,) or (m, p)."""
+    """Derivatives of one or (m,) values by every parameter, by central differences: (p,) or (m, p)."""
     columns = []
     for index, value in enumerate(point):
         step = 1e-6 * max(abs(float(value)), 1e-3)
         up, down = point.copy(), point.copy()
         up[index] += step
         down[index] -= step
-        with np.errstate(invalid="ignore"):  # values that do not exist have no slope either
+        with np.errstate(invalid="ignore"):  # values that do not exist have no slope
             columns.append((np.asarray(function(up)) - np.asarray(function(down))) / (2.0 * step))
     return np.stack(columns, axis=-1)
 
@@ -186,10 +187,9 @@ class UncertaintyBudget:
         contributions: dict[Source, float],
         half_widths: tuple[float, float] | None = None,
     ) -> None:
-        """Note a quantity with the standard uncertainty from each source; zero shares are left out.
+        """Add a quantity with its standard uncertainty from each source; zero contributions are left out.
 
-        `reach` are the ends of the 95 % interval, below and above the value, where they are not 1.96
-        standard uncertainties.
+        `half_widths` of the 95 % interval, below and above the value, replace 1.96 standard uncertainties.
         """
         quantity = Quantity.normal(
             value, float(np.sqrt(sum(share**2 for share in contributions.values()))), unit
@@ -202,7 +202,6 @@ class UncertaintyBudget:
 
 
 def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:
-    """Noise of each gauge, its stated variance times a factor, and every stated source."""
     inverse, _ = covariance(fit.normal_matrix)
     noise = np.zeros_like(inverse)
     systems = problem.normal_equations(fit.parameters, fit.law, fit.free)

@@ -1,4 +1,4 @@
-"""The line or low polynomial through counts and displacements, with its covariance."""
+"""Calibration of a gauge: curve through counts and displacements, gain, zero, and their uncertainties."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarnin
 from messages.message import message
 
 _REACH = 0.5
-"""A polynomial is asked for its zero no further beyond the readings than this share of their span."""
+"""A polynomial is extrapolated to its zero by this share of the span of readings at most."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -27,7 +27,7 @@ class CalibrationCurve:
     polynomial : Polynomial
         m of count.
     covariance : (p, p) float64
-        Of the coefficients in the polynomial's own window, for a scatter of 1 m.
+        Of the coefficients in the window of the polynomial, for a scatter of 1 m.
     scatter_m : float
         Standard deviation of the points about the curve, with `freedom` degrees of freedom (m).
     freedom : int
@@ -91,14 +91,14 @@ class CalibrationCurve:
 
 
 def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> CalibrationCurve:
-    """Least squares of displacements (n,) over counts (n,), which are taken for exact.
+    """Fit displacements (n,) over counts (n,) by least squares; counts have no error.
 
     For a straight line this is the method of JCGM 100, H.3.
 
     Raises
     ------
     CalibrationError
-        There are not more points than coefficients and one, or their counts are alike.
+        Too few points, or their counts are alike.
     """
     if len(counts) < degree + 2:
         raise CalibrationError(
@@ -130,20 +130,19 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Calibratio
 
 @dataclass(frozen=True, slots=True)
 class GaugeCharacteristics:
-    """Figures of a gauge in m; None where the readings cannot tell.
+    """Performance characteristics of a gauge (m); None where the readings do not determine them.
 
     Attributes
     ----------
     nonlinearity_m : float
-        Largest deviation from the curve at any step on the way up or down, averaged over the rounds; with
-        the gauge's hysteresis, therefore.
+        Largest deviation from the curve at any step on the way up or down, averaged over the rounds. It
+        includes the hysteresis.
     hysteresis_m : float, optional
         Largest difference between the ways up and down at one step, averaged over the rounds.
     repeatability_m : float, optional
         Standard deviation of readings at one step in one direction from round to round, pooled.
     zero_drift_m : float, optional
-        By how much the gauge shows more at the end of its last way back to the lowest step than at its
-        first reading there.
+        Difference between the last and the first reading at the lowest step.
     """
 
     nonlinearity_m: float
@@ -153,7 +152,7 @@ class GaugeCharacteristics:
 
 
 def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> GaugeCharacteristics:
-    """Figures from the residuals (n,), dial reading minus curve (m)."""
+    """Characteristics from the residuals (n,), dial reading minus curve (m)."""
     steps = readings.steps()
     cells = [
         (step, way, residual_m[(steps == step) & (readings.direction == way)])
@@ -173,7 +172,7 @@ def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> Ga
 
 
 def step_means(readings: CalibrationPoints) -> tuple[Floats, Floats]:
-    """Mean counts and mean displacement (m) of each step; up and down weigh alike."""
+    """Mean counts and mean displacement (m) of each step; up and down have equal weight."""
     steps = readings.steps()
     means = []
     for step in np.unique(steps):
@@ -199,7 +198,7 @@ def _zero_drift(residual_m: Floats) -> float | None:
 
 
 _DOUBTFUL: Final = 8.0
-"""A reading so many times further off than is usual (median absolute residual) is doubted."""
+"""A residual of so many median absolute residuals is 5 standard deviations: no chance in a calibration."""
 _SQRT12: Final = math.sqrt(12.0)
 _NORMAL_95: Final = 1.959963984540054
 """Half of a 95 % interval in standard uncertainties of a normal distribution."""
@@ -207,14 +206,14 @@ _NORMAL_95: Final = 1.959963984540054
 
 @dataclass(frozen=True, slots=True)
 class DialGauge:
-    """What the displacements are measured with.
+    """Dial gauge that measures the displacements.
 
     Attributes
     ----------
     resolution_m : float
-        To which it is read (m); the reading errs evenly within half of it to each side.
+        To which it is read (m); the reading error is rectangular, ± half of it.
     standard_uncertainty_m : float, optional
-        Of its certificate (m): what is off in a like manner whenever it stands at a place. None: not stated.
+        Of its certificate (m): the reproducible error at each position. None: not stated.
     """
 
     resolution_m: float = 1e-5
@@ -251,8 +250,8 @@ class Calibration:
     zero_standard_uncertainty_m : float
         Of the displacement at `zero_count`.
     displacement_standard_uncertainty_m : float
-        Combined, of a displacement anywhere within the readings, the largest (m); without what is not
-        stated of the dial gauge.
+        Largest combined one of a displacement within the readings (m), without sources that are not
+        stated.
     merits : Merits
     scatter_m : float
         Standard deviation of the steps about the curve (m).
@@ -283,15 +282,15 @@ class Calibration:
 
     @property
     def gain_relative_normal_uncertainty(self) -> float:
-        """Standard uncertainty of the normal distribution that has the same 95 % interval.
+        """Standard uncertainty of the normal distribution with the same 95 % interval.
 
-        For whoever takes the gain on without its degrees of freedom.
+        For uses of the gain without its degrees of freedom.
         """
         low, high = self.gain_m_per_count.interval_95
         return 0.5 * (high - low) / _NORMAL_95 / abs(self.gain_m_per_count.value)
 
     def displacement_m(self, counts: Floats) -> Floats:
-        """Displacements (k,) that counts (k,) stand for (m)."""
+        """Displacements (k,) of counts (k,) (m)."""
         linear = self.gain_m_per_count.value * (counts - self.zero_count.value)
         return linear * np.polynomial.polynomial.polyval(linear, (1.0, *self.polynomial))
 
@@ -299,9 +298,9 @@ class Calibration:
 def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: int = 1) -> Calibration:
     """Fit a line (degree 1) or polynomial (2, 3) to readings, with uncertainties by JCGM 100.
 
-    The curve goes through the means of the steps, since readings at one step share what the gauge and the
-    dial gauge are off there: repeating a step does not make the curve surer of it. What the certificate
-    of the dial gauge leaves open is taken as independent at both ends of its travel.
+    The curve is fitted to the means of the steps: readings at one step share the errors of gauge and dial
+    gauge there, and repeats do not reduce them. Certificate errors of the dial gauge are independent at both
+    ends of its travel.
 
     Raises
     ------
@@ -342,7 +341,7 @@ def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: 
 
 
 def _about(curve: CalibrationCurve, zero: float) -> tuple[float, tuple[float, ...]]:
-    """Gain at the zero (m/count), and the bends in powers of gain (count - zero)."""
+    """Gain at the zero (m/count), and the coefficients of higher powers of gain (count - zero)."""
     slopes, factor = curve.polynomial, 1.0
     taylor = []
     for order in range(1, curve.polynomial.degree() + 1):
@@ -356,7 +355,7 @@ def _budget(
     curve: CalibrationCurve, zero: float, dial: DialGauge, merits: GaugeCharacteristics
 ) -> tuple[BudgetLine, ...]:
     """Each source's standard uncertainty of gain (relative), zero and displacement (m)."""
-    # Few steps can lie on a line by luck; they were read no better than the dial can be.
+    # Few steps may lie on a line by chance; the resolution of the dial is the lower limit.
     scatter_m = max(curve.scatter_m, dial.reading_uncertainty_m)
     span_m = float(abs(np.diff(curve.polynomial(curve.ends))[0]))
     certificate_m = math.nan if dial.standard_uncertainty_m is None else dial.standard_uncertainty_m
@@ -388,14 +387,14 @@ def _combined(ledger: tuple[BudgetLine, ...], name: str) -> float:
 
 
 def _share(ledger: tuple[BudgetLine, ...], name: str) -> float:
-    """Share of the readings, which alone have few degrees of freedom, in a standard uncertainty."""
+    """Share of the readings, which have few degrees of freedom, in a standard uncertainty."""
     whole = _combined(ledger, name)
     readings = _combined(tuple(line for line in ledger if line.source is BudgetSource.READINGS), name)
     return readings / whole if whole else 0.0
 
 
 def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit: str) -> Quantity:
-    """Quantity whose interval is as wide as the effective degrees of freedom ask (JCGM 100, G.2b)."""
+    """Quantity with the interval of the effective degrees of freedom (JCGM 100, G.2b)."""
     effective = freedom / share**4 if share > 1e-3 else math.inf
     half = float(stdtrit(min(effective, 1e6), 0.975)) * uncertainty
     return Quantity(value, uncertainty, (value - half, value + half), unit)

@@ -1,4 +1,4 @@
-"""A gauge tried against a displacement that is known, to see whether its calibration still holds."""
+"""Check of a calibration against a known displacement."""
 
 import math
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
 from messages.message import message
 
 COVERAGE: Final = 2.0
-"""The tolerance is so many combined standard uncertainties: about 95 % (JCGM 100, 6.3)."""
+"""Tolerance over the combined standard uncertainty: coverage of about 95 % (JCGM 100, 6.3)."""
 _BLUNT: Final = 0.05
-"""A tolerance above this share of the displacement lets too much pass."""
+"""A tolerance above this share of the displacement passes errors of a gain that matter for f_d."""
 _BOTH_ENDS: Final = math.sqrt(2.0)
 _SQRT12: Final = math.sqrt(12.0)
 _MEASURED: Final = "measured_m"
@@ -19,7 +19,7 @@ _MEASURED: Final = "measured_m"
 
 @dataclass(frozen=True, slots=True)
 class MeanReading:
-    """What a gauge shows while it is left alone.
+    """Mean reading of a gauge at rest.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class MeanReading:
 
     @property
     def standard_uncertainty_m(self) -> float:
-        """Of the mean: from the noise, and from the creep, which is taken as even."""
+        """Of the mean: noise, and creep with a rectangular distribution."""
         return math.hypot(self.noise_m / math.sqrt(self.samples), self.creep_m / _SQRT12)
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationClaim:
-    """What its calibration says of a gauge; None is "not stated".
+    """Stated uncertainties of a calibration; None is "not stated".
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class CalibrationClaim:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceDisplacement:
-    """The displacement that is known, or the one that a shunt resistor stands for.
+    """Known displacement, or the one that a shunt resistor simulates.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class ReferenceDisplacement:
     standard_uncertainty_m : float, optional
         Of that (m); None: not stated.
     is_electric : bool
-        A shunt: the gauge itself does not move, and neither its non-linearity nor its repeatability come in.
+        A shunt: the gauge does not move, so non-linearity and repeatability do not contribute.
     """
 
     displacement_m: float
@@ -95,14 +95,14 @@ class ReferenceDisplacement:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementCheck:
-    """What came of it.
+    """Result of the check.
 
     Attributes
     ----------
     expected_m, measured_m : float
-        Displacement as known, and as the gauge shows it: the reading there minus that at rest.
+        Known displacement, and that of the gauge: its reading there minus the one at rest.
     standard_uncertainty_m : float
-        Combined, of their difference, as far as it is stated (m).
+        Combined, of their difference, from stated sources (m).
     budget : tuple of BudgetLine
         Of `measured_m` minus `expected_m` (m); NaN where not stated.
     cautions : tuple of Caution
@@ -126,7 +126,7 @@ class DisplacementCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether what is known of calibration, reference and readings explains the deviation."""
+        """The stated uncertainties explain the deviation."""
         return abs(self.deviation_m) <= self.tolerance_m
 
 
@@ -135,7 +135,7 @@ def check_displacement(
 ) -> DisplacementCheck:
     """Compare the difference of two readings with a known displacement.
 
-    The zero of the calibration and the place of rest cancel, so that the gain is checked, and nothing else.
+    Zero and rest position cancel: only the gain is checked.
 
     Raises
     ------

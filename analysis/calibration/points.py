@@ -1,4 +1,4 @@
-"""Counts against dial-gauge readings: what an operator reads off, and what is wrong with it."""
+"""Calibration points: counts of a gauge against readings of a dial gauge, checked."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,27 +16,27 @@ IntArray = NDArray[np.int64]
 
 POLYNOMIAL_DEGREES = (1, 2, 3)
 _SPACING_SHARE = 0.5
-"""Readings nearer than this share of the usual spacing belong to one step."""
+"""Readings closer than this share of the median spacing belong to one step."""
 
 
 class CalibrationError(AnalysisError, ValueError):
-    """Readings that make no calibration."""
+    """Readings that cannot be calibrated with."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationPoints:
-    """Readings in the order in which they were taken; make them with `of`.
+    """Readings in the order in which they were taken; build them with `from_readings`.
 
     Attributes
     ----------
     counts : (n,) float64
-        What the device sent, averaged while the table stood still.
+        Averages of the device's counts while the table stood still.
     dial_m : (n,) float64
-        What the dial gauge showed (m).
+        Readings of the dial gauge (m).
     direction : (n,) int64
         +1 on the way up (dial readings grow), -1 on the way down.
     round_number : (n,) int64
-        Which time up and down, from 1.
+        Number of the way up and down, from 1.
     """
 
     counts: Floats
@@ -55,13 +55,13 @@ class CalibrationPoints:
         direction: ArrayLike | None = None,
         round_number: ArrayLike | None = None,
     ) -> Self:
-        """Readings (n,) as taken; direction and round are seen from the dial where they are not given.
+        """Build checked points from readings (n,); direction and round follow from the dial if not given.
 
         Raises
         ------
         CalibrationError
-            Arrays of unlike lengths, values that are not finite, dial readings that do not move the way
-            they should, or counts that do not follow the dial.
+            Unequal lengths, values that are not finite, dial readings against their direction, or counts
+            that do not follow the dial.
         """
         counts_seen = np.asarray(counts, dtype=np.float64)
         dial = np.asarray(dial_m, dtype=np.float64)
@@ -175,7 +175,7 @@ def _check_finite(counts: Floats, dial_m: Floats) -> None:
 
 
 def _directions_and_rounds(dial_m: Floats) -> tuple[IntArray, IntArray]:
-    """Direction and round of each reading: a turn begins a way, every second one a round."""
+    """Direction and round of each reading; every second reversal begins a round."""
     moves = np.sign(np.diff(dial_m)).astype(np.int64)
     still = np.flatnonzero(moves == 0)
     if len(still):

@@ -1,4 +1,4 @@
-"""A campaign summed up: a row a series, and what was left out and why."""
+"""Summary of a campaign: rows by series, effects, ratios, excluded runs, and the published table beside."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from messages.message import Message, message
 
 @dataclass(frozen=True, slots=True)
 class Excluded:
-    """A run that does not count, and why."""
+    """A run that does not count, with the reason."""
 
     run: str
     reason: str
@@ -23,22 +23,22 @@ class Excluded:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Campaign:
-    """All that the runs say together.
+    """Summary of all runs.
 
     Attributes
     ----------
     rows : tuple of SeriesRow
         In the paper's order.
     effects : Effects
-        What f_d depends on.
+        Dependence of f_d on mass, pullback, velocity and contact.
     ratios : tuple of ContactRatio
         f_s / f_d by contact.
     msk64_degrees : tuple of str
-        Degrees that the table reached, each once, the lowest first.
+        Degrees that the table reached, each once, lowest first.
     excluded : tuple of Excluded
         In the order given.
     cautions : tuple of Caution
-        Of the campaign; those of a series are in its row.
+        Of the campaign; a row carries those of its series.
     """
 
     rows: tuple[SeriesRow, ...]
@@ -50,14 +50,14 @@ class Campaign:
 
 
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
-    """Sum up runs: a row a series in the paper's order.
+    """Summarize runs: one row for each series, in the paper's order.
 
     Parameters
     ----------
     runs : sequence of RunResult
-        Of one campaign, in any order. The numbers do not depend on it.
+        Of one campaign; their order does not change the numbers.
     known_contacts : sequence of str
-        Codes of the stand; others are allowed, and named. Empty where none is known.
+        Codes of the stand. Runs with others get a warning. Empty: none is known.
     """
     counted = sorted(
         (run for run in runs if not run.excluded), key=lambda run: (run.series.sort_key, run.name)
@@ -81,7 +81,7 @@ def _velocity(row: SeriesRow) -> float:
 
 
 def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
-    """What was said of single runs, once for each code and gauge, with the runs that it was said of."""
+    """Warnings of single runs, grouped by code and gauge."""
     groups: dict[tuple[str, object], list[tuple[RunResult, Message]]] = {}
     for run in runs:
         for warning in run.warnings:
@@ -107,9 +107,9 @@ _UNITS_PRINTED = {"stiffness_n_per_m": KILOGRAM_FORCE_N}
 
 @dataclass(frozen=True, slots=True)
 class PublishedComparison:
-    """A figure as found and as printed, both in the unit of its column; the difference is found - printed.
+    """A measured and a published value in the unit of the column; the difference is measured - published.
 
-    `normalised` is the difference over the standard uncertainty as found; that of the print is not known.
+    `normalised` is the difference over the standard uncertainty of the measured value.
     """
 
     name: str
@@ -120,7 +120,7 @@ class PublishedComparison:
 
 
 def compare_with_published(row: SeriesRow, printed: PublishedRow) -> tuple[PublishedComparison, ...]:
-    """Hold a row against its print, in the order of the columns; what was not found is left out."""
+    """Compare a row with the published one, in the order of the columns."""
     return tuple(
         _compare(
             row, quantity.name, getattr(printed, column.published) * _UNITS_PRINTED.get(quantity.name, 1.0)
@@ -141,7 +141,7 @@ def _compare(row: SeriesRow, name: str, printed: float) -> PublishedComparison:
 def compare_all_with_published(
     rows: Sequence[SeriesRow], published: Mapping[str, PublishedRow]
 ) -> dict[str, tuple[PublishedComparison, ...]]:
-    """Hold all rows that the print has too against it, by their labels."""
+    """Compare all rows that the published table has too, by their labels."""
     return {
         row.label: compare_with_published(row, published[row.label]) for row in rows if row.label in published
     }

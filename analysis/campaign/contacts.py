@@ -1,4 +1,4 @@
-"""Static and dynamic friction by contact: what the paper's histogram shows, with uncertainties."""
+"""Static and dynamic friction and their ratio by contact, with uncertainties (the paper's Fig. 2)."""
 
 import math
 from collections.abc import Sequence
@@ -27,13 +27,11 @@ class ContactFriction:
     contact : str
         Code, "" where it is not known.
     dynamic, static : Quantity or None
-        Mean over the series; its interval holds what series differ by, and what they share. None where no
-        series determined it.
+        Mean over the series, with the scatter between series and shared errors; None where undetermined.
     dynamic_of_series, static_of_series : dict of Quantity
-        By the labels of the series.
-        Where no law told f_s, the middle of its two bounds.
+        By the labels of the series; f_s is the middle of its bounds where no law determined it.
     static_at_least : dict of float
-        By the labels of series that bound f_s from below alone.
+        Lower bounds, by the labels of series without an upper one.
     """
 
     contact: str
@@ -70,10 +68,10 @@ def _friction(contact: str, rows: Sequence[SeriesRow]) -> ContactFriction:
 
 
 def mean_over_series(series: Sequence[PooledQuantity]) -> Quantity | None:
-    """Plain mean of a quantity over series that may truly differ; None of none.
+    """Unweighted mean of a quantity over series that may truly differ; None without series.
 
-    Type A is the scatter between series over the root of their number, with Student's factor; errors that
-    series share enter at full size, as no number of series makes them smaller.
+    Type A is the scatter between series over the root of their number, with Student's factor. Errors that
+    series share enter at full size.
     """
     if len(series) < 2:
         return series[0].quantity if series else None
@@ -87,7 +85,7 @@ def mean_over_series(series: Sequence[PooledQuantity]) -> Quantity | None:
 
 
 def _static(row: SeriesRow) -> PooledQuantity | None:
-    """f_s as a law told it, or between its bounds."""
+    """f_s of a law, or the middle of its bounds (rectangular distribution)."""
     if _STATIC in row.quantities:
         return row.quantities[_STATIC]
     if not row.quantities.keys() >= {STATIC_LOWER, STATIC_UPPER}:
@@ -107,14 +105,13 @@ class ContactRatio:
     ----------
     contact : str
     ratio : Quantity or None
-        Mean over the series that determined f_s, their differences in its uncertainty; None without any.
+        Mean over the series that determined f_s, with their scatter; None without any.
     series : int
-        How many did.
+        Number of these series.
     between_series : float or None
-        Standard deviation of the ratio from series to series; None with fewer than two.
+        Standard deviation of the ratio between series; None with fewer than two.
     bounds : (float or None, float or None)
-        Between which the other series leave it, as the smallest lower and largest upper bound; None where
-        there are none.
+        Smallest lower and largest upper bound of the other series; None where there are none.
     """
 
     contact: str

@@ -1,4 +1,4 @@
-"""Whether f_d depends on plate mass, pullback, velocity and contact, and what could have been seen."""
+"""Effects of plate mass, pullback, velocity and contact on f_d, with the detectable size of each."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -30,13 +30,13 @@ from messages.message import Message, joined, message
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
 _TOLD: Final = 3
-"""Sizes that a sentence tells of an effect that was found."""
+"""Sizes of an effect that its sentence names."""
 _LARGEST: Final = 700.0
-"""Difference of logarithms above which a ratio is no number any more."""
+"""Difference of logarithms above which a ratio overflows."""
 
 
 class Cause(StrEnum):
-    """What f_d may depend on."""
+    """A possible cause of a change of f_d."""
 
     MASS = N_("plate mass")
     PULLBACK = N_("pullback")
@@ -46,9 +46,9 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class EffectSize:
-    """By which share f_d changes (0.02: by 2 %), all other causes equal.
+    """Relative change of f_d (0.02: by 2 %) for a step of one cause, all other causes equal.
 
-    `step` says for what, for example "per 10 kg more" or "FF: from 6 to 12 mm".
+    The step is, for example, "per 10 kg more".
     """
 
     step: Message
@@ -63,16 +63,15 @@ class Effect:
     ----------
     cause : Cause
     found : bool or None
-        Whether f_d depends on it, at 5 %; None where the campaign cannot tell.
+        Whether f_d depends on it, at the 5 % level; None where the campaign cannot tell.
     sentence : Message
     statistic, p_value : float or None
         Of the F test.
     degrees_of_freedom : (int, int) or None
     sizes : tuple of EffectSize
-        The first is the one of the sentence.
+        The sentence names the first.
     size_seen : float or None
-        Share by which f_d would have to change, for the step of the first size, to be found with a chance
-        of 80 %.
+        Relative change of f_d, for the step of the first size, that is found with a chance of 80 %.
     """
 
     cause: Cause
@@ -93,10 +92,10 @@ class Effects:
     ----------
     effects : tuple of Effect
     scatter : float or None
-        Relative standard deviation of the series about the model beyond their uncertainties; None where it
-        cannot be known.
+        Relative standard deviation of the series about the model beyond their uncertainties; None where
+        undetermined.
     series : int
-        Rows that were taken.
+        Number of rows used.
     """
 
     effects: tuple[Effect, ...]
@@ -106,7 +105,7 @@ class Effects:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Hypothesis:
-    """What is to be tested: combinations (k, p) that are zero without the effect.
+    """Null hypothesis: combinations (k, p) of the coefficients are zero without the effect.
 
     `patterns` (m, k) are the combinations for an effect of size 1 of the first of `steps`.
     """
@@ -117,12 +116,11 @@ class _Hypothesis:
 
 
 def find_effects(rows: Sequence[SeriesRow]) -> Effects:
-    """Test what f_d depends on, by one weighted linear model of ln f_d of the series.
+    """Test the causes of changes of f_d, by one weighted linear model of ln f_d of the series.
 
-    Contact and pullback enter as classes with a value for each combination, plate mass and largest velocity
-    of the table as straight lines. Each cause is tested with the others in the model, so that an effect is
-    not ascribed to what merely goes along with its cause. Errors that series share are in the covariance,
-    scatter of the series about the model too.
+    Contact and pullback are categorical, with a coefficient for each combination. Plate mass and largest
+    table velocity are linear. Each cause is tested with the others in the model, so a confounded cause is
+    not named. The covariance holds errors that series share, and the scatter of the series about the model.
     """
     taken = [row for row in rows if is_usable(row)]
     if not taken:
@@ -179,12 +177,12 @@ def _change_quantity(fitted: LinearFit, weights: Floats) -> Quantity:
 
 
 def _relative_change(difference: float) -> float:
-    """Relative change that a difference of logarithms is."""
+    """Relative change of a difference of logarithms."""
     return math.expm1(difference) if difference < _LARGEST else math.inf
 
 
 def _most_significant(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
-    """The sizes that are farthest from none, the farthest first."""
+    """The most significant sizes, in descending order."""
     far = sorted(sizes, key=lambda size: -abs(size.change.value) / size.change.standard_uncertainty)
     return far[:_TOLD]
 

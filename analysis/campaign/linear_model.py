@@ -1,4 +1,4 @@
-"""A linear model of values with known uncertainties, partly shared: fit, F tests, and their power."""
+"""Linear model of values with partly shared uncertainties: design matrix, fit, F tests and their power."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ _FARTHEST = 1e6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Observations:
-    """Values to be explained.
+    """Values of the model, with the covariance of their errors.
 
     Attributes
     ----------
     values : (n,) float64
     variances : (n,) float64
-        Of what each value has for itself, as repeats show it.
+        Of the independent errors, from repeats.
     shared : (n, n) float64
-        Covariance of the errors that values share.
+        Covariance of the shared errors.
     degrees_of_freedom : int
-        Of `variances`; 0 where they come from single runs, whose differences are not known.
+        Of `variances`; 0 where they come from single runs.
     """
 
     values: Floats
@@ -46,7 +46,7 @@ class LinearFit:
     coefficients : (p,) float64
     covariance : (p, p) float64
     degrees_of_freedom : int
-        Of the variance that tests use.
+        Of the variance used in tests.
     beyond : float
         Standard deviation of the values about the model beyond their uncertainties.
     """
@@ -61,7 +61,7 @@ class LinearFit:
 class FTest:
     """An F test that some combinations of coefficients are zero.
 
-    `size_seen` is the size of the effect of a given pattern that has the chance `POWER` to be found.
+    `detectable_size` is the size of an effect of the given pattern that is found with the chance `POWER`.
     """
 
     statistic: float
@@ -73,9 +73,9 @@ class FTest:
 def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | None:
     """Fit `values = design @ coefficients` by generalised least squares.
 
-    Each value has its own uncertainty, and the values scatter about the model beyond it, with a variance
-    that makes chi-square equal to its degrees of freedom (Mandel and Paule), 0 at least. Tests have the
-    degrees of freedom of that scatter; where there are none, those of the repeats.
+    The values scatter about the model beyond their uncertainties, with the variance, 0 or above, at which
+    chi-square equals its degrees of freedom (Mandel and Paule). Tests have the degrees of freedom of that
+    scatter, or those of the repeats where there are none.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | 
     Returns
     -------
     Fitted or None
-        None where nothing tells how far chance goes: no repeats, and as many coefficients as values.
+        None without residual degrees of freedom: no repeats, and as many coefficients as values.
     """
     left = len(observations.values) - design.shape[1]
     if left + observations.degrees_of_freedom == 0:
@@ -107,7 +107,7 @@ def f_test(fitted: LinearFit, combinations: Floats, patterns: Floats) -> FTest:
     combinations : (k, p) float64
         Of rank k.
     patterns : (m, k) float64
-        What the combinations are for an effect of size 1, in m ways; the power is that of the worst.
+        Values of the combinations for an effect of size 1, in m ways; the least power counts.
     """
     count, degrees = len(combinations), fitted.degrees_of_freedom
     inverse = np.linalg.inv(combinations @ fitted.covariance @ combinations.T)
@@ -170,28 +170,28 @@ def _noncentrality(count: int, degrees: int) -> float:
 
 FRICTION = "friction_dynamic"
 _INFLATION_MAX: Final = 10.0
-"""Of the variance of the velocity's coefficient by the plate mass, above which they are not told apart."""
+"""Variance inflation of the velocity's coefficient above which it is confounded with the plate mass."""
 _NOTHING: Final = 1e-9
-"""Relative variation of a cause that is none."""
+"""Relative variation that is rounding."""
 _VAGUE: Final = 1e100
-"""Relative uncertainty of an f_d that tells nothing, and whose square is no number."""
+"""Relative uncertainty whose square overflows."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DesignMatrix:
-    """Which combination of contact and pullback each row has, and its plate mass and velocity.
+    """Design matrix of ln f_d: combination of contact and pullback, plate mass, velocity.
 
     Attributes
     ----------
     cells : tuple of (str, float)
-        Contact and pullback (m) of each combination that occurs.
+        Contact and pullback (m) of each combination.
     matrix : (n, p) float64
-        A column a combination, then plate mass (kg) and velocity (m/s) about their means, if they are told
-        apart.
+        One column for each combination, then plate mass (kg) and velocity (m/s) about their means, where
+        they are not confounded.
     mass, velocity : int or None
-        Their columns; None where the rows cannot tell what they do.
+        Indices of their columns; None where confounded.
     velocity_follows : bool
-        The velocity differs, but only as contact, pullback and plate mass do.
+        The velocity varies only with contact, pullback and plate mass.
     velocities : (float, float)
         Least and largest (m/s).
     """
@@ -229,7 +229,7 @@ class DesignMatrix:
 
 
 def is_usable(row: SeriesRow) -> bool:
-    """Tell whether the effects can take a row: it has f_d above 0, v_max and a pullback."""
+    """Tell whether a row has f_d above 0, v_max and a pullback."""
     friction = row.quantities.get(FRICTION)
     return (
         friction is not None
@@ -241,7 +241,7 @@ def is_usable(row: SeriesRow) -> bool:
 
 
 def build_design(rows: Sequence[SeriesRow]) -> DesignMatrix:
-    """Lay out the model of rows that are `usable`."""
+    """Design matrix of rows that are usable."""
     places = [(row.series.contact, row.series.pullback_m or 0.0) for row in rows]
     cells = tuple(dict.fromkeys(places))
     columns = [np.array([float(place == cell) for place in places]) for cell in cells]

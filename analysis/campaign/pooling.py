@@ -1,4 +1,4 @@
-"""One quantity of one run, its uncertainty divided between what repeats make smaller and what they share."""
+"""Pooling of repeats: weighted means, with errors that repeats share and the scatter between runs."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity, SharedBy, So
 from analysis.uncertainty import COVERAGE_FACTOR_95
 
 _SMALLEST = 1e-9
-"""Relative uncertainty under which numbers decide, not readings."""
+"""Relative uncertainty below which rounding errors decide."""
 _LARGEST = 1e100
-"""What is farther from 0 has no square, and is no measured number."""
+"""Larger values have no square in double precision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,18 +40,18 @@ class SharedError:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunValue:
-    """A quantity as one run found it.
+    """A quantity of one run, with its uncertainty split by what repeats average.
 
     Attributes
     ----------
     run : str
     value : float
     repeatable : float
-        Standard uncertainty that is this run's own; above 0.
+        Standard uncertainty of this run alone; above 0.
     common : dict of float
-        Standard uncertainty by source and identity of what is shared: readings with the same key err alike.
+        Standard uncertainties of errors shared with other runs.
     reach : (float, float)
-        Ends of the 95 % interval, below and above the value.
+        Of the 95 % interval, below and above the value.
     unit : str
     """
 
@@ -64,9 +64,9 @@ class RunValue:
 
 
 def run_value(run: RunResult, name: str) -> RunValue | None:
-    """Take one quantity from a run; None where the run does not have it, or not as a number.
+    """Return one quantity of a run; None where the run has no finite value.
 
-    A quantity without a budget counts as shared between all runs, which no repeat makes smaller.
+    The uncertainty of a quantity without a budget counts as shared between all runs.
     """
     quantity = run.results.get(name)
     if quantity is None or not abs(quantity.value) < _LARGEST:
@@ -84,7 +84,7 @@ def run_value(run: RunResult, name: str) -> RunValue | None:
 
 
 def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
-    """Take the quotient of two quantities of a run; what both share cancels as far as it is the same."""
+    """Return the quotient of two quantities of a run; equal relative errors that both share cancel."""
     top, bottom = run_value(run, above), run_value(run, below)
     if top is None or bottom is None or top.value == 0.0 or bottom.value == 0.0:
         return None
@@ -102,7 +102,7 @@ def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
 
 
 def is_fully_stated(run: RunResult, name: str) -> bool:
-    """Tell whether every source that matters for a quantity has an uncertainty."""
+    """Tell whether every source of a quantity has a stated uncertainty."""
     return not any(
         line.contribution_to == name and math.isnan(line.standard_uncertainty) for line in run.budget
     )
@@ -130,7 +130,7 @@ def _shared_by(run: RunResult, source: Source) -> str:
 
 
 def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, float]) -> float:
-    """The run's own part where its interval is wider than a normal one; 0 where it is not."""
+    """Own uncertainty of a run whose interval is wider than a normal one; 0 otherwise."""
     if not deviation < _LARGEST or deviation <= stated * (1.0 + 1e-9):
         return 0.0
     return math.sqrt(max(0.0, deviation**2 - sum(share**2 for share in common.values())))
@@ -143,25 +143,24 @@ class PooledQuantity:
     Attributes
     ----------
     quantity : Quantity
-        Weighted mean with what it is worth, errors that repeats share included.
+        Weighted mean; its uncertainty includes errors that repeats share.
     runs : int
-        How many runs determined it.
+        Number of runs that determined it.
     repeatable : float
-        Part of the standard uncertainty that repeats make smaller.
+        Part of the standard uncertainty that repeats reduce.
     common : dict of float
-        The other parts, by source and what shares it.
+        Other parts, by shared error.
     between_runs : float or None
-        Standard deviation from run to run beyond what the readings' noise explains; None without repeats.
+        Standard deviation between runs beyond the noise of the readings; None without repeats.
     scatter : float or None
         Standard deviation of the runs' values; None without repeats.
     birge_ratio : float or None
         Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that
         each run states for itself; None without repeats.
     degrees_of_freedom : float
-        Of the scatter that was taken for this series: its own, and what its contact tells of it; 0 where
-        nothing does.
+        Of the scatter used for this series: its own plus those lent by its contact; 0 without repeats.
     outliers : tuple of str
-        Runs too far from the others; they count all the same.
+        Runs too far from the others; they are not left out.
     """
 
     quantity: Quantity
@@ -180,18 +179,17 @@ def pool(
 ) -> list[PooledQuantity]:
     """Pool one quantity of several series, each with one reading at least.
 
-    Weights are the inverse of each run's own variance and that between runs. With few repeats the latter is
-    poorly known, so that series of one kind (contact) tell it together, as a share of the value if
-    `proportional`; see `scatters`. The interval has the coverage factor of Student for it, and is never
-    narrower than the runs' own uncertainties make it. What the runs share is added at its full size
-    (JCGM 100, 5.2.4).
+    Weights are the inverse sum of each run's own variance and the variance between runs. Few repeats
+    determine the latter poorly: series of one kind (contact) determine it together, relative to the value if
+    `proportional` (`estimate_scatter`). The interval has Student's coverage factor, and is never narrower
+    than the runs' own uncertainties give. Shared errors are added at full size (JCGM 100, 5.2.4).
 
     Parameters
     ----------
     series : sequence of sequence of Reading
     proportional : bool
     kinds : sequence of str, optional
-        Of each series; all are of one kind without.
+        Kind of each series; by default all are of one kind.
 
     Returns
     -------
@@ -248,14 +246,14 @@ def _pooled(
 
 
 def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:
-    """Standard deviation from run to run of this series beyond noise."""
+    """Standard deviation between runs of this series beyond noise."""
     noise = 1.0 / float(np.mean(repeats.weights(0.0)))
     run = noise + (scatter.between * float(repeats.scales[0])) ** 2
     return math.sqrt(max(0.0, scatter.factor * run - noise))
 
 
 def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[SharedError, float]:
-    """Error of the mean from each shared source: readings with the same key err alike."""
+    """Error of the mean from each shared error."""
     common: dict[SharedError, float] = {}
     for one, share in zip(readings, shares, strict=True):
         for key, deviation in one.common.items():
@@ -266,7 +264,7 @@ def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[Share
 def _half_widths(
     readings: Sequence[RunValue], stated: float, seen: float, shared: float, scatter: SeriesScatter
 ) -> tuple[float, float]:
-    """Distance of both ends of the 95 % interval from the mean."""
+    """Half widths of the 95 % interval, below and above the mean."""
     half = COVERAGE_FACTOR_95 * stated
     if scatter.degrees_of_freedom:
         half = max(half, float(stdtrit(scatter.degrees_of_freedom, 0.975)) * seen)

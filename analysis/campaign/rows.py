@@ -1,4 +1,4 @@
-"""Rows of the table: the quantities of each series, pooled over its runs."""
+"""Rows of the table: quantities of each series, pooled over its runs."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
 TABLE_VELOCITY = "table_velocity_max_m_per_s"
 _MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
 _CHANCE = 0.01
-"""That runs which differ by chance are said to disagree."""
+"""Chance that runs which agree get the warning that they differ."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -28,12 +28,12 @@ class SeriesRow:
     Attributes
     ----------
     label : str
-        The code of the series, with what tells its rows apart where it has several; unique in a campaign.
+        Code of the series, with the difference where it has several rows; unique in a campaign.
     series : SeriesKey
     quantities : dict of Pooled
         By name, for every column of the table and both bounds of f_s; absent where no run determined it.
     msk64_degree : str
-        Of the pooled v_max, with a slash between two where its interval reaches over a bound; "" without.
+        Of the pooled v_max; two with a slash where its interval crosses a bound; "" without v_max.
     runs : tuple of str
     cautions : tuple of Caution
     """
@@ -49,7 +49,7 @@ class SeriesRow:
 def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     """Pool every quantity of the series, in the order given.
 
-    Series of one contact tell together how far runs differ, all series where the stand alone decides.
+    Series of one contact share their scatter; for properties of the stand, all series do.
     """
     quantities: dict[str, dict[str, PooledQuantity]] = {each.label: {} for each in series}
     for row, column in _pooled_columns():
@@ -94,7 +94,7 @@ def _row(series: Series, quantities: dict[str, PooledQuantity]) -> SeriesRow:
 
 
 def _plate_mass(series: Series) -> PooledQuantity:
-    """Plate mass: known before any run, so that repeats say nothing of it."""
+    """Plate mass: weighed before the runs, so repeats do not reduce its uncertainty."""
     known = run_value(series.runs[0], _MASS)
     mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
     common = {} if known is None else known.common
@@ -153,7 +153,7 @@ def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWa
 
 
 def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
-    """Say in which quantities runs differ by more than their own uncertainties explain."""
+    """Warn of quantities in which runs differ by more than their own uncertainties explain."""
     found = [
         f"{row.symbol.text} (Birge ratio {pooled.birge_ratio:.1f})"
         for row, _ in table_columns()

@@ -1,4 +1,4 @@
-"""How much repeats differ beyond what their stated uncertainties explain."""
+"""Scatter between repeats beyond their stated uncertainties, and outliers."""
 
 import math
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ class RepeatedValues:
     Attributes
     ----------
     values, variances : (n,) float64
-        And the square of the standard uncertainty that each has for itself.
+        Variances are those of each run by itself.
     scales : (n,) float64
-        What a deviation between runs of size 1 means for each value.
+        Size of a unit deviation between runs, for each value.
     series : (n,) int
-        Number of the series that each belongs to, from 0 without gaps.
+        Index of the series of each value, from 0 without gaps.
     """
 
     values: Floats
@@ -37,16 +37,16 @@ class RepeatedValues:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Number of values beyond one a series."""
+        """Number of values minus number of series."""
         return len(self.values) - len(np.unique(self.series))
 
     def select(self, chosen: NDArray[np.bool_]) -> Self:
-        """Return those that are chosen."""
+        """Return the chosen values, with series numbered anew."""
         _, series = np.unique(self.series[chosen], return_inverse=True)
         return type(self)(self.values[chosen], self.variances[chosen], self.scales[chosen], series)
 
     def weights(self, between: float) -> Floats:
-        """Inverse variances (n,) where runs differ by a standard deviation of `between` scales."""
+        """Inverse variances (n,) with a standard deviation between runs of `between` scales."""
         return 1.0 / (self.variances + (between * self.scales) ** 2)
 
     def means(self, between: float) -> Floats:
@@ -61,10 +61,10 @@ class RepeatedValues:
         return np.asarray(np.bincount(self.series, self.weights(between) * deviations**2), dtype=np.float64)
 
     def between_run_deviation(self) -> float:
-        """Standard deviation between runs, in scales, that makes chi-square what it should be; 0 or above.
+        """Standard deviation between runs, in scales, at which chi-square equals its degrees of freedom.
 
-        The estimator of Mandel and Paule (Analytical Chemistry 42 (1970) 1194, and 54 (1982) 2486), with
-        the sums over all series: chi-square equals its degrees of freedom.
+        0 where the runs agree. Estimator of Mandel and Paule (Analytical Chemistry 42 (1970) 1194, and 54
+        (1982) 2486), with the sums over all series.
         """
         degrees = self.degrees_of_freedom
         if degrees == 0 or self._excess(0.0) <= 0.0:
@@ -79,27 +79,27 @@ class RepeatedValues:
 
 
 _ALIKE = 1e-6
-"""Excess of the variance of the logarithms under which all series scatter alike."""
+"""Excess variance of the logarithms below which all series count as alike."""
 _LEAST = 1e-5
-"""Of the median: smaller scatters are chance, and would rule the logarithms."""
+"""Over the median: smaller scatters are chance, and would dominate the logarithms."""
 _TRUST = 1.0
-"""Degrees of freedom that a kind may lend a series for each that tells whether series are alike."""
+"""Degrees of freedom lent by a kind, over those that estimate how alike its series are."""
 _LOG_HALVES = (-15.0, 20.0)
-"""Between which the logarithm of half the degrees of freedom lies."""
+"""Search range of the logarithm of half the degrees of freedom."""
 
 
 @dataclass(frozen=True, slots=True)
 class SeriesScatter:
-    """What is known of the differences between the runs of one series.
+    """Scatter of the runs of one series.
 
     Attributes
     ----------
     between : float
-        Standard deviation from run to run, in scales, by all series of the kind.
+        Standard deviation between runs, in scales, from all series of the kind.
     factor : float
-        What the variances with `between` are to be multiplied by for this series.
+        Multiplies the variances with `between` for this series.
     degrees_of_freedom : float
-        0 where nothing tells.
+        0 where there are no repeats.
     """
 
     between: float
@@ -110,10 +110,10 @@ class SeriesScatter:
 def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter]]:
     """Scatter of every series of each kind (contact).
 
-    Three repeats tell little of the scatter of their series, and series scatter differently: the variance of
-    each is drawn towards that of its kind, as far as the series of all kinds are alike (moderated
+    Three repeats determine the scatter of their series poorly, and series scatter differently. The variance
+    of each is drawn towards that of its kind, as far as the series of all kinds are alike (moderated
     variances: Smyth, Statistical Applications in Genetics and Molecular Biology 3 (2004) 3, section 6). The
-    degrees of freedom are those of the series, and the ones that its kind lends it.
+    degrees of freedom are those of the series plus those lent by its kind.
     """
     betweens = [repeats.between_run_deviation() for repeats in kinds]
     degrees = [np.bincount(repeats.series).astype(np.float64) - 1.0 for repeats in kinds]
@@ -131,7 +131,7 @@ def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter
 
 
 def _logs(squares: Floats, degrees: Floats) -> Floats:
-    """Logarithms of the mean squares of series with repeats, without what their degrees of freedom do."""
+    """Logarithms of the mean squares of series with repeats, free of the bias by degrees of freedom."""
     some, halves = squares[degrees > 0.0], degrees[degrees > 0.0] / 2.0
     if not some.any():
         return np.zeros(0)
@@ -144,7 +144,7 @@ def _mean(logs: Floats) -> float:
 
 
 def _lent(logs: Sequence[Floats], degrees: Sequence[Floats]) -> float:
-    """Degrees of freedom of what a kind tells of each of its series; infinite where all are alike."""
+    """Degrees of freedom lent by a kind to each series; infinite where all series are alike."""
     taken = [(some, counts) for some, counts in zip(logs, degrees, strict=True) if len(some) > 1]
     if not taken:
         return 0.0
@@ -161,7 +161,7 @@ def _lent(logs: Sequence[Floats], degrees: Sequence[Floats]) -> float:
 def _moderated(
     between: float, squares: Floats, degrees: Floats, mean_log: float, lent: float, known: int
 ) -> list[SeriesScatter]:
-    """Mean squares drawn towards that of the kind, by no more than it is `known` how alike series are."""
+    """Mean squares drawn towards that of the kind; `known` limits the weight of the kind."""
     total = float(degrees.sum())
     if total == 0.0:
         return [SeriesScatter(0.0, 1.0, 0.0)] * len(squares)
@@ -178,21 +178,20 @@ def _moderated(
 
 
 _CHANCE = 0.01
-"""That any run of a quantity is named though none is out of place."""
+"""Chance that a quantity without outliers has one named."""
 _DOUBT = 0.003
-"""Chance up to which a suspect stands out of its own series too. Where series scatter by factors of 3, one is
-named wrongly in one of six sets of 12 x 3; one 20 standard deviations off is found in 96 %."""
+"""Chance up to which a suspect is an outlier of its own series too. Where series scatter by factors of 3, one
+is named wrongly in one of six sets of 12 x 3; a run 20 standard deviations off is found in 96 %."""
 _TIE = 1e-6
+"""Relative difference of distances that rounding makes."""
 
 
 def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:
     """Tell which values (n,) lie too far from the mean of the others of their series.
 
-    The farthest is held against Student's distribution for all series' scatter without it (externally
-    studentised residual), by Bonferroni over all runs; where it is out, the search goes on without it.
-    What was found so is then held against the scatter of its own series without it, as far as it differs
-    from that of the others (`scatters`). Of two runs that differ, nobody can tell which is wrong: both are
-    named.
+    The farthest value is tested by its externally studentised residual, with Bonferroni's correction over
+    all runs. If it is an outlier, the search continues without it. Each suspect is then tested against the
+    scatter of its own series (`estimate_scatter`). Of two runs that differ, both are named.
     """
     suspects = _suspects(repeats)
     far = np.zeros(len(suspects), dtype=bool)
@@ -202,7 +201,7 @@ def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:
 
 
 def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
-    """Values that lie too far if all series scatter alike."""
+    """Values that are outliers if all series scatter alike."""
     far = np.zeros(len(repeats.values), dtype=bool)
     while True:
         places = np.flatnonzero(~far)
@@ -217,7 +216,7 @@ def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
 
 
 def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], place: int) -> float:
-    """Chance of a value so far from its mates, by the scatter that these and the other series show."""
+    """Chance of a value so far from the others of its series, by the scatter of all series."""
     mates = (repeats.series == repeats.series[place]) & ~suspects
     if not mates.any():  # two runs that differ: each is held against the other
         mates = (repeats.series == repeats.series[place]) & (np.arange(len(suspects)) != place)
@@ -236,12 +235,12 @@ def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], pla
 
 
 def _stated_fraction(repeats: RepeatedValues, weights: Floats, place: int) -> float:
-    """What the run's stated variance is of the one that its weight stands for: scatter is no less."""
+    """Stated variance of a run over that of its weight: a lower bound of the scatter factor."""
     return float(repeats.variances[place] * weights[place])
 
 
 def _distances(repeats: RepeatedValues) -> Floats:
-    """Distance of each value from its series' mean over its standard deviation; 0 where it is alone."""
+    """Distance of each value from the mean of its series in standard deviations; 0 for a single run."""
     between = repeats.between_run_deviation()
     weights = repeats.weights(between)
     left = 1.0 / weights - 1.0 / np.bincount(repeats.series, weights)[repeats.series]
@@ -251,7 +250,7 @@ def _distances(repeats: RepeatedValues) -> Floats:
 
 
 def _is_outlier(repeats: RepeatedValues, place: int, count: int) -> bool:
-    """Hold one value against the mean of the others of its series, and the scatter of all others."""
+    """Test one value against the mean of the others of its series, and the scatter of all others."""
     others = np.arange(len(repeats.values)) != place
     rest = repeats.select(others)
     degrees = rest.degrees_of_freedom

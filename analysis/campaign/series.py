@@ -1,4 +1,4 @@
-"""What a campaign takes: the result of one run, and the series that it belongs to."""
+"""Input of a campaign: results of runs, grouped into series, with warnings about runs that do not fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from messages.message import message
 
 @dataclass(frozen=True, slots=True)
 class SeriesKey:
-    """What is the same in all repeats of a series.
+    """Properties that all repeats of a series have in common.
 
     Attributes
     ----------
     code : str
         As in the paper, for example "1FFM0"; "" for runs without a series.
     contact : str
-        Code of what rubs on what, for example "FF", or any other name; "" where it is not known.
+        Code of the pair of surfaces, for example "FF", or any other name; "" where unknown.
     pullback_m : float or None
-        Nominal; None where it is not known.
+        Nominal; None where unknown.
     plate_mass_kg, table_mass_kg : float
         m2 with its added mass, and m1.
     """
@@ -40,7 +40,7 @@ class SeriesKey:
 
     @property
     def sort_key(self) -> tuple[bool, str, float, float, float, str]:
-        """Sorts as the paper's table does: by contact, pullback from large to small, then plate mass."""
+        """Order of the paper's table: contact, pullback from large to small, plate mass."""
         pullback = 0.0 if self.pullback_m is None else self.pullback_m
         return (
             not self.contact,
@@ -54,7 +54,7 @@ class SeriesKey:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunResult:
-    """What a campaign takes of one run.
+    """Result of one run.
 
     Attributes
     ----------
@@ -62,21 +62,21 @@ class RunResult:
         Path or label of the run.
     series : SeriesKey
     results : dict of Quantity
-        By the names of INTERFACE; what could not be determined is absent. `plate_mass_kg` may be among them.
+        By name; absent where undetermined. `plate_mass_kg` may be among them.
     budget : tuple of BudgetLine
-        All lines of all results.
+        Lines of all results.
     calibration : str
-        Identity of the gauges' calibrations: runs with the same one share its errors.
+        Runs with the same calibrations share their errors.
     stand : str
-        Identity of the stand: runs with the same one share the errors of its masses, gravity and clock.
+        Runs on the same stand share the errors of masses, gravity and clock.
     adequate : bool or None
-        Whether the friction law explains the record; None where no law was fitted.
+        The friction law explains the record; None where no law was fitted.
     msk64_degree : str
-        "" where it is not known.
+        "" where unknown.
     excluded : str
         Why the run does not count; "" when it does.
     cautions : tuple of Caution
-        What was said of this run.
+        Of the analysis of this run.
     """
 
     name: str
@@ -92,9 +92,9 @@ class RunResult:
 
 
 _SAME_MASS = 1e-3
-"""Relative difference up to which masses count as the same."""
+"""Relative difference up to which masses are equal: they are weighed to some grams."""
 _NAMED = 5
-"""Runs that a message names; more are counted."""
+"""Runs named in a message; further ones are counted."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,8 +109,8 @@ class Series:
 def group_into_series(runs: Sequence[RunResult]) -> list[Series]:
     """Sort runs into series, in the paper's order.
 
-    A series is its code; runs without one are sorted by contact, pullback and masses. Runs of one code
-    that contradict each other in these are not the same test: they get a row each, named by the difference.
+    Runs of one code form a series; runs without a code are grouped by contact, pullback and masses. Runs of
+    one code that differ in these get a row each, labelled with the difference.
     """
     codes: dict[str, list[list[RunResult]]] = {}
     for run in runs:
@@ -129,7 +129,7 @@ def group_into_series(runs: Sequence[RunResult]) -> list[Series]:
 
 
 def campaign_warnings(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[ResultWarning]:
-    """Say what the runs of a campaign leave in doubt, and what to do."""
+    """Return warnings about calibrations, missing series and unknown contacts."""
     found = [_calibrations(runs), _without_series(runs), *_unknown_contacts(runs, known_contacts)]
     return [caution for caution in found if caution is not None]
 
@@ -152,7 +152,7 @@ def _same(one: SeriesKey, other: SeriesKey) -> bool:
 
 
 def _distinction(key: SeriesKey, groups: Sequence[Sequence[RunResult]]) -> str:
-    """What tells the runs of one label apart, as ` (m2 = 42.4 kg)`; "" where nothing does."""
+    """Difference between the runs of one label, as ` (m2 = 42.4 kg)`; "" without any."""
     keys = [group[0].series for group in groups]
     facts = (
         (f"m2 = {key.plate_mass_kg:g} kg", {other.plate_mass_kg for other in keys}),
