@@ -13,7 +13,7 @@ from analysis.calibration.known_displacement import (
     ReferenceDisplacement,
     check_displacement,
 )
-from app.acquisition.gauge_samples import AveragedCounts
+from app.acquisition.averaged_counts import AveragedCounts
 from config.schema import Gauge, GaugeCheck
 
 

@@ -1,179 +1,17 @@
-"""What a gauge shows while nothing moves: counts averaged over a window, for a calibration or a check."""
+"""Samples of both gauges over a time, for the judgement of their health."""
 
-import threading
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from types import TracebackType
-from typing import Protocol, Self
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.gauge_health import GaugeSamples
+from app.acquisition.averaged_counts import OVERLOAD_FLAGS, TIMEOUT_S, SampleStream
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import CalibratedBlock
-from app.acquisition.stream.reads import DecodedRead
 from config.schema import Gauges
-from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
-
-_PATIENCE_S = 5.0
-_STALE_S = 0.1
-"""What was sent before it was asked for may still be under way."""
-_OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
-_SOUND_SHARE = 0.5
-
-
-_STEADY = 6.0
-
-
-@dataclass(frozen=True, slots=True)
-class AveragedCounts:
-    """Counts of one gauge over a window.
-
-    Attributes
-    ----------
-    counts, noise_counts : float
-        Mean, and standard deviation of a sample.
-    samples : int
-    creep_counts : float
-        Mean of the second half minus that of the first.
-    """
-
-    counts: float
-    noise_counts: float
-    samples: int
-    creep_counts: float
-
-    @property
-    def is_steady(self) -> bool:
-        """Whether noise alone explains the difference of the halves."""
-        return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
-
-
-def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
-    """Average of the samples (n,) of a window, n >= 2."""
-    half = len(counts) // 2
-    creep = float(counts[half:].mean() - counts[:half].mean())
-    return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
-
-
-class NoAverageError(AcquisitionError):
-    """A window that gives no average."""
-
-
-class SampleStream(Protocol):
-    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
-
-    @property
-    def rate_hz(self) -> float:
-        """Nominal samples a second."""
-
-    def next_read(self, timeout_s: float) -> DecodedRead | None:
-        """What was read since the last call."""
-
-
-class CountAverager:
-    """Reads a stream in a thread of its own, so that none of it is lost meanwhile; use it with `with`.
-
-    Parameters
-    ----------
-    stream : Stream
-        Open; not closed here.
-    channel : int
-        0 for gauge 1, 1 for gauge 2.
-    """
-
-    def __init__(self, stream: SampleStream, channel: int) -> None:
-        self._stream = stream
-        self._channel = channel
-        self._flag = int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])
-        self._changed = threading.Condition()
-        self._taken: list[NDArray[np.float64]] | None = None
-        self._unsound = 0
-        self._fault: Exception | None = None
-        self._leaving = False
-        self._thread = threading.Thread(target=self._read, name="settled counts", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._leaving = True
-        self._thread.join()
-
-    def average(self, window_s: float) -> AveragedCounts:
-        """Average of the samples from now on.
-
-        Raises
-        ------
-        UnsettledError
-            Samples stay away, or under half of them are sound.
-        AcquisitionError, DriverError
-            The stream has ended.
-        """
-        stale, wanted = (round(span_s * self._stream.rate_hz) for span_s in (_STALE_S, window_s))
-        enough = stale + max(wanted, 2)
-        with self._changed:
-            self._taken, self._unsound = [], 0
-            came = self._changed.wait_for(
-                lambda: self._fault is not None or self._seen() >= enough, window_s + _PATIENCE_S
-            )
-            taken, self._taken = self._taken, None
-        if self._fault is not None:
-            raise self._fault
-        if not came:
-            raise NoAverageError(
-                f"only {sum(map(len, taken))} samples came in {window_s + _PATIENCE_S:g} s. Check cable,"
-                " power and rate of the device"
-            )
-        sound = np.concatenate(taken)[stale:]
-        if len(sound) < max(_SOUND_SHARE * wanted, 2):
-            raise NoAverageError(
-                f"gauge {self._channel + 1} is overloaded or its samples are damaged: {self._unsound} of"
-                f" {self._unsound + sum(map(len, taken))}. Move it back into its range, or check the cable"
-            )
-        return compute_average(sound)
-
-    def steady_average(
-        self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
-    ) -> AveragedCounts:
-        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
-        for _ in range(windows - 1):
-            average = self.average(window_s)
-            if average.is_steady:
-                return average
-            on_unsteady(average)
-        return self.average(window_s)
-
-    def _seen(self) -> int:
-        return self._unsound + sum(map(len, self._taken or []))
-
-    def _read(self) -> None:
-        try:
-            while not self._leaving:
-                chunk = self._stream.next_read(0.05)
-                if chunk is not None:
-                    self._take(chunk)
-        except Exception as error:  # whoever waits for an average must hear of it
-            with self._changed:
-                self._fault = error
-                self._changed.notify_all()
-
-    def _take(self, chunk: DecodedRead) -> None:
-        with self._changed:
-            if self._taken is None:
-                return
-            for rows in chunk.rows:
-                sound = (rows.status & self._flag) == 0
-                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
-                self._unsound += int(np.count_nonzero(~sound))
-            self._changed.notify_all()
-
 
 GaugePair = tuple[GaugeSamples, GaugeSamples]
 
@@ -193,12 +31,12 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
         The stream has ended.
     """
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
-    ends_s = time.monotonic() + seconds + _PATIENCE_S
+    ends_s = time.monotonic() + seconds + TIMEOUT_S
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
             raise NoSamplesError(
                 f"only {sum(map(len, taken))} of {wanted} samples came in"
-                f" {seconds + _PATIENCE_S:g} s. Check"
+                f" {seconds + TIMEOUT_S:g} s. Check"
                 " cable, power and rate of the device"
             )
         chunk = stream.next_read(0.1)
@@ -221,7 +59,7 @@ def _pair(
     table, relative = (
         GaugeSamples(displacement_m, (status & flag) != 0, rate_hz, gauge.range_m)
         for displacement_m, flag, gauge in zip(
-            readings, _OVERLOADS, (gauges.table, gauges.relative), strict=True
+            readings, OVERLOAD_FLAGS, (gauges.table, gauges.relative), strict=True
         )
     )
     return table, relative

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, cast
 import typer
 
 from analysis.calibration.known_displacement import DisplacementCheck
+from app.acquisition.averaged_counts import AveragedCounts, CountAverager
 from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
-from app.acquisition.gauge_samples import AveragedCounts, CountAverager
 from app.acquisition.run_setup import complete_port_settings
 from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.calibration.points import CalibrationPoints
-from app.acquisition.gauge_samples import AveragedCounts, CountAverager, NoAverageError
+from app.acquisition.averaged_counts import AveragedCounts, CountAverager, NoAverageError
 from app.acquisition.messages import PortSettings
 from app.acquisition.run_setup import complete_port_settings
 from app.acquisition.stream.live_stream import open_stream

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from analysis.formatting import typeset, with_unit
-from app.acquisition.gauge_samples import AveragedCounts
+from app.acquisition.averaged_counts import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples, average_counts
 from app.presenters.gauges.state import (

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from analysis.formatting import typeset, with_unit
-from app.acquisition.gauge_samples import AveragedCounts
+from app.acquisition.averaged_counts import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples
 from app.presenters.gauges.state import CONNECTION_LOST, NO_DEVICE, CheckForm, CheckKind, CheckState

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.formatting import typeset
-from app.acquisition.gauge_samples import AveragedCounts, compute_average
+from app.acquisition.averaged_counts import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus

@@ -4,7 +4,7 @@ import datetime
 from dataclasses import dataclass
 from typing import Final
 
-from app.acquisition.gauge_samples import AveragedCounts
+from app.acquisition.averaged_counts import AveragedCounts
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.state import CalibrationPoint, CheckForm, LabelledValue
 from app.presenters.worker import LazyFunction

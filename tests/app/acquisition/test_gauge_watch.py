@@ -46,7 +46,7 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gauge_samples, "_PATIENCE_S", -0.95)
+    monkeypatch.setattr(gauge_samples, "TIMEOUT_S", -0.95)
     with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
         collect_samples(FakeStream(10), 1.0, load_gauges())
 

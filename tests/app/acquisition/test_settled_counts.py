@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from app.acquisition.averaged_counts import CountAverager, NoAverageError, compute_average
 from app.acquisition.errors import StreamEndedError
-from app.acquisition.gauge_samples import CountAverager, NoAverageError, compute_average
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import calibrate
 from app.acquisition.stream.reads import DecodedRead
