@@ -1,11 +1,26 @@
 """Where a screen can lead: implemented by the window presenter."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.acquisition.messages import PortSettings
-from app.presenters.start.state import ConnectForm
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectForm:
+    """Form of the Start screen, as typed."""
+
+    port: str = ""
+    protocol: str = ""
+    baud: str = ""
+    rate_hz: str = ""
+    parity: str = "N"
+    settings: str = ""
+    """Settings of the device, `KEY=VALUE KEY=VALUE`."""
+    relative_port: str = ""
+    """Port of gauge 2 if each gauge has a device of its own."""
 
 
 class Navigator(Protocol):

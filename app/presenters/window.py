@@ -15,6 +15,7 @@ from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import IdentifyTask
+from app.presenters.navigator import ConnectForm
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Connecting,
@@ -32,7 +33,7 @@ from app.presenters.runs.state import RunFilter
 from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
-from app.presenters.start.state import ConnectForm, PortChoice, StartState
+from app.presenters.start.state import PortChoice, StartState
 from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings

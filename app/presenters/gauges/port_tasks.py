@@ -7,7 +7,7 @@ from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.state import PortCard
-from app.presenters.start.state import ConnectForm
+from app.presenters.navigator import ConnectForm
 from app.presenters.worker import ReportProgress
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, list_ports

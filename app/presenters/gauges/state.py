@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip
-from app.presenters.start.state import ConnectForm
+from app.presenters.navigator import ConnectForm
 from messages.i18n import N_
 
 if TYPE_CHECKING:  # its import loads `analysis`, which the window does without until it has started

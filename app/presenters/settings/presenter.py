@@ -12,34 +12,34 @@ from config.schema import ConfigError, Settings
 from messages.i18n import gettext
 
 _AT_START = ("language", "scale", "recordings")
-"""What only holds from the next start on."""
+"""Settings that take effect after a restart."""
 
 
 class SettingsStore(Protocol):
-    """Where settings are kept."""
+    """Storage of settings."""
 
     def save(self, settings: Settings) -> Path | None:
-        """Keep them; returns what an unreadable file was put aside as. Raises ConfigError."""
+        """Save settings; return the backup of an unreadable file, if there was one. Raises ConfigError."""
 
 
 class NullStore:
-    """Keeps nothing."""
+    """Storage that saves nothing."""
 
     def save(self, _settings: Settings) -> None:
-        """Do nothing."""
+        """Save nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonalSettings:
-    """What the window takes from a person's settings when it starts.
+    """Personal settings at the start of the window.
 
     Attributes
     ----------
     settings : Settings
     fault : str
-        Why the defaults are used instead of what was kept; empty where all is well.
-    recordings, overridden : str
-        The folder in use, and what else than the settings says so.
+        Why the defaults are used; empty if the settings were read.
+    recordings, override : str
+        The folder in use, and the environment variable that sets it.
     files : tuple of SettingsFile
     store : Store
     """
@@ -53,13 +53,13 @@ class PersonalSettings:
 
 
 class SettingsPresenter(Presenter[SettingsState]):
-    """A person's choices.
+    """Changes personal settings.
 
     Parameters
     ----------
     personal : Personal
     apply : callable
-        Lets the rest of the window take new settings.
+        Applies new settings to the window.
     """
 
     def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
@@ -72,7 +72,7 @@ class SettingsPresenter(Presenter[SettingsState]):
         self._before: list[Settings] = []
 
     def change(self, **changes: Any) -> None:
-        """Give fields of `Settings` new values; what cannot be is said and leaves all as it was."""
+        """Set fields of `Settings`; an invalid value changes nothing."""
         before = self.state.settings
         try:
             if folder := changes.get("recordings"):
@@ -83,34 +83,34 @@ class SettingsPresenter(Presenter[SettingsState]):
             return
         if settings != before:
             self._before.append(before)
-            self._take(settings)
+            self._apply_settings(settings)
 
     def undo(self) -> None:
-        """Take the last change back."""
+        """Undo the last change."""
         if self._before:
-            self._take(self._before.pop())
+            self._apply_settings(self._before.pop())
 
-    def _take(self, settings: Settings) -> None:
+    def _apply_settings(self, settings: Settings) -> None:
         waits = any(getattr(settings, name) != getattr(self._at_start, name) for name in _AT_START)
         self._update(
-            settings=settings, needs_restart=waits, can_undo=bool(self._before), message=self._keep(settings)
+            settings=settings, needs_restart=waits, can_undo=bool(self._before), message=self._save(settings)
         )
         self._apply(settings)
 
-    def _keep(self, settings: Settings) -> Chip:
+    def _save(self, settings: Settings) -> Chip:
         try:
-            aside = self._store.save(settings)
+            backup = self._store.save(settings)
         except ConfigError as error:
             return Chip(sentence(str(error)), Tone.BAD)
-        if aside is None:
+        if backup is None:
             return EMPTY_CHIP
         return Chip(
-            gettext("The file before could not be read. It is kept as {name}", name=aside.name), Tone.WARN
+            gettext("The file before could not be read. It is kept as {name}", name=backup.name), Tone.WARN
         )
 
 
 def _check_folder(folder: str) -> None:
-    """Refuse what cannot become a folder of runs. Raises ConfigError."""
+    """Check a folder of runs. Raises ConfigError."""
     path = Path(folder).expanduser()
     if not path.is_absolute():
         raise ConfigError(

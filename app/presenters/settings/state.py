@@ -1,7 +1,6 @@
-"""What the settings page shows, as values."""
+"""The Settings screen: state and presenter. Each change is applied and saved at once, and can be undone."""
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from config.schema import Settings
@@ -18,12 +17,12 @@ SCALES = (1.0, 1.25, 1.5, 1.75, 2.0)
 
 @dataclass(frozen=True, slots=True)
 class SettingsFile:
-    """A file that settings come from.
+    """A settings file.
 
     Attributes
     ----------
     name : str
-        What it holds.
+        Its content, as a label.
     path : str
     """
 
@@ -33,22 +32,21 @@ class SettingsFile:
 
 @dataclass(frozen=True, slots=True)
 class SettingsState:
-    """The whole page.
+    """State of the screen.
 
     Attributes
     ----------
     settings : Settings
     recordings : str
-        Folder of the runs that is in use since the start of the window.
-    overridden : str
-        What sets the folder whatever is chosen here; empty when nothing does.
+        Folder of the runs that is in use.
+    override : str
+        Environment variable that overrides the setting; empty if none does.
     files : tuple of SettingsFile
-    waits : bool
-        Something chosen only holds from the next start on.
-    undo : bool
-        A change can be taken back.
+    needs_restart : bool
+        Whether a change takes effect after a restart.
+    can_undo : bool
     message : Chip
-        What came of the last change.
+        Fault of the last change.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -58,13 +56,3 @@ class SettingsState:
     needs_restart: bool = False
     can_undo: bool = False
     message: Chip = EMPTY_CHIP
-
-
-class SettingsEvents(Protocol):
-    """What the settings page tells its presenter."""
-
-    def change(self, **changes: object) -> None:
-        """Give fields of `Settings` new values."""
-
-    def undo(self) -> None:
-        """Take the last change back."""

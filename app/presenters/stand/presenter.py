@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 
 import msgspec
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
+from app.presenters.connection import Simulation
 from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import format_fixed, format_millimetres, parse_number
 from app.presenters.results import sentence
@@ -19,33 +20,24 @@ from config.files import published_row
 from drivers.errors import SettingsError
 from messages.i18n import gettext
 
-_LISTED: Final = 8
+_MAX_LISTED: Final = 8
+"""Injected faults on the screen: more do not fit into the lowest window."""
 _TRUTH_EVERY: Final = 30
-"""Ticks between two looks at the truth."""
-
-
-class RunningStand(Protocol):
-    """A simulated stand that runs."""
-
-    def truth(self) -> Truth:
-        """What is true of it."""
-
-    def disturb(self, text: str) -> None:
-        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+"""Ticks between two updates of the truth: about half a second."""
 
 
 class StandPresenter(Presenter[StandState]):
-    """The simulated stand.
+    """Starts and disturbs the simulated stand.
 
     Parameters
     ----------
     options : SimulatedStandOptions
-        What is not on the screen, and what an empty field stands for.
+        Defaults, and options that are not on the screen.
     all_series : tuple of str
     open_stand : callable
         Starts a stand and connects to it.
     running : callable
-        The stand that is connected; None where none is.
+        Returns the connected stand, or None.
     """
 
     def __init__(
@@ -53,23 +45,21 @@ class StandPresenter(Presenter[StandState]):
         options: SimulatedStandOptions,
         all_series: tuple[str, ...],
         open_stand: Callable[[SimulatedStandOptions], None],
-        running: Callable[[], RunningStand | None],
+        running: Callable[[], Simulation | None],
     ) -> None:
         form = StandForm(options.series)
-        super().__init__(StandState(all_series, form, _usual(options, form)))
+        super().__init__(StandState(all_series, form, _default_form(options, form)))
         self._options = options
         self._open_stand = open_stand
         self._running = running
         self._ticks = 0
 
-    # --- what the operator does ---
-
     def set_form(self, form: StandForm) -> None:
-        """Take what was filled in."""
-        self._update(form=form, defaults=_usual(self._options, form), message=EMPTY_CHIP)
+        """Replace the form."""
+        self._update(form=form, defaults=_default_form(self._options, form), message=EMPTY_CHIP)
 
     def start(self) -> None:
-        """Start a stand that is so, and connect to it."""
+        """Start a stand with these options, and connect to it."""
         try:
             options = stand_options(self.state.form, self._options)
         except ValueError as error:
@@ -78,11 +68,11 @@ class StandPresenter(Presenter[StandState]):
             self._open_stand(options)
 
     def set_fault_duration(self, seconds: str) -> None:
-        """How long the next fault lasts."""
+        """Set the duration of the next fault."""
         self._update(fault_duration_s=seconds, message=EMPTY_CHIP)
 
     def inject_fault(self, kind: str) -> None:
-        """Let a fault happen now."""
+        """Inject a fault now."""
         stand = self._running()
         if stand is None:
             self._update(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
@@ -95,15 +85,13 @@ class StandPresenter(Presenter[StandState]):
         else:
             self._update(message=EMPTY_CHIP)
 
-    # --- what happens elsewhere ---
-
     def select_series(self, series: str) -> SimulatedStandOptions:
-        """A stand without faults that runs a series, as the start page offers it."""
+        """Select a series; return options without faults, for the Start screen."""
         self.set_form(replace(self.state.form, series=series))
         return msgspec.structs.replace(self._options, series=series)
 
     def tick(self) -> None:
-        """Look at the truth now and then."""
+        """Update the truth now and then."""
         self._ticks = (self._ticks + 1) % _TRUTH_EVERY
         stand = self._running()
         if self._ticks and (stand is not None) == self.state.is_running:
@@ -116,7 +104,7 @@ class StandPresenter(Presenter[StandState]):
 
 
 def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
-    """The stand that was filled in. Raises ValueError that names field, value and remedy."""
+    """Options of a form. Raises ValueError that names field, value and remedy."""
     wanted = {
         "friction": _number(form.friction, gettext("Friction")),
         "tilt_rad": _scaled(form.tilt_mrad, gettext("Tilt"), 1e3),
@@ -130,7 +118,7 @@ def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStan
 
 
 def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
-    """What is true of a stand and of its wire."""
+    """True parameters of a stand, and counts of its transmission."""
     stand, wire = truth.stand, truth.wire
     releases = str(len(truth.release_s))
     if truth.release_s:
@@ -159,15 +147,15 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
 
 def _happened(truth: Truth) -> tuple[str, ...]:
     lines = []
-    for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
+    for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_MAX_LISTED]:
         length = gettext("for ever") if one.seconds is None else with_unit(typeset(f"{one.seconds:g}"), "s")
         at = with_unit(f"{one.at_s or 0.0:.1f}", "s")
         lines.append(gettext("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
     return tuple(lines)
 
 
-def _usual(options: SimulatedStandOptions, form: StandForm) -> StandForm:
-    """What each empty field stands for."""
+def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
+    """Defaults of the form."""
     friction = options.friction
     if friction is None:
         friction = published_row(form.series).friction_dynamic
@@ -183,13 +171,13 @@ def _usual(options: SimulatedStandOptions, form: StandForm) -> StandForm:
 
 
 def _scaled(text: str, name: str, parts: float) -> float | None:
-    """Read a number that is written in so many parts of its unit."""
+    """Parse a number in `parts` per unit."""
     value = _number(text, name)
     return None if value is None else value / parts
 
 
 def _number(text: str, name: str) -> float | None:
-    """Read a number; None where nothing was filled in. A decimal comma is one too."""
+    """Parse a number; None for an empty text. Raises ValueError."""
     value = parse_number(text)
     if value is not None and math.isnan(value):
         raise ValueError(

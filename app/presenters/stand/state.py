@@ -1,7 +1,6 @@
-"""What the Simulated stand screen shows, as values."""
+"""The Simulated stand screen: state and presenter. Options before the start, faults and truth after it."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.gauges.state import LabelledValue
@@ -9,7 +8,7 @@ from app.presenters.gauges.state import LabelledValue
 
 @dataclass(frozen=True, slots=True)
 class StandForm:
-    """What the operator has filled in, as typed; an empty field takes what is usual."""
+    """Options as typed; an empty field takes the default."""
 
     series: str
     friction: str = ""
@@ -22,24 +21,23 @@ class StandForm:
 
 @dataclass(frozen=True, slots=True)
 class StandState:
-    """The whole screen.
+    """State of the screen.
 
     Attributes
     ----------
     all_series : tuple of str
     form : StandForm
-    usual : StandForm
-        What an empty field stands for.
-    runs : bool
-        The simulated stand is what is connected.
-    seconds : str
-        How long a fault lasts, as typed.
-    truth : tuple of Fact
-        Of the stand that runs.
-    happened : tuple of str
-        Faults on demand, the newest first.
+    defaults : StandForm
+    is_running : bool
+        Whether the simulated stand is connected.
+    fault_duration_s : str
+        Duration of the next fault, as typed.
+    truth : tuple of LabelledValue
+        True parameters of the running stand.
+    disturbances : tuple of str
+        Injected faults, the newest first.
     message : Chip
-        What is wrong with what was filled in or asked for.
+        What is wrong with the last input.
     """
 
     all_series: tuple[str, ...]
@@ -50,19 +48,3 @@ class StandState:
     truth: tuple[LabelledValue, ...] = ()
     disturbances: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
-
-
-class StandEvents(Protocol):
-    """What the Simulated stand screen tells its presenter."""
-
-    def set_form(self, form: StandForm) -> None:
-        """Take what was filled in."""
-
-    def start(self) -> None:
-        """Start a stand that is so, and connect to it."""
-
-    def set_fault_duration(self, seconds: str) -> None:
-        """How long the next fault lasts."""
-
-    def inject_fault(self, kind: str) -> None:
-        """Let a fault happen now."""

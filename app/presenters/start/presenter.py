@@ -2,38 +2,23 @@
 
 import math
 from collections.abc import Callable
-from typing import Protocol
 
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
-from app.presenters.start.state import ConnectForm, PortChoice, StartState
+from app.presenters.navigator import ConnectForm, Navigator
+from app.presenters.number_text import parse_number
+from app.presenters.start.state import PortChoice, StartState
 from messages.i18n import gettext
 
 
-class Navigator(Protocol):
-    """Where the start page leads."""
-
-    def open_simulated(self, series: str) -> None:
-        """Start the simulated stand and record from it."""
-
-    def open_port(self, port: PortSettings) -> None:
-        """Record from an amplifier."""
-
-    def close_connection(self) -> None:
-        """Let go of what is connected."""
-
-    def open_run(self, path: str) -> None:
-        """Show a recording."""
-
-
 class StartPresenter(Presenter[StartState]):
-    """The first page.
+    """Checks the form, and opens connections and runs.
 
     Parameters
     ----------
     state : StartState
-        What can be chosen, and what is chosen at first.
-    doors : Doors
+        Initial state.
+    navigator : Navigator
     ports : callable
         Lists the serial ports of this computer.
     """
@@ -42,29 +27,29 @@ class StartPresenter(Presenter[StartState]):
         self, state: StartState, navigator: Navigator, ports: Callable[[], tuple[PortChoice, ...]]
     ) -> None:
         super().__init__(state)
-        self._navigator = navigator
+        self.navigator = navigator
         self._ports = ports
 
     def set_series(self, code: str) -> None:
-        """Series that the simulated stand shall run."""
+        """Select the series of the simulated stand."""
         if code in self.state.all_series:
             self._update(series=code)
 
     def start_simulation(self) -> None:
         """Start the simulated stand and connect to it."""
         if not self.state.busy:
-            self._navigator.open_simulated(self.state.series)
+            self.navigator.open_simulated(self.state.series)
 
     def refresh_ports(self) -> None:
-        """Look for ports again."""
+        """List the ports again."""
         self._update(ports=self._ports())
 
     def set_form(self, form: ConnectForm) -> None:
-        """Take what the operator filled in."""
+        """Replace the form."""
         self._update(form=form, form_error="")
 
     def connect(self) -> None:
-        """Connect to the amplifier as filled in, or say what is wrong with it."""
+        """Connect to the amplifier, or say what is wrong with the form."""
         if self.state.busy:
             return
         try:
@@ -72,28 +57,24 @@ class StartPresenter(Presenter[StartState]):
         except ValueError as error:
             self._update(form_error=str(error))
         else:
-            self._navigator.open_port(port)
-
-    def disconnect(self) -> None:
-        """Let go of what is connected."""
-        self._navigator.close_connection()
+            self.navigator.open_port(port)
 
     def open_run(self, path: str) -> None:
         """Open a run file."""
         if path:
-            self._navigator.open_run(path)
+            self.navigator.open_run(path)
 
     def set_busy(self, what: str) -> None:
-        """Say what is being waited for; empty when nothing."""
+        """Show the work in progress; empty for none."""
         self._update(busy=what)
 
     def set_connected(self, device: str) -> None:
-        """Say what is connected; empty when nothing."""
+        """Show the connected device; empty for none."""
         self._update(connected=device, busy="")
 
 
 def port_settings(form: ConnectForm) -> PortSettings:
-    """Check what was filled in. Raises ValueError that names field, value and remedy."""
+    """Settings of a port. Raises ValueError that names field, value and remedy."""
     if not form.port.strip():
         raise ValueError(gettext("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port"))
     return PortSettings(
@@ -133,13 +114,10 @@ def _whole(text: str, name: str) -> int | None:
 
 
 def _number(text: str, name: str) -> float | None:
-    """Read a positive number; None where nothing was filled in. A decimal comma is one too."""
-    if not text.strip():
+    """Parse a positive number; None for an empty text. Raises ValueError."""
+    value = parse_number(text)
+    if value is None:
         return None
-    try:
-        value = float(text.strip().replace(",", "."))
-    except ValueError:
-        value = math.nan
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(
             gettext(

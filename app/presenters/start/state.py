@@ -1,7 +1,8 @@
-"""What the start page shows, as values."""
+"""The Start screen: state and presenter. Connects to the simulated stand or an amplifier, or opens a run."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+
+from app.presenters.navigator import ConnectForm
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,39 +15,24 @@ class PortChoice:
 
 @dataclass(frozen=True, slots=True)
 class ProtocolChoice:
-    """A device's language."""
+    """A protocol that devices speak."""
 
     name: str
     title: str
     default_baud: int | None = None
     verified: str = ""
-    """Against what it was tested."""
-
-
-@dataclass(frozen=True, slots=True)
-class ConnectForm:
-    """What the operator has filled in, as typed."""
-
-    port: str = ""
-    protocol: str = ""
-    baud: str = ""
-    rate_hz: str = ""
-    parity: str = "N"
-    settings: str = ""
-    """The device's own, `KEY=VALUE KEY=VALUE`."""
-    relative_port: str = ""
-    """Of gauge 2, where each gauge has a device of its own."""
+    """How it was verified."""
 
 
 @dataclass(frozen=True, slots=True)
 class StartState:
-    """The whole page. `busy` says what is being waited for; `connected` what is connected already."""
+    """State of the screen. `busy` names the work in progress, `connected` the connected device."""
 
     all_series: tuple[str, ...]
     series: str
     protocols: tuple[ProtocolChoice, ...] = ()
     ports: tuple[PortChoice, ...] = ()
-    form: ConnectForm = ConnectForm()
+    form: ConnectForm = field(default_factory=ConnectForm)
     form_error: str = ""
     recordings: str = ""
     busy: str = ""
@@ -54,30 +40,5 @@ class StartState:
 
     @property
     def selected_protocol(self) -> ProtocolChoice | None:
-        """The protocol that is filled in, if it is one."""
+        """Protocol of the form; None if it is unknown."""
         return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
-
-
-class StartEvents(Protocol):
-    """What the start page tells its presenter."""
-
-    def set_series(self, code: str) -> None:
-        """Series that the simulated stand shall run."""
-
-    def start_simulation(self) -> None:
-        """Start the simulated stand and connect to it."""
-
-    def refresh_ports(self) -> None:
-        """Look for ports again."""
-
-    def set_form(self, form: ConnectForm) -> None:
-        """Take what the operator filled in."""
-
-    def connect(self) -> None:
-        """Connect to the amplifier as filled in."""
-
-    def disconnect(self) -> None:
-        """Let go of what is connected."""
-
-    def open_run(self, path: str) -> None:
-        """Open a run file."""

@@ -17,11 +17,11 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
+from app.presenters.settings.presenter import SettingsPresenter
 from app.presenters.settings.state import (
     LANGUAGES,
     SCALES,
     THEMES,
-    SettingsEvents,
     SettingsFile,
     SettingsState,
 )
@@ -38,14 +38,14 @@ _WIDTH = 760
 class SettingsScreen(QWidget):
     """Draws `SettingsState`."""
 
-    def __init__(self, events: SettingsEvents) -> None:
+    def __init__(self, presenter: SettingsPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._state = SettingsState()
-        self._theme = _choice(THEMES, lambda name: events.change(theme=name))
-        self._language = _choice(LANGUAGES, lambda name: events.change(language=name))
+        self._theme = _choice(THEMES, lambda name: presenter.change(theme=name))
+        self._language = _choice(LANGUAGES, lambda name: presenter.change(language=name))
         self._scale = _choice(
-            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: events.change(scale=scale)
+            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: presenter.change(scale=scale)
         )
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
@@ -99,22 +99,22 @@ class SettingsScreen(QWidget):
         dialog = QFileDialog(self, gettext("Folder of the runs"), self._state.recordings)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(lambda path: self._events.change(recordings=path))
+        dialog.fileSelected.connect(lambda path: self._presenter.change(recordings=path))
         dialog.open()
 
     def _write_folder(self) -> None:
         """Take the folder as written; where it cannot be, the field gets its old text back."""
-        self._events.change(recordings=self._recordings.text().strip())
+        self._presenter.change(recordings=self._recordings.text().strip())
         self._recordings.setText(self._state.settings.recordings)
 
     def _connect(self) -> None:
         self._operator.editingFinished.connect(
-            lambda: self._events.change(operator=self._operator.text().strip())
+            lambda: self._presenter.change(operator=self._operator.text().strip())
         )
         self._recordings.editingFinished.connect(self._write_folder)
         self._browse.clicked.connect(lambda _checked: self._choose_folder())
-        self._sounds.clicked.connect(lambda checked: self._events.change(sounds=checked))
-        self._undo.clicked.connect(lambda _checked: self._events.undo())
+        self._sounds.clicked.connect(lambda checked: self._presenter.change(sounds=checked))
+        self._undo.clicked.connect(lambda _checked: self._presenter.undo())
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def _lay_out(self) -> None:

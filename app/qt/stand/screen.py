@@ -10,7 +10,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.stand.state import StandEvents, StandForm, StandState
+from app.presenters.stand.presenter import StandPresenter
+from app.presenters.stand.state import StandForm, StandState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox
@@ -49,9 +50,9 @@ _NOT_RUNNING = N_("Faults can be asked for while the simulated stand is connecte
 class StandScreen(QWidget):
     """Draws `StandState`."""
 
-    def __init__(self, events: StandEvents) -> None:
+    def __init__(self, presenter: StandPresenter) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._series = ComboBox()
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._start = QPushButton(gettext("Start and connect"))
@@ -89,15 +90,15 @@ class StandScreen(QWidget):
         self._no_truth.setVisible(not state.truth)
 
     def _connect(self) -> None:
-        events = self._events
-        self._series.activated.connect(lambda _: events.set_form(self._read()))
+        presenter = self._presenter
+        self._series.activated.connect(lambda _: presenter.set_form(self._read()))
         for field in self._fields.values():
-            field.textEdited.connect(lambda _: events.set_form(self._read()))
-        self._start.clicked.connect(lambda _: events.start())
-        self._seconds.textEdited.connect(events.set_fault_duration)
+            field.textEdited.connect(lambda _: presenter.set_form(self._read()))
+        self._start.clicked.connect(lambda _: presenter.start())
+        self._seconds.textEdited.connect(presenter.set_fault_duration)
         bind_button(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
-            button.clicked.connect(lambda _checked, kind=kind: events.inject_fault(kind))
+            button.clicked.connect(lambda _checked, kind=kind: presenter.inject_fault(kind))
             bind_button(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:

@@ -16,7 +16,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
-from app.presenters.start.state import ConnectForm, StartEvents, StartState
+from app.presenters.navigator import ConnectForm
+from app.presenters.start.presenter import StartPresenter
+from app.presenters.start.state import StartState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
@@ -33,26 +35,25 @@ class StartScreen(QWidget):
 
     Parameters
     ----------
-    events : StartEvents
-        Told what the operator does.
+    presenter : StartPresenter
     ask_for_run : callable
         Lets the operator choose a recording.
     """
 
-    def __init__(self, events: StartEvents, ask_for_run: Callable[[], None]) -> None:
+    def __init__(self, presenter: StartPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
-        self._events = events
+        self._presenter = presenter
         self._series = ComboBox()
-        self._try = _button(gettext("Try with the simulated stand"), events.start_simulation)
-        self._form = _Form(events)
-        self._connect = _button(gettext("Connect my amplifier"), events.connect)
+        self._try = _button(gettext("Try with the simulated stand"), presenter.start_simulation)
+        self._form = _Form(presenter)
+        self._connect = _button(gettext("Connect my amplifier"), presenter.connect)
         self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
         self._open = _button(gettext("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
         self._status = label(role=TextRole.HEADING)
-        self._disconnect = _button(gettext("Disconnect"), events.disconnect)
-        self._series.activated.connect(lambda _: events.set_series(self._series.currentText()))
+        self._disconnect = _button(gettext("Disconnect"), presenter.navigator.close_connection)
+        self._series.activated.connect(lambda _: presenter.set_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
             (self._try, "Alt+S", gettext("Start the simulated stand and connect to it")),
@@ -82,7 +83,7 @@ class StartScreen(QWidget):
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Ports may have come and gone since the page was last seen."""
         super().showEvent(event)
-        self._events.refresh_ports()
+        self._presenter.refresh_ports()
         self._try.setFocus()
 
     def _lay_out(self) -> None:
@@ -155,7 +156,7 @@ class StartScreen(QWidget):
 class _Form(QWidget):
     """Port, protocol, baud, rate; folded away what few devices need: parity, own settings, a second port."""
 
-    def __init__(self, events: StartEvents) -> None:
+    def __init__(self, presenter: StartPresenter) -> None:
         super().__init__()
         self._port = ComboBox()
         self._port.setEditable(True)
@@ -176,11 +177,11 @@ class _Form(QWidget):
         self._rare = QWidget()
         self._lay_out()
         bind_button(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
-        self._port.currentTextChanged.connect(lambda _: events.set_form(self._read()))
-        self._protocol.activated.connect(lambda _: events.set_form(self._read()))
-        self._parity.activated.connect(lambda _: events.set_form(self._read()))
+        self._port.currentTextChanged.connect(lambda _: presenter.set_form(self._read()))
+        self._protocol.activated.connect(lambda _: presenter.set_form(self._read()))
+        self._parity.activated.connect(lambda _: presenter.set_form(self._read()))
         for field in (self._baud, self._rate, self._settings, self._relative):
-            field.textEdited.connect(lambda _: events.set_form(self._read()))
+            field.textEdited.connect(lambda _: presenter.set_form(self._read()))
 
     def show_form(self, state: StartState) -> None:
         """Draw choices and what is filled in."""

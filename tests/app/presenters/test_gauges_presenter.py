@@ -34,7 +34,7 @@ from app.presenters.gauges.tasks import (
     SavedCalibration,
 )
 from app.presenters.gauges.work import execute
-from app.presenters.start.state import ConnectForm
+from app.presenters.navigator import ConnectForm
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from config.files import load_checks, load_gauges
 from config.schema import GaugeCheck, GaugeChecks, Gauges

@@ -3,8 +3,9 @@
 import pytest
 
 from app.acquisition.messages import PortSettings
+from app.presenters.navigator import ConnectForm
 from app.presenters.start.presenter import StartPresenter, port_settings
-from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
+from app.presenters.start.state import PortChoice, ProtocolChoice, StartState
 
 
 class FakeDoors:

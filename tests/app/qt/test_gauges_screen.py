@@ -28,7 +28,7 @@ from app.presenters.gauges.state import (
     PortCard,
 )
 from app.presenters.gauges.tasks import ActiveCalibrations, FitCalibration, LoadCalibrations
-from app.presenters.start.state import ConnectForm
+from app.presenters.navigator import ConnectForm
 from app.presenters.worker import TaskDone
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme

@@ -26,8 +26,9 @@ from stage import RUN, FakeLauncher, FakeWorker, analysed, bench, fake_workers
 from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.navigator import ConnectForm
 from app.presenters.recovery import RecoverFolder
-from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
+from app.presenters.start.state import PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone
 from app.qt.theme import DARK, LIGHT, Theme
