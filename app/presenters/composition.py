@@ -11,9 +11,8 @@ from app.presenters.connection import Connection, Engine, Simulation
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import StandContext
-from app.presenters.settings.presenter import PersonalSettings
-from app.presenters.settings.state import SettingsFile
-from app.presenters.start.state import PortChoice, ProtocolChoice, StartState
+from app.presenters.settings_screen import PersonalSettings, SettingsFile
+from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter, Workers
 from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory

@@ -30,10 +30,9 @@ from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
-from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
-from app.presenters.stand.presenter import StandPresenter
-from app.presenters.start.presenter import StartPresenter
-from app.presenters.start.state import PortChoice, StartState
+from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
+from app.presenters.stand_screen import StandPresenter
+from app.presenters.start_screen import PortChoice, StartPresenter, StartState
 from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings

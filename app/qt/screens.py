@@ -28,7 +28,7 @@ def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialo
 
 
 def _start(presenter: WindowPresenter, _theme: Theme, dialogs: WindowDialogs) -> QWidget:
-    from app.qt.start.screen import StartScreen
+    from app.qt.start_screen import StartScreen
 
     view = StartScreen(presenter.start, dialogs.ask_for_run)
     presenter.start.attach(view)
@@ -76,7 +76,7 @@ def _gauges(presenter: WindowPresenter, theme: Theme, _dialogs: WindowDialogs) -
 
 
 def _stand(presenter: WindowPresenter, _theme: Theme, _dialogs: WindowDialogs) -> QWidget:
-    from app.qt.stand.screen import StandScreen
+    from app.qt.stand_screen import StandScreen
 
     view = StandScreen(presenter.stand)
     presenter.stand.attach(view)
@@ -84,7 +84,7 @@ def _stand(presenter: WindowPresenter, _theme: Theme, _dialogs: WindowDialogs) -
 
 
 def _settings(presenter: WindowPresenter, _theme: Theme, _dialogs: WindowDialogs) -> QWidget:
-    from app.qt.settings.screen import SettingsScreen
+    from app.qt.settings_screen import SettingsScreen
 
     view = SettingsScreen(presenter.settings)
     presenter.settings.attach(view)

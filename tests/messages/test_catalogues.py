@@ -18,7 +18,7 @@ MUST = (
     "app/qt/window.py",
     "app/acquisition/guidance.py",
     "app/presenters/results.py",
-    "app/qt/settings/screen.py",
+    "app/qt/settings_screen.py",
 )
 RENEW = "run `make translations`"
 

@@ -10,7 +10,7 @@ from app.presenters.base import Progress, Tone
 from app.presenters.gauges import port_tasks
 from app.presenters.gauges.port_tasks import list_port_cards, listed_port, probe_ports, probed_port
 from app.presenters.gauges.ports import ListPorts, ProbePorts
-from app.presenters.start.presenter import port_settings
+from app.presenters.start_screen import port_settings
 from drivers.host_checks import PortHint
 from drivers.port import PortInfo, PortUser
 from drivers.port_probe import LineSettings, PortReport, ProbeOutcome

@@ -12,7 +12,7 @@ from app.presenters.base import Notice, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport, recover_runs
-from app.presenters.start.state import StartState
+from app.presenters.start_screen import StartState
 from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.presenters.base import EMPTY_CHIP, Tone
-from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
+from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from config.schema import ConfigError, Settings
 
 

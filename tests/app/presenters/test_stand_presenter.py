@@ -6,8 +6,7 @@ import pytest
 from stage import FakeSimulation
 
 from app.presenters.base import EMPTY_CHIP, Tone
-from app.presenters.stand.presenter import StandPresenter, stand_options
-from app.presenters.stand.state import StandForm
+from app.presenters.stand_screen import StandForm, StandPresenter, stand_options
 from app.simulated_stand.options import SimulatedStandOptions
 
 BASE = SimulatedStandOptions(decay_s=30.0, seed=1)

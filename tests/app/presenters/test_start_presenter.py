@@ -4,8 +4,7 @@ import pytest
 
 from app.acquisition.messages import PortSettings
 from app.presenters.navigator import ConnectForm
-from app.presenters.start.presenter import StartPresenter, port_settings
-from app.presenters.start.state import PortChoice, ProtocolChoice, StartState
+from app.presenters.start_screen import PortChoice, ProtocolChoice, StartPresenter, StartState, port_settings
 
 
 class FakeDoors:

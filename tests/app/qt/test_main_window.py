@@ -28,7 +28,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.recovery import RecoverFolder
-from app.presenters.start.state import PortChoice, ProtocolChoice, StartState
+from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowContext, WindowPresenter
 from app.presenters.worker import TaskDone
 from app.qt.theme import DARK, LIGHT, Theme
@@ -98,7 +98,7 @@ def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
 
 def test_what_the_first_paint_needs_loads_nothing_heavy() -> None:
     code = (
-        "import app.qt.main, app.qt.start.screen, sys;print(' '.join({m.split('.')[0] for m in sys.modules}))"
+        "import app.qt.main, app.qt.start_screen, sys;print(' '.join({m.split('.')[0] for m in sys.modules}))"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not set(loaded.split()) & {"pyqtgraph", "matplotlib", "numba", "scipy", "serial"}

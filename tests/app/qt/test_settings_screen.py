@@ -9,9 +9,8 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
-from app.presenters.settings.state import SettingsFile
-from app.qt.settings.screen import SettingsScreen
+from app.presenters.settings_screen import PersonalSettings, SettingsFile, SettingsPresenter
+from app.qt.settings_screen import SettingsScreen
 from config.schema import Settings
 
 

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from pytestqt.qtbot import QtBot
 from stage import FakeSimulation
 
-from app.presenters.stand.presenter import StandPresenter
-from app.qt.stand.screen import StandScreen
+from app.presenters.stand_screen import StandPresenter
+from app.qt.stand_screen import StandScreen
 from app.qt.theme import Theme
 from app.simulated_stand.options import SimulatedStandOptions
 

@@ -17,8 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
-from app.presenters.start.presenter import StartPresenter
-from app.presenters.start.state import StartState
+from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area

@@ -1,14 +1,53 @@
-"""What the start page does: checks what was filled in and says where to go."""
+"""The Start screen: state and presenter. Connects to the simulated stand or an amplifier, or opens a run."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
 from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.number_text import parse_number
-from app.presenters.start.state import PortChoice, StartState
 from messages.i18n import gettext
+
+
+@dataclass(frozen=True, slots=True)
+class PortChoice:
+    """A serial port of this computer."""
+
+    url: str
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolChoice:
+    """A protocol that devices speak."""
+
+    name: str
+    title: str
+    default_baud: int | None = None
+    verified: str = ""
+    """How it was verified."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartState:
+    """State of the screen. `busy` names the work in progress, `connected` the connected device."""
+
+    all_series: tuple[str, ...]
+    series: str
+    protocols: tuple[ProtocolChoice, ...] = ()
+    ports: tuple[PortChoice, ...] = ()
+    form: ConnectForm = field(default_factory=ConnectForm)
+    form_error: str = ""
+    recordings: str = ""
+    busy: str = ""
+    connected: str = ""
+
+    @property
+    def selected_protocol(self) -> ProtocolChoice | None:
+        """Protocol of the form; None if it is unknown."""
+        return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
 
 
 class StartPresenter(Presenter[StartState]):

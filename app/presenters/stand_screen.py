@@ -1,8 +1,8 @@
-"""What the Simulated stand screen does: options before it starts, faults while it runs, its truth."""
+"""The Simulated stand screen: state and presenter. Options before the start, faults and truth after it."""
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import msgspec
@@ -13,12 +13,56 @@ from app.presenters.connection import Simulation
 from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import format_fixed, format_millimetres, parse_number
 from app.presenters.results import sentence
-from app.presenters.stand.state import StandForm, StandState
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError
 from messages.i18n import gettext
+
+
+@dataclass(frozen=True, slots=True)
+class StandForm:
+    """Options as typed; an empty field takes the default."""
+
+    series: str
+    friction: str = ""
+    tilt_mrad: str = ""
+    noise_um: str = ""
+    rate_hz: str = ""
+    drop_percent: str = ""
+    flip_percent: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StandState:
+    """State of the screen.
+
+    Attributes
+    ----------
+    all_series : tuple of str
+    form : StandForm
+    defaults : StandForm
+    is_running : bool
+        Whether the simulated stand is connected.
+    fault_duration_s : str
+        Duration of the next fault, as typed.
+    truth : tuple of LabelledValue
+        True parameters of the running stand.
+    disturbances : tuple of str
+        Injected faults, the newest first.
+    message : Chip
+        What is wrong with the last input.
+    """
+
+    all_series: tuple[str, ...]
+    form: StandForm
+    defaults: StandForm
+    is_running: bool = False
+    fault_duration_s: str = "2"
+    truth: tuple[LabelledValue, ...] = ()
+    disturbances: tuple[str, ...] = ()
+    message: Chip = EMPTY_CHIP
+
 
 _MAX_LISTED: Final = 8
 """Injected faults on the screen: more do not fit into the lowest window."""

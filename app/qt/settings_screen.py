@@ -17,12 +17,12 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
-from app.presenters.settings.presenter import SettingsPresenter
-from app.presenters.settings.state import (
+from app.presenters.settings_screen import (
     LANGUAGES,
     SCALES,
     THEMES,
     SettingsFile,
+    SettingsPresenter,
     SettingsState,
 )
 from app.qt.theme import TextRole

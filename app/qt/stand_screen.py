@@ -10,8 +10,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.stand.presenter import StandPresenter
-from app.presenters.stand.state import StandForm, StandState
+from app.presenters.stand_screen import StandForm, StandPresenter, StandState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox

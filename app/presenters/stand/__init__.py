@@ -1,1 +1,0 @@
-"""The Simulated stand screen: what is true of it, what goes wrong with it."""

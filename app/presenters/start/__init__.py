@@ -1,1 +1,0 @@
-"""The start page: simulated stand, amplifier, or a recording."""

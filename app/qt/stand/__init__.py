@@ -1,1 +1,0 @@
-"""The Simulated stand screen."""
