@@ -71,7 +71,7 @@ def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
     presenter.connect()
     presenter.open_run("/recordings/a.h5")
     presenter.open_run("")
-    presenter.disconnect()
+    presenter.navigator.close_connection()
     assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "/recordings/a.h5", "closed"]
 
 

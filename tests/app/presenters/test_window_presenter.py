@@ -153,20 +153,20 @@ def test_nothing_else_is_opened_while_a_run_is_recorded(desk: Desk) -> None:
     window.record.dispatch(Action.ARM)
     desk.play(1.0)
     window.start.start_simulation()
-    window.start.disconnect()
+    window.start.navigator.close_connection()
     assert len(desk.launcher.engines) == 1
     assert window.start.state.connected
     assert window.state.notice is not None
     assert window.state.notice.tone is Tone.WARN
     desk.play(END_S + 0.1)
-    window.start.disconnect()
+    window.start.navigator.close_connection()
     assert not window.start.state.connected
 
 
 def test_letting_go_leaves_nothing_connected(desk: Desk) -> None:
     desk.window.open_simulated("1FFM0")
     desk.tick_until_connected()
-    desk.window.start.disconnect()
+    desk.window.start.navigator.close_connection()
     desk.window.tick()
     assert desk.window.start.state.connected == ""
     assert desk.window.record.state.allowed == frozenset()
