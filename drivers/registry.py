@@ -1,9 +1,9 @@
 """All devices by name: the folders of `drivers.devices`, and names that are reserved for later ones."""
 
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 
-from drivers import devices
 from drivers.driver import DeviceDriver
 from drivers.errors import SettingsError
 
@@ -17,7 +17,8 @@ _RESERVED = (
 
 
 def _find_drivers() -> dict[str, DeviceDriver]:
-    folders = (import_module(f"{devices.__name__}.{entry.name}") for entry in iter_modules(devices.__path__))
+    entries = iter_modules([str(Path(__file__).with_name("devices"))])
+    folders = (import_module(f"drivers.devices.{entry.name}") for entry in entries)
     found = {driver.name: driver for driver in _RESERVED}
     found |= {folder.DRIVER.name: folder.DRIVER for folder in folders}
     return {driver.name: driver for driver in sorted(found.values(), key=lambda driver: driver.rank)}

@@ -21,6 +21,15 @@ VIOLATIONS = [
     pytest.param("app/newcomer.py", "import json", "inside app", id="module-outside-the-layers"),
     pytest.param("app/presenters/__init__.py", "import PySide6.QtCore", "Qt only", id="qt-in-presenter"),
     pytest.param("analysis/record.py", "import pyqtgraph", "Qt only", id="pyqtgraph-in-analysis"),
+    pytest.param(
+        "drivers/recognition.py", "import drivers.stream", "inside drivers", id="recognition-knows-stream"
+    ),
+    pytest.param(
+        "drivers/devices/harp/codec.py",
+        "import drivers.devices.gsv.codec",
+        "device folders",
+        id="device-knows-device",
+    ),
     pytest.param("drivers/samples.py", "import serial", "pyserial only", id="serial-outside-port"),
     pytest.param("app/acquisition/__init__.py", "import h5py", "h5py only", id="h5py-outside-runs"),
 ]
