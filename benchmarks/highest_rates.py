@@ -9,12 +9,16 @@ much as the driver: on a busy machine `chrt -r 1` before the command shows what 
 
 import argparse
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import (
@@ -30,10 +34,10 @@ from app.acquisition.messages import (
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
+from tests.drivers.examples import recording_examples
 
 FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-POLLED = (20, 50, 100, 150, 200, 250, 300, 350)
-QUICK = (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
+POLLED = recording_examples()["modbus"].rates_hz
 TRIES = 2
 """A busy machine may stop any run for a moment."""
 ENDLESS_S = 3600.0
@@ -46,7 +50,7 @@ class Contender:
 
     name: str
     protocol: str
-    rates_hz: Sequence[int] = QUICK
+    rates_hz: Sequence[int]
     is_polled: bool = False
     """Its device samples at its own pace, and is asked at the rate that is tried."""
     gauges: tuple[Literal["table", "relative"] | None, ...] = (None,)
@@ -54,11 +58,10 @@ class Contender:
 
 
 CONTENDERS = (
-    Contender("Slipstand binary", "slipstand-binary"),
-    Contender("CSV lines, time and two values", "csv"),
-    Contender("GSV, float32", "gsv", (1000, 2000, 5000, 10_000, 20_000, 48_000)),
-    Contender("Harp LoadCells (1000 Hz by itself)", "harp", (1000, 2000, 5000, 10_000)),
-    Contender("Modbus RTU, 115200 baud", "modbus", POLLED, is_polled=True),
+    *(
+        Contender(example.title, protocol, example.rates_hz, is_polled=example.polled_hz is not None)
+        for protocol, example in recording_examples().items()
+    ),
     Contender(
         "two Modbus devices of one gauge", "modbus", POLLED, is_polled=True, gauges=("table", "relative")
     ),

@@ -38,6 +38,7 @@ from config.files import settings_file
 from drivers.samples import ABSENT, SampleStatus
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
+from tests.drivers.examples import RecordingExample, recording_examples
 
 RATE_HZ = 1000.0
 DURATION_S = 4.0
@@ -58,35 +59,10 @@ zero_count = -30.0
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Device:
-    """How a protocol is unplugged.
-
-    Attributes
-    ----------
-    is_exact : bool
-        Whether it tells how many samples it has sent or taken meanwhile.
-    asked_hz : float, optional
-        Of one that is asked: how often.
-    gauges : str, optional
-        Calibration file for it.
-    """
-
-    is_exact: bool = True
-    asked_hz: float | None = None
-    gauges: str = ""
-
-
 PAIR = "pair"
 """Two Modbus devices of one gauge each, of which one is unplugged (`tests.drills.unplug_pair`)."""
 
-DEVICES = {
-    "slipstand-binary": Device(),
-    "csv": Device(),
-    "gsv": Device(is_exact=False),
-    "harp": Device(gauges=SIXTEEN_BITS),
-    "modbus": Device(is_exact=False, asked_hz=100.0),
-}
+DEVICES = recording_examples()
 
 
 @dataclass(slots=True)
@@ -142,9 +118,9 @@ def unplug(
     """
     device = DEVICES[protocol]
     gauges_file = settings_file("gauges.toml")
-    if device.gauges:
+    if device.has_16_bits:
         gauges_file = folder / "sixteen-bits.toml"
-        gauges_file.write_text(device.gauges)
+        gauges_file.write_text(SIXTEEN_BITS)
     options = SimulatedStandOptions(
         protocol=protocol,
         rate_hz=RATE_HZ,
@@ -157,7 +133,7 @@ def unplug(
     report, moments, sent = UnplugReport(), random.Random(seed), Sent()
     files = (str(settings_file("stand.toml")), str(gauges_file))
     with SimulatedStand.start(options) as stand:
-        port = PortSettings(url=stand.port, protocol=protocol, rate_hz=device.asked_hz or RATE_HZ)
+        port = PortSettings(url=stand.port, protocol=protocol, rate_hz=device.polled_hz or RATE_HZ)
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
             for number in range(count):
@@ -194,7 +170,9 @@ def _one_run(
     return ended
 
 
-def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport, device: Device) -> None:
+def _check(
+    ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport, device: RecordingExample
+) -> None:
     """Hold a run against what was sent."""
     run = open_run(ended.path)
     stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
@@ -210,8 +188,8 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugRep
     marked = int(np.count_nonzero(run.status & SampleStatus.MISSING))
     if marked != ended.missing + ended.missing_estimated or not marked:
         raise ValueError(f"{marked} rows are marked, {ended.missing} + {ended.missing_estimated} are told")
-    if device.asked_hz:
-        _check_grid(run.status, load_counts(run), truth, sent, report, 1.0 / device.asked_hz)
+    if device.polled_hz:
+        _check_grid(run.status, load_counts(run), truth, sent, report, 1.0 / device.polled_hz)
     else:
         _check_places(run.status, load_counts(run), truth, sent, report, device.is_exact)
 
