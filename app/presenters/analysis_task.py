@@ -140,10 +140,13 @@ def _objective(found: "Identification") -> Objective | None:
 
 
 def _motion(found: "Identification", record: "Record") -> "Motion | None":
-    """The fitted motion of both masses; None for one mass, without slip, or with a running-in velocity."""
+    """The fitted motion of both masses; None for one mass, without slip, or for an integrated law."""
+    from analysis.laws.catalogue import law_with_own_parameters
     from analysis.motion.two_mass import TwoMassParameters
 
-    if FRICTION.name not in found.parameters or "stribeck_velocity_m_per_s" in found.results:
+    if FRICTION.name not in found.parameters:
+        return None
+    if not law_with_own_parameters(found.results).solver.is_closed_form:
         return None
     of_motion = {name: value for name, value in found.parameters.items() if name != "release_s"}
     return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])
