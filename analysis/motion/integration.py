@@ -479,7 +479,7 @@ def _longest_step(parameters: Floats, direction: Floats) -> float:
     step = math.inf
     for place in range(len(parameters)):
         relative = place >= OWN or place in (STIFFNESS, DAMPING, TABLE_MASS, PLATE_MASS, GRAVITY)
-        most = 1e-5 * abs(parameters[place]) if relative else 1e-6
+        most = 1e-5 * abs(parameters[place]) if relative and parameters[place] != 0.0 else 1e-6
         if direction[place] != 0.0 and most > 0.0:
             step = min(step, most / abs(direction[place]))
     return step if step < math.inf else 1.0
