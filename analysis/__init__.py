@@ -1,7 +1,7 @@
 """Arrays in, numbers with uncertainties out: no files, threads, Qt or serial.
 
-`identify` takes a `record` to an `identification`. `one_mass` does so for a table without plate. `live` follows
-a test as it runs. `refit` fits again from a known start. Each layer imports those below it only:
+`identify` takes a `record` to an `identification`. `one_mass` does so for a table without plate. `live`
+follows a test as it runs. `refit` fits again from a known start. Each layer imports those below it only:
 
 results      quantities, slip and rest, choice of the law, warnings (`uncertainty`: propagation and budget)
 fitting      least-squares problem, initial guess, search
