@@ -85,7 +85,9 @@ def save_calibration(
     try:
         return _write_new(path, text)
     except FileExistsError:
-        raise ConfigError(f"{path} exists already and is not overwritten. Choose another name") from None
+        raise ConfigError(
+            "{path} exists already and is not overwritten. Choose another name", path=path
+        ) from None
 
 
 def activate_calibration(path: Path, day: datetime.date) -> Path | None:
@@ -247,7 +249,9 @@ def _write(path: Path, text: str, mode: str) -> None:
 
 def _unwritable(path: Path, error: OSError) -> ConfigError:
     return ConfigError(
-        f"{path}: cannot be written ({error.strerror or error}). Check the folder, its rights and its disk"
+        "{path}: cannot be written ({fault}). Check the folder, its rights and its disk",
+        path=path,
+        fault=error.strerror or error,
     )
 
 
@@ -265,9 +269,11 @@ def load_published_rows(path: Path) -> list[PublishedRow]:
             for line, row in enumerate(csv.DictReader(file), start=2):
                 rows.append(_published_row(path, line, row))
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}). Give a readable UTF-8 CSV file") from None
+        raise ConfigError(
+            "{path}: cannot be read ({fault}). Give a readable UTF-8 CSV file", path=path, fault=error
+        ) from None
     if not rows:
-        raise ConfigError(f"{path}: holds no rows. Give a header and a row a series, as in Table 1")
+        raise ConfigError("{path}: holds no rows. Give a header and a row a series, as in Table 1", path=path)
     return rows
 
 
@@ -277,7 +283,9 @@ def published_row(series: str) -> PublishedRow:
         return published_table()[series]
     except KeyError:
         raise ConfigError(
-            f"series {series!r} has no row in Table 1: choose one of {', '.join(published_table())}"
+            "series {series!r} has no row in Table 1: choose one of {series_of_table}",
+            series=series,
+            series_of_table=list(published_table()),
         ) from None
 
 
@@ -286,8 +294,11 @@ def _published_row(path: Path, line: int, row: dict[str | Any, str | Any]) -> Pu
         return msgspec.convert(row, PublishedRow, strict=False)
     except msgspec.ValidationError as error:
         raise ConfigError(
-            f"{path}: line {line}: {_explain(str(error), row)}. The columns are those of Table 1: "
-            f"{', '.join(PublishedRow.__struct_fields__)}"
+            "{path}: line {line}: {fault}. The columns are those of Table 1: {columns}",
+            path=path,
+            line=line,
+            fault=_explain(str(error), row),
+            columns=list(PublishedRow.__struct_fields__),
         ) from None
 
 
@@ -295,15 +306,21 @@ def _load(path: Path, kind: type[T]) -> T:
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ConfigError(f"{path}: there is no such file. Give the path of a {_what(kind)} file") from None
+        raise ConfigError(
+            "{path}: there is no such file. Give the path of a {kind} file", path=path, kind=_what(kind)
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}). Give a readable UTF-8 text file") from None
+        raise ConfigError(
+            "{path}: cannot be read ({fault}). Give a readable UTF-8 text file", path=path, fault=error
+        ) from None
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: is not valid TOML ({error}). Correct that line") from None
+        raise ConfigError(
+            "{path}: is not valid TOML ({fault}). Correct that line", path=path, fault=error
+        ) from None
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{path}: {_explain(str(error), raw)}") from None
+        raise ConfigError("{path}: {fault}", path=path, fault=_explain(str(error), raw)) from None
 
 
 def _what(kind: type) -> str:

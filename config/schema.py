@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import msgspec
 
+from messages.message import MessageError
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -21,7 +23,7 @@ _MAX_PIXELS = 100_000
 """How much larger than the system's scaling the window may be."""
 
 
-class ConfigError(Exception):
+class ConfigError(MessageError):
     """A settings file that cannot be used: names file, key, value and what is allowed."""
 
 
@@ -120,9 +122,12 @@ class Stand(_Checked, frozen=True):
                     plate_mass_kg=self.plate_mass_kg + self.added_masses_kg[mass],
                 )
         raise SeriesError(
-            f"series {code!r} is not one of this stand: write pullback ({', '.join(self.pullbacks_m)}), "
-            f"contact ({', '.join(self.contacts)}) and mass ({', '.join(self.added_masses_kg)}), "
-            "for example 1FFM0"
+            "series {code!r} is not one of this stand: write pullback ({pullbacks}), contact ({contacts}) and"
+            " mass ({masses}), for example 1FFM0",
+            code=code,
+            pullbacks=list(self.pullbacks_m),
+            contacts=list(self.contacts),
+            masses=list(self.added_masses_kg),
         )
 
 
