@@ -120,7 +120,7 @@ class SimulatedStand:
         parse_disturbance(text)
         if not self._child.is_running:
             raise SimulatedStandError(
-                f"{text!r} cannot be done: the simulated stand has ended. Start another one"
+                "{text!r} cannot be done: the simulated stand has ended. Start another one", text=text
             )
         self._child.send(text, self._STOP_S)
 
@@ -154,7 +154,9 @@ class SimulatedStand:
             if isinstance(event, Refused):
                 raise SimulatedStandError(event.error)
             code = f" (exit code {event})"
-        raise SimulatedStandError(f"the simulated stand did not start{code}. Its own message stands above")
+        raise SimulatedStandError(
+            "the simulated stand did not start{code}. Its own message stands above", code=code
+        )
 
 
 def _encode_disturbance(text: str) -> bytes:

@@ -72,5 +72,7 @@ def read_truth(path: Path) -> Truth:
         return msgspec.json.decode(path.read_bytes(), type=Truth)
     except (OSError, msgspec.DecodeError) as error:
         raise SimulatedStandError(
-            f"{path} is not the truth file of a simulated stand ({error}). Give the one it was told to write"
+            "{path} is not the truth file of a simulated stand ({error}). Give the one it was told to write",
+            path=path,
+            error=error,
         ) from None

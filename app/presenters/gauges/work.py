@@ -89,7 +89,9 @@ def _write_points(name: str, counts: list[float], dial_m: list[float]) -> None:
         write_points(path, counts, dial_m)
     except OSError as error:
         raise ConfigError(
-            f"{path}: cannot be written ({error.strerror}). Check the folder, its rights and its disk"
+            "{path}: cannot be written ({strerror}). Check the folder, its rights and its disk",
+            path=path,
+            strerror=error.strerror,
         ) from None
 
 

@@ -334,7 +334,11 @@ def _form_error(form: RunForm) -> str:
 def _parse_count(form: RunForm) -> int:
     text = form.count.strip() or "1"
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= REPEATS_MAX):
-        raise MetadataError(f"runs in a row = {text!r} is no whole number from 1 to {REPEATS_MAX}")
+        raise MetadataError(
+            "runs in a row = {text!r} is no whole number from 1 to {repeats_max}",
+            text=text,
+            repeats_max=REPEATS_MAX,
+        )
     return int(text)
 
 

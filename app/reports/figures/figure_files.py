@@ -77,7 +77,9 @@ class FigureFolder(msgspec.Struct, frozen=True):
             for stem in [""] if number == FRICTION_FIGURE else stems:
                 file = self.file(number, stem)
                 if file.exists() and not self.replace:
-                    raise RunExistsError(f"{file} exists already. Choose another folder or add --force")
+                    raise RunExistsError(
+                        "{file} exists already. Choose another folder or add --force", file=file
+                    )
 
     def file(self, number: str, stem: str = "") -> Path:
         """Name of a figure: `fig2.png`, `1FFM0_001-fig3a.png`."""
@@ -204,7 +206,9 @@ def representative_runs(
 def _row(rows: dict[str, SeriesRow], label: str) -> SeriesRow:
     row = rows.get(label) or rows.get(label.strip().upper())
     if row is None:
-        raise RunNotFoundError(f"series {label!r} has no run there. Choose from {', '.join(rows)}")
+        raise RunNotFoundError(
+            "series {label!r} has no run there. Choose from {rows}", label=label, rows=", ".join(rows)
+        )
     return row
 
 

@@ -74,7 +74,9 @@ def _compiler(report: Report) -> "Iterator[Compiler]":
             )
         except typst.TypstError as error:
             said = " ".join(str(error).split())[:200]
-            raise WriteError(f"the report cannot be typeset ({said}). Report this with the runs") from None
+            raise WriteError(
+                "the report cannot be typeset ({said}). Report this with the runs", said=said
+            ) from None
 
 
 def _printable(value: Any, key: str = "") -> Any:
