@@ -1,4 +1,4 @@
-"""Figures written to a folder, each whole or not at all, and never in place of another unless asked."""
+"""Writing of the paper's figures to a folder, atomically, without overwriting unless asked."""
 
 import errno
 import os
@@ -26,20 +26,20 @@ from config.schema import Stand
 Format = Literal["png", "svg", "pdf"]
 FRICTION_FIGURE = "2"
 NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))
-"""Of the paper's figures that are drawn."""
+"""Numbers of the paper's figures that are drawn."""
 
 
 class FigureFile(msgspec.Struct, frozen=True):
-    """A figure that was written.
+    """A written figure.
 
     Attributes
     ----------
     figure : str
-        Its number in the paper.
+        Number in the paper.
     file : str
     caption : str
     run : str
-        Path of the run that it shows; "" for a figure of all runs.
+        Path of its run; "" for a figure of all runs.
     """
 
     figure: str
@@ -49,14 +49,14 @@ class FigureFile(msgspec.Struct, frozen=True):
 
 
 class FigureFolder(msgspec.Struct, frozen=True):
-    """Where figures go, in which format."""
+    """Folder and format of figures."""
 
     path: str
     format: Format = "png"
     replace: bool = False
 
     def check(self) -> None:
-        """Refuse a folder that cannot be made or written to, without making it. Raises WriteError."""
+        """Check that the folder can be created and written to. Raises WriteError."""
         path = Path(self.path)
         there = next(place for place in (path, *path.parents) if place.exists())
         if not there.is_dir():
@@ -65,14 +65,14 @@ class FigureFolder(msgspec.Struct, frozen=True):
             raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
     def create(self) -> None:
-        """Make the folder where it is not there yet. Raises WriteError."""
+        """Create the folder. Raises WriteError."""
         try:
             Path(self.path).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise storage_error(Path(self.path), error) from None
 
     def check_not_existing(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
-        """Refuse names that are taken, before anything is drawn. Raises RunExistsError."""
+        """Check that no figure exists already. Raises RunExistsError."""
         for number in numbers:
             for stem in [""] if number == FRICTION_FIGURE else stems:
                 file = self.file(number, stem)
@@ -88,7 +88,7 @@ class FigureFolder(msgspec.Struct, frozen=True):
     def write(
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
     ) -> FigureFile:
-        """Write one figure within `look.print_style`, and make the folder for it. Raises RunError."""
+        """Write one figure within `print_style`. Raises RunError."""
         self.create()
         target = self.file(number, stem)
         with atomic_write(target, replace=self.replace) as made:

@@ -1,4 +1,4 @@
-"""The figure of a calibration: the curve through its readings, and what is left between them."""
+"""Figures of gauges: calibration curve with residuals, and noise spectra at rest."""
 
 from collections.abc import Sequence
 from pathlib import Path

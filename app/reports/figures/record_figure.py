@@ -1,4 +1,4 @@
-"""The figure of one test: record against simulation for both channels, and what is left between them."""
+"""Figure of one test: record, simulation and residuals of both channels."""
 
 from pathlib import Path
 
@@ -31,8 +31,8 @@ def save_record_figure(path: Path, record: Record, identification: Identificatio
 def record_figure(record: Record, identification: Identification) -> Figure:
     """Draw record and simulation of both channels, and the residuals where there is a simulation.
 
-    To be called within `look.print_style`. Shown is the time from shortly before release to two seconds
-    after the last slip; the whole record where there was no slip.
+    Call it within `print_style`. It shows the time from shortly before the release to two seconds after the
+    last slip, or the whole record without slip.
     """
     time_s = record.time_s - (identification.events.release_s or 0.0)
     shown = _shown(time_s, identification)

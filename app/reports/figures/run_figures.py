@@ -1,4 +1,4 @@
-"""One run as its figures draw it: readings and simulated motion in one frame, from the release on."""
+"""Figures 3a to 5b of the paper for one run: displacements, velocities, accelerations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from app.reports.figures.style import DASHED, PLATE, SIMULATION, TABLE, decimate
 
 Floats = NDArray[np.float64]
 _BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0
-"""Shown before the release, and after the last slip."""
+"""Periods shown before the release, and after the last slip."""
 _WITHOUT_SLIP_PERIODS = 15.0
 _PER_PERIOD = 200
 _USUAL_PERIOD_S = 0.3
@@ -28,17 +28,17 @@ _JUST_BEFORE_S = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunFigureData:
-    """A run for its figures. Displacements are from the rest position, and from the plate's place before.
+    """Curves of a run. Displacements are from rest, and from the position of the plate before the pull.
 
     Attributes
     ----------
     time_s : (n,) float64
-        Of the readings, seconds since the release.
+        Times of the readings since the release.
     table_m : (n,) float64
     relative_m : (n,) float64 or None
         Plate against table; None without a second gauge.
     motion : MotionSamples or None
-        Of the fitted law; None where there is none.
+        Of the fitted law; None without one.
     slip_end_s : float or None
         Seconds since the release.
     results : dict of Quantity
@@ -53,7 +53,7 @@ class RunFigureData:
 
     @classmethod
     def from_identification(cls, record: Record, found: Identification) -> Self:
-        """Put what was recorded and what was found into one frame."""
+        """Curves of a record and its identification, from the release on."""
         release_s = found.events.release_s or float(record.time_s[0])
         first_s, last_s = _span_s(record, found, release_s)
         since_s = record.time_s - release_s
@@ -99,7 +99,7 @@ def _fitted_motion(record: Record, found: Identification) -> Motion | None:
 
 
 def _times(motion: Motion, first_s: float, last_s: float, period_s: float) -> Floats:
-    """An even grid, with both sides of each moment at which a slip begins or ends."""
+    """Even grid, with both sides of each transition between stick and slip."""
     last_s = min(last_s, motion.duration_s)
     count = round((last_s - first_s) / period_s * _PER_PERIOD) + 2
     starts = motion.phase_starts_s[motion.phase_starts_s <= last_s]
@@ -116,7 +116,7 @@ def _readings(
     shown: NDArray[np.bool_],
     motion_m: tuple[Floats, Floats] | None,
 ) -> tuple[Floats, Floats | None]:
-    """Readings where the motion puts them: motion, and what the gauge read beyond what it should have."""
+    """Simulated motion plus the residuals of the gauges."""
     gauges = [record.table_displacement_m, record.relative_displacement_m]
     if motion_m is None or found.curves is None:
         rest = [None if gauge is None else gauge[shown] - _middle(gauge) for gauge in gauges]
@@ -131,16 +131,16 @@ def _readings(
 
 
 def _middle(reading_m: Floats) -> float:
-    """About which a gauge swings in the second half of a record; 0 where it has no reading."""
+    """Mean of a gauge over the second half of a record; 0 without readings."""
     late = reading_m[len(reading_m) // 2 :]
     late = late[np.isfinite(late)]
     return float(late.mean()) if len(late) else 0.0
 
 
 def _placed(reading_m: Floats, curve_m: Floats, measured_m: list[Floats]) -> Floats:
-    """The first of `measured_m` with what the gauge read beyond what it should have.
+    """The first of `measured_m` plus the residual, with the sign of a reversed gauge.
 
-    A gauge that is mounted the other way errs the other way: its curve runs against what it may measure.
+    A gauge is reversed where its curve runs against every motion that it may measure.
     """
     alike = [_likeness(curve_m, one_m) for one_m in measured_m]
     side = -1.0 if max(alike, key=abs) < 0.0 else 1.0
@@ -148,7 +148,7 @@ def _placed(reading_m: Floats, curve_m: Floats, measured_m: list[Floats]) -> Flo
 
 
 def _likeness(one_m: Floats, other_m: Floats) -> float:
-    """Coefficient of correlation; 0 of what does not move."""
+    """Coefficient of correlation; 0 where a curve is constant."""
     one_m, other_m = one_m - one_m.mean(), other_m - other_m.mean()
     size = float(np.sqrt(np.dot(one_m, one_m) * np.dot(other_m, other_m)))
     return float(np.dot(one_m, other_m)) / size if size > 0.0 else 0.0
@@ -169,7 +169,7 @@ class RunFigure:
     draw : callable
         Draws it.
     simulated : bool
-        It shows the fitted motion, and is nothing without one.
+        It shows the fitted motion, and needs one.
     """
 
     number: str
@@ -178,7 +178,7 @@ class RunFigure:
     simulated: bool = True
 
     def render(self, run: RunFigureData, title: str = "") -> Figure | None:
-        """Draw the figure within `look.print_style`; None where the run has nothing to show in it."""
+        """Draw the figure within `print_style`; None where the run has nothing to show in it."""
         if self.simulated and run.motion is None:
             return None
         figure, axes = new_figure()
@@ -231,7 +231,7 @@ def _accelerations(axes: Axes, run: RunFigureData) -> None:
 def _rates(
     axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], words: tuple[str, str, str], largest: str
 ) -> None:
-    """Both bodies with their largest values; `words` are symbol, name and unit."""
+    """Draw both bodies with their largest values; `words` are symbol, name and unit."""
     symbol, name, unit = words
     table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}')}"
     plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}')}"
@@ -270,7 +270,7 @@ def _motion(run: RunFigureData) -> MotionSamples:
 
 
 def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) -> None:
-    """Broad and pale under the simulation; a plain line where there is none."""
+    """Draw readings: broad and pale under the simulation, a plain line without one."""
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
     axes.plot(
         *decimate_for_print(run.time_s, reading_m * 1e3),
@@ -293,7 +293,7 @@ def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: t
 
 def _largest(run: RunFigureData, name: str) -> str:
     found = run.results.get(name)
-    return "what is not known" if found is None else definition(name).format(found, Place.REPORT).in_print
+    return "unknown" if found is None else definition(name).format(found, Place.REPORT).in_print
 
 
 def _legend(axes: Axes, columns: int) -> None:

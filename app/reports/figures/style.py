@@ -1,4 +1,4 @@
-"""How figures look in print: LOOK's colours on white, one typeface, files that repeat to the byte."""
+"""Style of printed figures: colours, typeface, and files that are reproducible to the byte."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,13 +8,14 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
+from fontpkg_ibm_plex_sans import ROOT
 from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
-"""Colours of the channels and of the simulation: the same in every plot, table and figure (LOOK)."""
+"""Colours of the channels and of the simulation, as in the window."""
 DASHED: Final = (0, (4, 2))
 FORMATS: Final = ("png", "svg", "pdf")
 FAMILY = "IBM Plex Sans"
@@ -22,19 +23,19 @@ COLUMN_IN = 3.46
 """Width of a column of a journal, 88 mm."""
 _DPI = 300
 _STRETCHES = 4000
-"""More than a page has dots across at 300 dpi."""
+"""More stretches than a page has dots across at 300 dpi."""
 Floats = NDArray[np.float64]
-_NOTHING_OF_THE_DAY: Final[dict[str, dict[str, Any]]] = {
+_REPRODUCIBLE: Final[dict[str, dict[str, Any]]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-"""Metadata that would differ from day to day, or with matplotlib's version."""
+"""Metadata left out, because they hold a date or a version."""
 
 
 @contextmanager
 def print_style() -> Iterator[None]:
-    """Draw and save figures for print within this block: 9 pt IBM Plex Sans, thin lines, no box."""
+    """Context with the style of printed figures: 9 pt IBM Plex Sans, thin lines, no box."""
     _load_typeface()
     with mpl.rc_context(
         {
@@ -81,7 +82,7 @@ def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Fig
 
 
 def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
-    """A curve that a page can show: of very many readings (n,), the smallest and largest of each stretch."""
+    """Decimate a curve of very many readings (n,) to the minimum and maximum of each stretch."""
     if len(value) <= 2 * _STRETCHES:
         return time_s, value
     each = len(value) // _STRETCHES
@@ -93,13 +94,13 @@ def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a PNG, SVG or PDF file by its ending, the same bytes each time. Raises OSError."""
-    figure.savefig(path, metadata=_NOTHING_OF_THE_DAY[path.suffix[1:].lower()])
+    figure.savefig(path, metadata=_REPRODUCIBLE[path.suffix[1:].lower()])
 
 
 def figure_svg(figure: Figure) -> str:
-    """The figure as SVG, the same each time."""
+    """The figure as SVG, reproducible."""
     buffer = StringIO()
-    figure.savefig(buffer, format="svg", metadata=_NOTHING_OF_THE_DAY["svg"])
+    figure.savefig(buffer, format="svg", metadata=_REPRODUCIBLE["svg"])
     return buffer.getvalue()
 
 
@@ -112,6 +113,4 @@ def _load_typeface() -> None:
 
 def typeface_files() -> list[Path]:
     """The files of the one typeface."""
-    from fontpkg_ibm_plex_sans import ROOT
-
     return sorted(Path(ROOT).rglob("*.ttf"))

@@ -1,4 +1,4 @@
-"""What a table says: the campaign, the print beside it, and what could not be taken."""
+"""Content of the campaign's table, and its cells for people."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from analysis.quantities import Quantity, ResultWarning
 
 @dataclass(frozen=True, slots=True)
 class PublishedRowComparison:
-    """A row of the published table: its figures beside those found, and what the audit says of it."""
+    """Comparison of a row with the published one, and the flags of the audit."""
 
     figures: tuple[PublishedComparison, ...]
     flags: tuple[str, ...]
@@ -22,17 +22,17 @@ class PublishedRowComparison:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TableContent:
-    """All that goes into a table.
+    """Content of a table.
 
     Attributes
     ----------
     campaign : Campaign
     cautions : tuple of Caution
-        What must be known beside what the campaign and its rows say themselves.
+        Beside those of the campaign and its rows.
     failures : tuple of (str, str)
-        Runs that gave no result, and why.
+        Runs without a result, with the reason.
     published : dict of Printed or None
-        By the labels of the rows; None where it was not asked for.
+        By the labels of the rows; None where not asked for.
     """
 
     campaign: Campaign
@@ -41,7 +41,7 @@ class TableContent:
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
 
     def all_warnings(self) -> list[ResultWarning]:
-        """Those of the runs together, then of the campaign, then row by row."""
+        """Warnings of the runs, of the campaign, and of its rows."""
         of_rows = [caution for row in self.campaign.rows for caution in row.warnings]
         return [*self.warnings, *self.campaign.warnings, *of_rows]
 
@@ -65,14 +65,14 @@ def table_headers() -> tuple[str, ...]:
 
 
 def row_cells(row: SeriesRow) -> tuple[str, ...]:
-    """A row of the table; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
+    """Cells of a row; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
     doubt = INADEQUATE if has_inadequate_run(row) else ""
     values = (row_cell(row, column) for column in table_quantities())
     return (row.label + doubt, str(len(row.runs)), *values)
 
 
 def row_cell(row: SeriesRow, column: QuantityDefinition) -> str:
-    """One quantity; f_s without a value of its own by its bounds; "" for what no run determined."""
+    """Cell of a quantity; bounds for f_s without a value; "" where undetermined."""
     pooled = row.quantities.get(column.name)
     if pooled is None:
         return _bounds(row) if column.name == "friction_static" else ""
@@ -93,7 +93,7 @@ def format_difference(found: Quantity, reference: float, column: QuantityDefinit
 
 
 def repeats(pooled: PooledQuantity) -> str:
-    """How runs differ: relative standard deviation and Birge ratio, as `0.12 % 1.1`."""
+    """Scatter of the runs: relative standard deviation and Birge ratio, `0.12 % 1.1`."""
     value = abs(pooled.quantity.value)
     if pooled.scatter is None or pooled.birge_ratio is None or not value:
         return ""

@@ -47,13 +47,13 @@ def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool 
 
 
 def write_text(text: str, path: Path, *, replace: bool = False) -> None:
-    """Write a file that appears whole or not at all. Raises RunExistsError, DiskFullError, WriteError."""
+    """Write a file atomically. Raises RunExistsError, DiskFullError, WriteError."""
     with atomic_write(path, replace=replace) as made:
         made.write_bytes(text.encode())
 
 
 def write_workbook(content: TableContent, path: Path, *, replace: bool = False) -> None:
-    """Write a workbook: table, repeats, what is said of it, runs that do not count, and the print if asked.
+    """Write a workbook: table, numbers, repeats, notes, and the published table if asked for.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def _markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> lis
 
 
 def _marked(text: str) -> str:
-    """Text that Markdown shows as it is."""
+    """Escape text for Markdown."""
     return "".join(f"\\{one}" if one in "\\`*_[]<>|#" else " " if one in "\r\n" else one for one in text)
 
 
@@ -121,7 +121,7 @@ def _latex(content: TableContent) -> str:
 
 
 def _latex_cell(text: str) -> str:
-    """A cell with true minus signs and ranges."""
+    """A cell with minus signs and ranges in LaTeX."""
     shown = escape(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
     if shown.startswith(("[", "*")):  # after the end of a row these would belong to it
         return f"{{{shown[0]}}}{shown[1:]}"
@@ -148,7 +148,7 @@ _LEADING: Final = ("series", "contact", "pullback_m", "table_mass_kg", "runs")
 
 
 def flat_table(content: TableContent) -> tuple[list[str], list[list[Any]]]:
-    """Header and rows; None where there is nothing."""
+    """Header and rows of plain numbers in SI; None where undetermined."""
     names = [f"{name}{fact}" for name in _names() for fact in _SUFFIXES]
     header = [*_LEADING, *names, "msk64_degree", "warnings"]
     if content.published is not None:
@@ -191,7 +191,7 @@ SCHEMA: Final = "slipstand-table/1"
 
 
 def table_document(content: TableContent) -> dict[str, Any]:
-    """All that the table says; what was not determined is absent, what is not finite null."""
+    """JSON of the table; undetermined values are absent, values that are not finite null."""
     campaign = content.campaign
     document: dict[str, Any] = json_value(
         {

@@ -1,4 +1,4 @@
-"""The table as text for a terminal, in as many blocks of columns as its width needs."""
+"""The table as text for a terminal, in blocks of columns that fit its width."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ from app.reports.table.content import (
 _GAP: Final = "  "
 _UNBROKEN: Final = "\u00a0%"
 _SAID, _NAMED = 3, 12
-"""Series of which a caution is said in full, and that are named."""
+"""Series for which a warning is printed in full, and that are named."""
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
     " law explains a run."
@@ -35,7 +35,7 @@ _PUBLISHED_LEGEND: Final = "Found less printed, the printed c read as kgf/m:"
 
 
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
-    """Lines of the table and of what is said of it; `width` characters at most where words allow it."""
+    """Lines of the table and its notes, of at most `width` characters where words allow it."""
     rows = [row_cells(row) for row in content.campaign.rows]
     yield from blocks(table_headers(), rows, width)
     yield from ("", *_wrapped(LEGEND, width))
@@ -52,7 +52,7 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
 
 
 def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
-    """What is said below the table: titles with sentences, only those that have some."""
+    """Notes below the table: titles with sentences; empty ones are left out."""
     campaign = content.campaign
     every = (
         ("What f_d depends on", effect_sentences(campaign.effects)),
@@ -67,7 +67,7 @@ def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
 
 
 def _degrees(campaign: Campaign) -> list[str]:
-    """Each degree with its series; those of the most frequent one are counted."""
+    """Each degree with its series; the most frequent one with their number."""
     by_degree = {
         degree: [row.label for row in campaign.rows if row.msk64_degree == degree]
         for degree in campaign.msk64_degrees
@@ -81,7 +81,7 @@ def _degrees(campaign: Campaign) -> list[str]:
 
 
 def _warnings(content: TableContent) -> Iterator[str]:
-    """What must be known; what is said of many series is said of the first, and the others are named."""
+    """Warnings. One that many series share is printed for the first, with the names of the others."""
     yield from (str(caution.message) for caution in (*content.warnings, *content.campaign.warnings))
     by_code: dict[str, list[tuple[str, str]]] = {}
     for row in content.campaign.rows:
@@ -102,7 +102,7 @@ def _flags(content: TableContent) -> list[str]:
 
 
 def effect_sentences(effects: Effects) -> list[str]:
-    """A sentence a cause, and how far the series scatter about what they say."""
+    """One sentence for each cause, and the scatter of the series about the model."""
     said = [str(effect.sentence) for effect in effects.effects]
     if effects.scatter:
         said.append(
@@ -113,7 +113,7 @@ def effect_sentences(effects: Effects) -> list[str]:
 
 
 def ratio_sentence(ratio: ContactRatio) -> str:
-    """How much larger f_s is than f_d with one contact."""
+    """Ratio of f_s to f_d of one contact."""
     contact = ratio.contact or "contact not named"
     low, high = ratio.bounds
     said = []
@@ -133,7 +133,7 @@ def _spread(between_series: float | None) -> str:
 
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """How the runs of each series differ: header and rows."""
+    """Scatter of the runs of each series: header and rows."""
     columns = table_quantities()[1:]
     rows = [
         (
@@ -164,7 +164,7 @@ def _differences(row: SeriesRow, printed: PublishedRowComparison) -> Iterator[st
 
 
 def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> Iterator[str]:
-    """Columns under each other where they do not fit beside each other; the first one leads each block."""
+    """Lines of a table, split into blocks of columns that fit `width`; each begins with the first column."""
     widths = [max(len(row[place]) for row in (header, *rows)) for place in range(len(header))]
     for number, places in enumerate(_fitting(widths, width)):
         if number:
@@ -174,7 +174,7 @@ def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> 
 
 
 def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
-    """Places of the columns of each block."""
+    """Column indices of each block."""
     block, used = [0], widths[0]
     for place, wide in enumerate(widths[1:], start=1):
         if len(block) > 1 and used + len(_GAP) + wide > width:
@@ -186,7 +186,7 @@ def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
 
 
 def _wrapped(text: str, width: int, begin: str = "") -> list[str]:
-    """Lines of a sentence; no number is parted from its percent sign."""
+    """Lines of a sentence, without a break before a percent sign."""
     lines = textwrap.wrap(
         text.replace(" %", _UNBROKEN),
         width,

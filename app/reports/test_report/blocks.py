@@ -1,4 +1,4 @@
-"""Parts that a report is made of; the template knows how each looks, and takes every text as it is."""
+"""Blocks of a report. The template sets each kind; texts are taken literally."""
 
 from typing import Literal
 
@@ -6,7 +6,7 @@ import msgspec
 
 
 class Symbol(msgspec.Struct, frozen=True, tag="symbol"):
-    """A symbol of the paper, set with its subscript: `f_d`; and a unit, where it heads a column."""
+    """A symbol with its subscript, `f_d`, and a unit where it heads a column."""
 
     text: str
     unit: str = ""
@@ -16,15 +16,15 @@ Cell = str | Symbol
 
 
 class Facts(msgspec.Struct, frozen=True, tag="facts"):
-    """What is known: names with values."""
+    """Names with values."""
 
     rows: list[tuple[str, str]]
 
 
 class Grid(msgspec.Struct, frozen=True, tag="grid"):
-    """A table with a header that is repeated on every page. `small` sets it in smaller type.
+    """A table whose header is repeated on every page, in smaller type where `small`.
 
-    `numbers` says how many of the last columns are numbers, set to the right.
+    The last `numbers` columns hold numbers, set to the right.
     """
 
     header: list[Cell]
@@ -41,13 +41,13 @@ class Text(msgspec.Struct, frozen=True, tag="text"):
 
 
 class Points(msgspec.Struct, frozen=True, tag="points"):
-    """Sentences, each on its own."""
+    """A list of sentences."""
 
     texts: list[str]
 
 
 class Conclusion(msgspec.Struct, frozen=True, tag="verdict"):
-    """The result in large type, `symbol relation value`, with what is to be thought of it."""
+    """The result in large type, `symbol relation value`, with its assessment."""
 
     symbol: Symbol
     value: str
@@ -57,27 +57,27 @@ class Conclusion(msgspec.Struct, frozen=True, tag="verdict"):
 
 
 class Notice(msgspec.Struct, frozen=True, tag="notice"):
-    """What must not be overlooked, marked at its side."""
+    """An important remark, marked at its side."""
 
     text: str
     tone: Literal["warn", "bad"] = "bad"
 
 
 class Drawing(msgspec.Struct, frozen=True, tag="drawing"):
-    """A figure as SVG, as wide as there is room, with what it shows."""
+    """A figure as SVG over the full width, with its caption."""
 
     svg: str
     caption: str
 
 
 class Drawings(msgspec.Struct, frozen=True, tag="drawings"):
-    """Figures two by two."""
+    """Figures in two columns."""
 
     items: list[Drawing]
 
 
 class Signatures(msgspec.Struct, frozen=True, tag="signatures"):
-    """Places to sign."""
+    """Fields for signatures."""
 
     roles: list[str]
 
@@ -86,7 +86,7 @@ Block = Facts | Grid | Text | Points | Conclusion | Notice | Drawing | Drawings 
 
 
 class Section(msgspec.Struct, frozen=True):
-    """A part of the report; `wide` is set on pages turned by a quarter."""
+    """A section of the report; `wide` ones are set on landscape pages."""
 
     title: str
     blocks: list[Block]
@@ -94,15 +94,15 @@ class Section(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """All that a report says.
+    """Content of a report.
 
     Attributes
     ----------
     title, subtitle : str
     laboratory : str
-        "" where it is not known.
+        "" where unknown.
     date : str
-        ISO, of the report; the only thing that differs between two reports of the same runs.
+        ISO date of the report, the only difference between two reports of the same runs.
     software : str
     sections : list of Section
     """

@@ -1,4 +1,4 @@
-"""From run files to a report: one run by itself, several as a campaign."""
+"""Building of a report from run files: of one run, or of a campaign."""
 
 import datetime
 import os
@@ -22,7 +22,7 @@ TITLE = "Test report: dry friction by pullback"
 
 
 class ReportHead(msgspec.Struct, frozen=True):
-    """What stands above a report: its date, and title and laboratory where they are given."""
+    """Head of a report: date, title, laboratory."""
 
     date: datetime.date
     title: str = TITLE
@@ -30,7 +30,7 @@ class ReportHead(msgspec.Struct, frozen=True):
 
 
 def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHead) -> Report:
-    """Report of everything that was gathered: of one run where there is but one.
+    """Build the report of the collected runs; of the run itself where there is only one.
 
     Raises RunError, AnalysisError.
     """
@@ -61,7 +61,7 @@ def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
 
 
 def _folder(names: Sequence[str]) -> str:
-    """The folder that all runs lie in; "" where there is none, as on two drives."""
+    """Common folder of all runs; "" where there is none, as on two drives."""
     try:
         return os.path.commonpath([str(Path(name).parent) for name in names])
     except ValueError:

@@ -1,4 +1,4 @@
-"""From what a report says to PDF/A, without a network and the same bytes each time."""
+"""Typesetting of a report as PDF/A: offline, reproducible to the byte."""
 
 import re
 from collections.abc import Iterator
@@ -6,20 +6,19 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import msgspec
+import typst
+from matplotlib.ft2font import FT2Font
 
 from app.reports.figures.style import typeface_files
 from app.reports.test_report.blocks import Report
 from app.runs.disk import atomic_write
 from app.runs.errors import WriteError
 
-if TYPE_CHECKING:
-    from typst import Compiler
-
 PDF_STANDARD: Final = "a-2a"
-"""PDF/A-2 with the structure that screen readers need: text and tables stay readable for decades."""
+"""PDF/A-2 level a: archival, with the structure that screen readers need."""
 _LONG_WORD = re.compile(r"\S{48}(?=\S)")
 _BREAK = "\u200b"
 _ALWAYS = frozenset("\n\u200b\u00a0\u202f")
@@ -39,17 +38,14 @@ def render_pdf(report: Report) -> bytes:
 
 
 def render_pages(report: Report, dots_per_inch: float = 100.0) -> list[bytes]:
-    """Typeset a report as a PNG a page, to look at. Raises WriteError."""
+    """Typeset a report as one PNG for each page. Raises WriteError."""
     with _compiler(report) as compiler:
         made = compiler.compile(format="png", ppi=dots_per_inch)
-    return made if isinstance(made, list) else [made or b""]  # a single page comes by itself
+    return made if isinstance(made, list) else [made or b""]  # a single page is no list
 
 
 def printable(text: str) -> str:
-    """Text that the typeface has a sign for; any other is told by its number, `[U+1F600]`.
-
-    Words without end are allowed to break.
-    """
+    """Replace characters that the typeface lacks by their code point, `[U+1F600]`; let long words break."""
     known = _signs()
     shown = "".join(
         sign if sign in _ALWAYS or ord(sign) in known else f"[U+{ord(sign):04X}]"
@@ -59,10 +55,8 @@ def printable(text: str) -> str:
 
 
 @contextmanager
-def _compiler(report: Report) -> "Iterator[Compiler]":
-    """What typesets this report. Raises WriteError where it cannot."""
-    import typst
-
+def _compiler(report: Report) -> Iterator[typst.Compiler]:
+    """Compiler of a report. Raises WriteError where typesetting fails."""
     document = msgspec.json.encode(_printable(msgspec.to_builtins(report))).decode()
     with as_file(files("app.reports.test_report") / "template.typ") as template:
         try:
@@ -80,7 +74,7 @@ def _compiler(report: Report) -> "Iterator[Compiler]":
 
 
 def _printable(value: Any, key: str = "") -> Any:
-    """All texts of a document but drawings, which are no texts."""
+    """Make every text of a document printable, except SVG."""
     if isinstance(value, dict):
         return {name: _printable(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -90,8 +84,6 @@ def _printable(value: Any, key: str = "") -> Any:
 
 @cache
 def _signs() -> frozenset[int]:
-    """Code points that every cut of the typeface has."""
-    from matplotlib.ft2font import FT2Font
-
+    """Code points that every font file of the typeface has."""
     cuts = [frozenset(FT2Font(str(file)).get_charmap()) for file in typeface_files()]
     return frozenset.intersection(*cuts)

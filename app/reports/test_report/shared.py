@@ -1,4 +1,4 @@
-"""Sections that reports of a run and of a campaign have in common."""
+"""Sections that the reports of a run and of a campaign share."""
 
 import datetime
 from collections.abc import Sequence
@@ -39,17 +39,17 @@ _PROCEDURE: Final = (
 
 
 def procedure() -> Section:
-    """How the test is made and evaluated."""
+    """Procedure of test and evaluation."""
     return Section("Procedure", [Text(paragraph) for paragraph in _PROCEDURE])
 
 
 def stand_section(stands: Sequence[Stand]) -> Section:
-    """The stand, or the stands, with what is stated of them."""
+    """Stated properties of each stand."""
     return Section("Stand" if len(stands) == 1 else "Stands", [_stand(stand) for stand in stands])
 
 
 def gauges_section(calibrations: Sequence[Gauges]) -> Section:
-    """Both gauges of each calibration."""
+    """Calibrations of both gauges."""
     blocks = [
         Grid(["", "gauge 1, table", f"gauge 2, {_measured(gauges.relative)}"], _calibration(gauges))
         for gauges in calibrations
@@ -58,7 +58,7 @@ def gauges_section(calibrations: Sequence[Gauges]) -> Section:
 
 
 def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
-    """Hash of each run file, and what it is worth."""
+    """Hash of each run file, with its meaning."""
     rows = [[one.name, f"{one.size_bytes}", one.sha256] for one in prints]
     note = (
         "SHA-256 of the run files as they were when this report was made. The checksums of the samples in"
@@ -68,27 +68,27 @@ def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
 
 
 def signatures() -> Section:
-    """Places to sign."""
+    """Fields for signatures."""
     return Section("Signatures", [Signatures(list(ROLES))])
 
 
 def drawing(figure: Figure, caption: str) -> Drawing:
-    """A figure within `look.print_style` as part of a report."""
+    """A figure drawn in `print_style`, as a block."""
     return Drawing(figure_svg(figure), caption)
 
 
 def format_time(at: datetime.datetime) -> str:
-    """A time for people, in its own zone."""
+    """Format a time in its own zone."""
     return at.strftime("%Y-%m-%d %H:%M:%S %z")
 
 
 def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:
-    """Facts without those of which nothing is known."""
+    """Facts with a value."""
     return Facts([(name, value) for name, value in rows if value])
 
 
 def scaled(value: float | None, scale: float, decimals: int, unit: str) -> str:
-    """A plain value in its unit, "" where there is none."""
+    """Format a value in its unit; "" for None."""
     return "" if value is None else f"{typeset(format_fixed(value * scale, decimals))}{NO_BREAK_SPACE}{unit}"
 
 
