@@ -28,11 +28,7 @@ class PortHint:
 
 
 def port_hints(
-    port: PortInfo,
-    *,
-    processes: Path = PROCESSES,
-    usb_serial: Path = USB_SERIAL,
-    udev_data: Path = UDEV_DATA,
+    port: PortInfo, *, processes: Path = PROCESSES, usb_serial: Path = USB_SERIAL, udev_data: Path = UDEV_DATA
 ) -> Iterator[PortHint]:
     """Hindrances to reading `port`; the folders are those of Linux and need not exist."""
     for hint in (

@@ -14,6 +14,7 @@ from app.cli.options import CalibrationFile, DeviceSettings, Json, choice, key_v
 from app.simulated_stand.client import Ready
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.process import read_disturbances, serve, stop_on_signal_or_orphaned
+from drivers.registry import AVAILABLE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,7 +22,7 @@ class StandOptions:
     """Options of the simulated stand, by the fields of `SimulatedStandOptions`."""
 
     protocol: Annotated[
-        str, typer.Option("--protocol", help="slipstand-binary, csv, gsv, harp or modbus.")
+        str, typer.Option("--protocol", help=f"{', '.join(driver.name for driver in AVAILABLE)}.")
     ] = "slipstand-binary"
     rate_hz: Annotated[float, typer.Option("--rate", help="Samples a second.")] = 2000.0
     series: Annotated[

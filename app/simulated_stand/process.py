@@ -11,13 +11,7 @@ from pathlib import Path
 import msgspec
 
 from analysis.record import AnalysisError
-from app.child_process import (
-    CommandReader,
-    EventSender,
-    LineDecoder,
-    ignore_session_signals,
-    reserve_stdout,
-)
+from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
 from app.simulated_stand.client import Ready, Refused, StandEvent, Started, TruthChanged
 from app.simulated_stand.options import SimulatedStandOptions

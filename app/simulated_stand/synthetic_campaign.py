@@ -216,9 +216,7 @@ def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]
     own = parameters.friction_dynamic * (1.0 + scatter * np.random.default_rng(seed).standard_normal())
     static = parameters.friction_static
     return replace(
-        parameters,
-        friction_dynamic=own,
-        friction_static=None if static is None else max(static, own),
+        parameters, friction_dynamic=own, friction_static=None if static is None else max(static, own)
     )
 
 

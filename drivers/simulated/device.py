@@ -113,11 +113,7 @@ class SimulatedDevice:
     _NO_STREAM_S = 0.02
 
     def __init__(
-        self,
-        transport: Transport,
-        protocol: SimulatedProtocol,
-        signal_at: SignalFactory,
-        setup: DeviceSetup,
+        self, transport: Transport, protocol: SimulatedProtocol, signal_at: SignalFactory, setup: DeviceSetup
     ) -> None:
         self._transport = transport
         self._protocol = protocol
@@ -267,11 +263,7 @@ class PolledDevice(SimulatedDevice):
     """
 
     def __init__(
-        self,
-        transport: Transport,
-        protocol: PolledProtocol,
-        signal_at: SignalFactory,
-        setup: DeviceSetup,
+        self, transport: Transport, protocol: PolledProtocol, signal_at: SignalFactory, setup: DeviceSetup
     ) -> None:
         super().__init__(transport, protocol, signal_at, setup)
         self._registers = protocol

@@ -7,13 +7,7 @@ import pytest
 from probe_kit import misread, wire_of
 
 from drivers.errors import SettingsError
-from drivers.port_probe import (
-    COMMON_LINE_SETTINGS,
-    FIRST_WAIT_S,
-    identity_queries,
-    listen,
-    query_identity,
-)
+from drivers.port_probe import COMMON_LINE_SETTINGS, FIRST_WAIT_S, identity_queries, listen, query_identity
 from drivers.recognition import recognise
 from drivers.source import LineSettings
 
@@ -159,12 +153,7 @@ def test_each_question_is_asked_at_its_baud_rates_and_in_order():
         (tuning, question.data) for _, question in identity_queries() for tuning in question.line_settings
     ]
     assert wire.sent == expected
-    assert [protocol for protocol, _ in identity_queries()] == [
-        "slipstand-binary",
-        "harp",
-        "gsv",
-        "modbus",
-    ]
+    assert [protocol for protocol, _ in identity_queries()] == ["slipstand-binary", "harp", "gsv", "modbus"]
 
 
 def test_the_first_answer_ends_it():

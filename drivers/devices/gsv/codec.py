@@ -9,15 +9,7 @@ from numpy.typing import NDArray
 from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
-from drivers.packets import (
-    LOSS_FIELDS,
-    MAX_GAP_S,
-    PACKET,
-    LossEstimator,
-    PacketDecoder,
-    Packets,
-    Record,
-)
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, Packets, Record
 from drivers.samples import Losses, SampleStatus
 
 HEADER_BYTES = 3
@@ -126,9 +118,7 @@ def _layout_at(data: bytes, at: int) -> tuple[int, ValueKind] | None:
 
 
 def encode_frames(
-    layout: FrameLayout,
-    counts: NDArray[np.int32] | NDArray[np.float64],
-    flags: int | NDArray[np.uint8] = 0,
+    layout: FrameLayout, counts: NDArray[np.int32] | NDArray[np.float64], flags: int | NDArray[np.uint8] = 0
 ) -> NDArray[np.uint8]:
     """Frames as a device without faults sends them; channels without a gauge are 0.
 

@@ -171,10 +171,7 @@ _ERROR_MASK = 0xF7
 
 @compiled
 def find_events(
-    buffer: NDArray[np.uint8],
-    channels: NDArray[np.int64],
-    garbage: int,
-    lines: NDArray[np.void],
+    buffer: NDArray[np.uint8], channels: NDArray[np.int64], garbage: int, lines: NDArray[np.void]
 ) -> tuple[int, int, int, int]:
     """Events in `buffer` and what is none, as `lines`.
 

@@ -8,14 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.devices.modbus.frames import MAX_UNIT, READ_FUNCTIONS, WRITE_FUNCTIONS, Function
-from drivers.devices.modbus.registers import (
-    WORD_BITS,
-    ByteOrder,
-    Channel,
-    Status,
-    ValueType,
-    ZeroCommand,
-)
+from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, Status, ValueType, ZeroCommand
 from drivers.driver import GAUGES
 from drivers.errors import SettingsError
 from messages.message import Message, message

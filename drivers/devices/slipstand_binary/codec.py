@@ -15,15 +15,7 @@ from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16, crc16_slice
 from drivers.errors import ProtocolError, SettingsError
-from drivers.packets import (
-    LOSS_FIELDS,
-    MAX_GAP_S,
-    PACKET,
-    PacketDecoder,
-    Packets,
-    Record,
-    is_plausible_gap,
-)
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, PacketDecoder, Packets, Record, is_plausible_gap
 
 START = b"S"
 STOP = b"P"

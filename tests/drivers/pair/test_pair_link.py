@@ -109,12 +109,7 @@ def test_reads_of_both_ports_come_in_envelopes_and_both_devices_are_stopped(port
     got = stamped(link, lambda reads: all(sum(read.port == gauge for read in reads) > 5 for gauge in (0, 1)))
     link.close()
     link.close()
-    assert {(read.port, read.data) for read in got} == {
-        (0, b"firsta"),
-        (0, b"a"),
-        (1, b"firstb"),
-        (1, b"b"),
-    }
+    assert {(read.port, read.data) for read in got} == {(0, b"firsta"), (0, b"a"), (1, b"firstb"), (1, b"b")}
     for gauge in (0, 1):
         arrivals = [read.arrival_ns for read in got if read.port == gauge]
         assert arrivals == sorted(arrivals)

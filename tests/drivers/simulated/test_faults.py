@@ -6,12 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import SettingsError
-from drivers.simulated.faults import (
-    Disturbance,
-    DisturbanceKind,
-    DisturbanceSchedule,
-    parse_disturbance,
-)
+from drivers.simulated.faults import Disturbance, DisturbanceKind, DisturbanceSchedule, parse_disturbance
 
 
 @pytest.mark.parametrize(

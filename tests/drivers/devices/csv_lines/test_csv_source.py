@@ -147,11 +147,7 @@ def test_a_second_start_goes_on_with_the_same_account():
 @pytest.mark.parametrize(
     ("settings", "rate_hz", "fault"),
     [
-        (
-            {"colums": "table"},
-            None,
-            "setting 'colums' is not known to csv: allowed are format, columns,",
-        ),
+        ({"colums": "table"}, None, "setting 'colums' is not known to csv: allowed are format, columns,"),
         (
             {"columns": "time,table,relative"},
             None,

@@ -42,10 +42,7 @@ class Stand:
     def __init__(self) -> None:
         self.terminal = open_pseudo_terminal()
         self.device = SimulatedDevice(
-            self.terminal,
-            find_driver("gsv").make_simulated({}),
-            lambda *_: Counting(),
-            DeviceSetup(RATE_HZ),
+            self.terminal, find_driver("gsv").make_simulated({}), lambda *_: Counting(), DeviceSetup(RATE_HZ)
         )
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -153,7 +150,7 @@ def test_the_peer_reads_the_simulated_device(stand, client):
     got = client.ReadMultiple()
     assert client.isResultOk(client.SetZero(0))
     zeroed = client.ReadValue()
-    assert len(got) == stand.device.account.samples > 20
+    assert len(got) == stand.device.log.samples > 20
     table = np.array([values["channel0"] for _, values, _, _ in got])
     np.testing.assert_array_equal(table, np.arange(len(got)))
     relative = np.array([values["channel1"] for _, values, _, _ in got])

@@ -32,10 +32,7 @@ def test_the_generic_map_needs_one_request():
 
 def test_two_transmitters_on_one_bus_need_two():
     poll = poll_for(map="laumas-tlb4")
-    assert poll.requests == (
-        Request(1, Function.READ_HOLDING, 6, 3),
-        Request(2, Function.READ_HOLDING, 6, 3),
-    )
+    assert poll.requests == (Request(1, Function.READ_HOLDING, 6, 3), Request(2, Function.READ_HOLDING, 6, 3))
     answers = [struct.pack(">Hi", 0x80, 70_000), struct.pack(">Hi", 0x08, 123)]
     table, relative = poll.channel_values(answers)
     assert table == ChannelValue(-70_000.0)  # bit 7: negative

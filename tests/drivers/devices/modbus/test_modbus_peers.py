@@ -131,10 +131,7 @@ def test_we_read_the_registers_that_pymodbus_serves(settings, held, expected):
 
 
 def test_we_read_two_units_of_pymodbus_with_status_and_sign():
-    held = {
-        1: registers(">Hi", 0x80, 70_000),
-        2: registers(">Hi", 0x08, 123),
-    }
+    held = {1: registers(">Hi", 0x80, 70_000), 2: registers(">Hi", 0x08, 123)}
     with pymodbus_server(held, first=6) as url:
         block, source = read_some(url, {"map": "laumas-tlb4"})
     read = (block.status & (SampleStatus.MISSING | SampleStatus.DAMAGED)) == 0
