@@ -15,7 +15,7 @@ from app.log import log_folder
 from app.version import __version__
 from config.files import config_directory
 from drivers.port import list_ports
-from drivers.registry import PROTOCOLS
+from drivers.registry import DRIVERS
 
 _VARIABLES = ("SLIPSTAND_", "NUMBA_", "QT_", "OMP_", "LANG", "DISPLAY", "WAYLAND_DISPLAY")
 """Beginnings of the names of environment variables that change how the program works."""
@@ -41,7 +41,7 @@ def _files(findings: Sequence[Finding]) -> Iterator[tuple[str, str, str]]:
         "serial ports with their USB identities",
         _json([asdict(port) for port in list_ports()]),
     )
-    protocols = {info.name: info.verified for info in PROTOCOLS.values()}
+    protocols = {info.name: info.verified for info in DRIVERS.values()}
     yield "protocols.json", "protocols, and what each was verified against", _json(protocols)
     for path in sorted(config_directory().glob("*.toml")):
         yield f"settings/{path.name}", f"your {path.name}", _text(path)
