@@ -120,6 +120,11 @@ def joined(parts: Sequence[Message | str], separator: str = " ") -> Message:
     return Message(separator.replace("{", "{{").replace("}", "}}").join(fields), named)
 
 
+def as_message(text: Message | str) -> Message:
+    """Return a text as message; a message as it is."""
+    return text if isinstance(text, Message) else message("{text}", text=text) if text else EMPTY
+
+
 def message_of(error: BaseException) -> Message:
     """Message of an error; of errors that carry none, their text on one line."""
     if isinstance(error, MessageError):

@@ -125,14 +125,18 @@ class CountAverager:
             raise self._fault
         if not came:
             raise NoAverageError(
-                f"only {sum(map(len, taken))} samples came in {window_s + TIMEOUT_S:g} s. Check cable,"
-                " power and rate of the device"
+                "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device",
+                samples=sum(map(len, taken)),
+                window_s=window_s + TIMEOUT_S,
             )
         sound = np.concatenate(taken)[stale:]
         if len(sound) < max(_SOUND_SHARE * wanted, 2):
             raise NoAverageError(
-                f"gauge {self._channel + 1} is overloaded or its samples are damaged: {self._unsound} of"
-                f" {self._unsound + sum(map(len, taken))}. Move it back into its range, or check the cable"
+                "gauge {gauge} is overloaded or its samples are damaged: {unsound} of {samples}. Move it"
+                " back into its range, or check the cable",
+                gauge=self._channel + 1,
+                unsound=self._unsound,
+                samples=self._unsound + sum(map(len, taken)),
             )
         return compute_average(sound)
 

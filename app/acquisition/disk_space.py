@@ -7,6 +7,7 @@ from pathlib import Path
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import MARGIN_BYTES, free_bytes
+from messages.message import EMPTY, Message, message
 
 ROW_BYTES = 41
 """Of one sample in a run file: time, two readings, status, two counts as float64."""
@@ -62,7 +63,7 @@ class DiskDemand:
         return self.journal_bytes_per_s * run.trigger_timeout_s if run.trigger == "pullback" else 0.0
 
 
-def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
+def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Message:
     """Make sure that a run has room, and say what else is to be known of it; "" if nothing.
 
     Raises
@@ -73,26 +74,31 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
     free = free_bytes(folder)
     needed = demand.of_run(run)
     if free is None:
-        return ""
+        return EMPTY
     if free < needed:
         raise DiskSpaceError(
-            f"{folder}: the disk has {_megabytes(free)} left, and this run takes {_megabytes(needed)}."
-            " Free some space or record to another disk"
+            "{folder}: the disk has {free} left, and this run takes {needed}. Free some space or record"
+            " to another disk",
+            folder=folder,
+            free=_megabytes(free),
+            needed=_megabytes(needed),
         )
     if free < needed + demand.of_waiting(run):
         waiting_s = (free - needed) / demand.journal_bytes_per_s
-        return (
-            f"the disk has {_megabytes(free)} left, enough for this run if the release comes within"
-            f" {waiting_s / 60:.0f} minutes: free some space"
+        return message(
+            "the disk has {free} left, enough for this run if the release comes within {minutes:.0f} minutes:"
+            " free some space",
+            free=_megabytes(free),
+            minutes=waiting_s / 60,
         )
-    return ""
+    return EMPTY
 
 
 @dataclass(frozen=True, slots=True)
 class DiskWarning:
     """What is to be said of the room that is left, and whether the run must end now."""
 
-    note: str
+    note: Message
     must_end: bool = False
 
 
@@ -125,15 +131,23 @@ class DiskSpaceMonitor:
         spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
         if spare_s < _CLOSING_S:
             return DiskWarning(
-                f"{self._folder}: the disk has only {_megabytes(free)} left, which closing this run takes."
-                " Free some space or record to another disk",
+                message(
+                    "{folder}: the disk has only {free} left, which closing this run takes. Free some"
+                    " space or record to another disk",
+                    folder=self._folder,
+                    free=_megabytes(free),
+                ),
                 must_end=True,
             )
         if spare_s > _WARN_S or self._is_warned:
             return None
         self._is_warned = True
         return DiskWarning(
-            f"the disk has {_megabytes(free)} left, enough for {spare_s:.0f} s more: free some space now"
+            message(
+                "the disk has {free} left, enough for {spare_s:.0f} s more: free some space now",
+                free=_megabytes(free),
+                spare_s=spare_s,
+            )
         )
 
 

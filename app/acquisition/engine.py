@@ -70,6 +70,7 @@ from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
+from messages.message import EMPTY, Message, as_message, message, message_of
 
 _SWITCH_S = 0.001
 """No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
@@ -189,10 +190,10 @@ class Engine:
             while not (self._is_leaving and self._recording is None):
                 self._step()
         except StreamEndedError as error:
-            self._finish(error.reason, str(error))
+            self._finish(error.reason, message_of(error))
             raise
         except BaseException as error:
-            self._finish(EndReason.WRITE_ERROR, str(error))
+            self._finish(EndReason.WRITE_ERROR, message_of(error))
             raise
         finally:
             self._space.stop()
@@ -282,10 +283,12 @@ class Engine:
 
     def _begin(self, run: RunSettings, count: int) -> None:
         if self._recording is not None:
-            self._recording.show_note("A run is being recorded already: stop it before the next one")
+            self._recording.show_note(message("A run is being recorded already: stop it before the next one"))
             return
         if self._stream.is_disconnected:
-            self._refuse(EndReason.DEVICE_LOST, "the device is away: plug it in, and record when it is back")
+            self._refuse(
+                EndReason.DEVICE_LOST, message("the device is away: plug it in, and record when it is back")
+            )
         elif self._try_to_arm(run):
             self._repetition.begin(run, count)
 
@@ -294,12 +297,12 @@ class Engine:
         try:
             self._arm(run)
         except DiskSpaceError as error:
-            self._refuse(EndReason.DISK_FULL, str(error))
+            self._refuse(EndReason.DISK_FULL, message_of(error))
         except JournalError as error:
-            self._refuse(end_reason(error), str(error))
+            self._refuse(end_reason(error), message_of(error))
         return self._recording is not None
 
-    def _refuse(self, reason: EndReason, message: str) -> None:
+    def _refuse(self, reason: EndReason, message: Message) -> None:
         """End a run that has not begun; the connection stays."""
         self._repetition.stop()
         self._events.send(RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
@@ -329,11 +332,11 @@ class Engine:
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.prepare()
         if self._stream.note:
-            self._recording.add_note(self._stream.note)
+            self._recording.add_note(as_message(self._stream.note))
         if note:
             self._recording.show_note(note)
 
-    def _end_all(self, reason: EndReason, message: str = "") -> None:
+    def _end_all(self, reason: EndReason, message: Message = EMPTY) -> None:
         """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
         self._repetition.stop()
         if self._recording is not None:
@@ -348,7 +351,7 @@ class Engine:
         self._is_leaving = True
         self._repetition.stop()
         if self._recording is not None and not self._recording.is_unattended:
-            self._end_all(EndReason.INTERRUPTED, "the program that recorded ended")
+            self._end_all(EndReason.INTERRUPTED, message("the program that recorded ended"))
 
     def _follow_recording(self) -> None:
         if self._recording is not None and not self._recording.is_ending:
@@ -369,7 +372,7 @@ class Engine:
         else:
             self._try_to_arm(following)
 
-    def _tell_idle(self, note: str = "") -> None:
+    def _tell_idle(self, note: Message = EMPTY) -> None:
         """Nothing is recorded: tell whether anything could be."""
         state = PullbackState.CONNECTING if self._stream.is_disconnected else PullbackState.IDLE
         self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
@@ -383,7 +386,7 @@ class Engine:
             if result.is_enough:
                 recording.end_if_enough()
 
-    def _finish(self, reason: EndReason, message: str) -> None:
+    def _finish(self, reason: EndReason, message: Message) -> None:
         """End and store a run without any more samples."""
         self._repetition.stop()
         if self._recording is not None:
@@ -443,20 +446,19 @@ def main() -> int:
         with live_folder() as folder:
             serve(CommandReader(0, LineDecoder(decode_command)), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
-        events.send(_failed(str(error)))
+        events.send(Failed(message_of(error)))
         return 1
     except Exception as error:
-        events.send(
-            _failed(f"Slipstand's engine failed ({type(error).__name__}: {error}). Please report this")
+        failure = message(
+            "Slipstand's engine failed ({kind}: {error}). Please report this",
+            kind=type(error).__name__,
+            error=error,
         )
+        events.send(Failed(failure))
         raise
     finally:
         events.close()
     return 0
-
-
-def _failed(message: str) -> Failed:
-    return Failed(" ".join(message.split()))
 
 
 if __name__ == "__main__":

@@ -31,6 +31,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingReader, RingRows, open_ring
 from app.child_process import ChildProcess, encode_line, spawn
+from messages.message import Message, message
 
 _WAIT_S = 0.1
 
@@ -143,12 +144,17 @@ class EngineClient:
 
     def _on_exit(self, code: int) -> None:
         if code and not self._has_failed:
-            self._events.put(Failed(f"the engine ended by itself (code {code}). {self._remedy()}"))
+            died = message(
+                "the engine ended by itself (code {code}). {remedy}", code=code, remedy=self._remedy()
+            )
+            self._events.put(Failed(died))
 
-    def _remedy(self) -> str:
+    def _remedy(self) -> Message:
         if not self._run_folder:
-            return "Connect again"
-        return f"What came of the run is in its journal: slipstand recover {self._run_folder}"
+            return message("Connect again")
+        return message(
+            "What came of the run is in its journal: slipstand recover {folder}", folder=self._run_folder
+        )
 
 
 def record_run(

@@ -1,9 +1,10 @@
 """Everything that can go wrong with the engine. Each message names the fault and the remedy."""
 
 from app.acquisition.messages import EndReason
+from messages.message import Message, MessageError
 
 
-class AcquisitionError(Exception):
+class AcquisitionError(MessageError):
     """Root of the acquisition errors."""
 
 
@@ -38,7 +39,7 @@ class JournalFullError(JournalError):
 class StreamEndedError(AcquisitionError):
     """No more samples will come: device lost, silent, or this computer too slow."""
 
-    def __init__(self, reason: EndReason, message: str) -> None:
+    def __init__(self, reason: EndReason, message: Message) -> None:
         super().__init__(message)
         self.reason = reason
 

@@ -35,9 +35,11 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
             raise NoSamplesError(
-                f"only {sum(map(len, taken))} of {wanted} samples came in"
-                f" {seconds + TIMEOUT_S:g} s. Check"
-                " cable, power and rate of the device"
+                "only {samples} of {wanted} samples came in {seconds:g} s. Check cable, power and rate"
+                " of the device",
+                samples=sum(map(len, taken)),
+                wanted=wanted,
+                seconds=seconds + TIMEOUT_S,
             )
         chunk = stream.next_read(0.1)
         taken += chunk.rows if chunk is not None else ()

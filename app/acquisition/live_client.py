@@ -18,9 +18,12 @@ from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.child_process import ChildProcess, encode_line, spawn
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate, Skew
+from messages.message import message
 
 _TIMED_EVERY_S = 1.0
-DIED_NOTE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
+DIED_NOTE = message(
+    "the live identification ended by itself. The run goes on, and is identified when it has ended"
+)
 
 
 class LiveClient:

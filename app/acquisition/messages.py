@@ -1,4 +1,4 @@
-"""What window or command line and the engine say to each other: one JSON document a line, typed here."""
+"""Commands to and events from the engine and the live identification, one JSON document a line."""
 
 from collections.abc import Callable
 from enum import StrEnum
@@ -8,6 +8,7 @@ import msgspec
 
 from app.child_process import json_decoder
 from app.runs.metadata import Conditions, RunMetadata
+from messages.message import EMPTY, Message
 
 _GUESS = 0.2
 """Relative standard uncertainty above which a number tells an operator nothing."""
@@ -171,7 +172,7 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
 
     state: PullbackState
     since_s: float
-    note: str = ""
+    note: Message = EMPTY
     """What the operator must know, where something did not go as it should."""
     position: StandPosition = StandPosition()
 
@@ -179,14 +180,14 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
 class Reconnecting(msgspec.Struct, frozen=True, tag=True):
     """The device is gone or says nothing intelligible, and is looked for; said again with new reasons."""
 
-    message: str
+    message: Message
 
 
 class Reconnected(msgspec.Struct, frozen=True, tag=True):
     """It is back. A run goes on, with rows for what is missing."""
 
     gap_s: float
-    message: str
+    message: Message
 
 
 class RunStarted(msgspec.Struct, frozen=True, tag=True):
@@ -208,7 +209,7 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     rate_hz: float
     release_s: float | None = None
     """On the run's time axis."""
-    message: str = ""
+    message: Message = EMPTY
     """What went wrong in a sentence, where something did."""
     skew_s: float | None = None
     """By how much later gauge 2 was read than gauge 1 on average, where two devices were read as one."""
@@ -260,14 +261,14 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     """Waiting longer does not narrow f_d."""
     is_enough: bool = False
     """Nor T, nor n1: a run without a set duration ends now."""
-    message: str = ""
+    message: Message = EMPTY
     """Why there are no more of these, where something went wrong."""
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):
     """The engine could not do it: one sentence with the remedy. The engine ends after it."""
 
-    message: str
+    message: Message
 
 
 Event = (

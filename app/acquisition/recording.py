@@ -20,7 +20,7 @@ from app.acquisition.poll_schedule import Latency
 from app.acquisition.pullback.plan import ObservedSlip, PullbackPlan, Transition
 from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
-from app.acquisition.stream.monitors import RATE_WORDS, is_rate_wrong, rate_note
+from app.acquisition.stream.monitors import RATE_TEMPLATE, is_rate_wrong, rate_note
 from app.acquisition.stream.reads import DecodedRead, RawRead, ReadHistory, ReadQueue, merge_reads
 from app.runs.blocks import BlockLayout
 from app.runs.errors import RunError
@@ -29,6 +29,7 @@ from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate, Skew
 from drivers.samples import Losses
+from messages.message import EMPTY, Message, as_message, joined, message, message_of
 
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
@@ -111,7 +112,7 @@ class Recording:
         self._path_is_told = False
         self._ended: EndReason | None = None
         self._skew: Skew | None = None
-        self._notes: list[str] = []
+        self._notes: list[Message] = []
         self._left_out = 0
         self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
         self._take_what_was_heard()
@@ -167,7 +168,7 @@ class Recording:
         if self.latency is not Latency.BATCHED or new >= _FOLLOW_S * self._rate_hz:
             self._catch_up()
 
-    def end(self, reason: EndReason, message: str = "", *, keep_rest: bool = True) -> None:
+    def end(self, reason: EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
         """End the run and keep it; without a release, what is there of the time since arming.
 
         With `keep_rest` false, a run in which the table was not even pulled back leaves no file.
@@ -185,7 +186,7 @@ class Recording:
                 history = self._around.history
                 self._open(max(history.first_index, min(self._armed_index, history.next_index - 1)))
         except RunError as error:
-            self._say(str(error))
+            self._say(message_of(error))
         if self._file is None:  # there is nothing to keep
             with contextlib.suppress(JournalError):
                 self._journal.close()
@@ -199,13 +200,13 @@ class Recording:
         if self._settings.duration_s is None and self._settings.trigger == "pullback":
             self.end(EndReason.ENOUGH)
 
-    def add_note(self, note: str) -> None:
+    def add_note(self, note: Message) -> None:
         """Tell the operator something that is kept with the run."""
         if not self.is_ending:
             self._say(note)
             self.show_note(note)
 
-    def show_note(self, note: str) -> None:
+    def show_note(self, note: Message) -> None:
         """Tell the operator something about the state that it is in."""
         self._tell(self._state, self._around.history.next_index, note)
 
@@ -243,7 +244,7 @@ class Recording:
         if error is None:
             self._around.emit(RunStarted(str(file.path.result())))
         elif isinstance(error, Exception):
-            self.end(end_reason(error), str(error))
+            self.end(end_reason(error), message_of(error))
 
     def _take_what_was_heard(self) -> None:
         """Begin the journal with what the history holds, and have it go on with all that comes."""
@@ -270,7 +271,7 @@ class Recording:
         except RunError as error:
             faults.append(error)
         if faults:
-            self.end(end_reason(faults[0]), str(faults[0]))
+            self.end(end_reason(faults[0]), message_of(faults[0]))
 
     def _follow_chunk(self, chunk: DecodedRead) -> None:
         self._followed_index = self._around.history.next_index
@@ -304,8 +305,12 @@ class Recording:
         if first_index > start_index:
             kept_s = self._settings.pretrigger_s - (first_index - start_index) / self._rate_hz
             self._say(
-                f"only {kept_s:.3g} s of the {self._settings.pretrigger_s:g} s before the release could be"
-                " kept: the stream had just begun"
+                message(
+                    "only {kept_s:.3g} s of the {pretrigger_s:g} s before the release could be kept: the"
+                    " stream had just begun",
+                    kept_s=kept_s,
+                    pretrigger_s=self._settings.pretrigger_s,
+                )
             )
         chunks = list(history.reads(first_index))
         self._file = RunFile(
@@ -328,7 +333,7 @@ class Recording:
         facts, clock = self._trigger.measurement, self._around.clock()
         self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
-        self._say("" if skew is None else str(skew.description))
+        self._say(EMPTY if skew is None else as_message(skew.description))
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
@@ -353,13 +358,15 @@ class Recording:
             zero_m=facts.zero_m,
             relative_zero_m=facts.relative_zero_m,
             held_m=facts.held_m,
-            message=self._message(),
+            message=str(self._message()),
         )
 
-    def _clock_note(self, clock: ClockEstimate | None) -> str:
+    def _clock_note(self, clock: ClockEstimate | None) -> Message:
         """What there is to say of a clock that is far off."""
-        is_said = any(RATE_WORDS in note for note in self._notes)
-        return "" if clock is None or is_said or not is_rate_wrong(clock) else rate_note(clock, self._rate_hz)
+        is_said = any(note.template == RATE_TEMPLATE for note in self._notes)
+        if clock is None or is_said or not is_rate_wrong(clock):
+            return EMPTY
+        return rate_note(clock, self._rate_hz)
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
         skew = self._skew
@@ -380,7 +387,7 @@ class Recording:
             skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
         )
 
-    def _say(self, note: str, *, first: bool = False) -> None:
+    def _say(self, note: Message, *, first: bool = False) -> None:
         if not note or note in self._notes:
             return
         if len(self._notes) >= _NOTES_MAX and not first:
@@ -388,11 +395,13 @@ class Recording:
         else:
             self._notes.insert(0 if first else len(self._notes), note)
 
-    def _message(self) -> str:
-        left_out = [f"{self._left_out} further notes are left out"] if self._left_out else []
-        return ". ".join(note.rstrip(".") for note in [*self._notes, *left_out])
+    def _message(self) -> Message:
+        notes = list(self._notes)
+        if self._left_out:
+            notes.append(message("{count} further notes are left out", count=self._left_out))
+        return joined(notes, ". ") if notes else EMPTY
 
-    def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
+    def _tell(self, state: PullbackState, index: int, note: Message = EMPTY) -> None:
         self._state = state
         self._around.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.position))
 

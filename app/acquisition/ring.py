@@ -211,7 +211,12 @@ def create_ring(path: Path, capacity: int, rate_hz: float) -> RingWriter:
             file.truncate(size)
             mapped = mmap.mmap(file.fileno(), size)
     except OSError as error:
-        raise RingError(f"{path}: no room for live samples ({error}). Free {size >> 20} MiB there") from None
+        raise RingError(
+            "{path}: no room for live samples ({error}). Free {size} MiB there",
+            path=path,
+            error=error,
+            size=size >> 20,
+        ) from None
     ring = _MappedRing(mapped)
     ring.header[1:4] = (capacity, 0, 0)
     ring.rate[0] = rate_hz
@@ -226,9 +231,11 @@ def open_ring(path: Path | str) -> RingReader:
         with Path(path).open("rb") as file:
             mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except (OSError, ValueError) as error:
-        raise RingError(f"{path}: no live samples there ({error}). Start the engine again") from None
+        raise RingError(
+            "{path}: no live samples there ({error}). Start the engine again", path=path, error=error
+        ) from None
     if len(mapped) < _HEADER_BYTES or np.frombuffer(mapped, np.uint64, 1)[0] != _MAGIC:
-        raise RingError(f"{path} is not a ring of live samples. Start the engine again")
+        raise RingError("{path} is not a ring of live samples. Start the engine again", path=path)
     ring = _MappedRing(mapped)
     ring.map_columns()
     return RingReader(ring)

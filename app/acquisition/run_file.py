@@ -27,6 +27,7 @@ from app.runs.metadata import EndMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.host_time import host_ns
 from drivers.samples import INCOMPLETE, Losses, SampleStatus
+from messages.message import EMPTY, Message, joined, message, message_of
 
 _OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
 _COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
@@ -125,7 +126,7 @@ class CloseResult:
 
     path: str
     fault: EndReason | None = None
-    message: str = ""
+    message: Message = EMPTY
 
 
 class RunFile:
@@ -249,7 +250,7 @@ class RunFile:
         lost = self._take_back_lost(samples)
         outcome = self._told(stored, samples, fault, journal_fault)
         self._journal.release()
-        self._outcome.set_result(replace(outcome, message=". ".join(filter(None, (outcome.message, lost)))))
+        self._outcome.set_result(replace(outcome, message=_sentences(outcome.message, lost)))
 
     def _hand_over_rest(self) -> None:
         if self._waiting:
@@ -259,15 +260,21 @@ class RunFile:
         try:
             return self._writer.close(ending).result(self._patience_s)
         except FutureTimeoutError:
-            raise WriteError(f"the run writer gives no answer for {self._patience_s:.0f} s") from None
+            raise WriteError(
+                message("the run writer gives no answer for {timeout_s:.0f} s", timeout_s=self._patience_s)
+            ) from None
 
-    def _take_back_lost(self, stored_samples: int) -> str:
+    def _take_back_lost(self, stored_samples: int) -> Message:
         """Count what neither file nor journal has no more, and say so."""
         lost = self._unsure.lost_after(self.start_index + stored_samples)
         for rows in lost:
             self.statistics.remove(rows)
         samples = sum(len(rows) for rows in lost)
-        return f"the last {samples} samples found no room in run or journal, and are lost" if samples else ""
+        if not samples:
+            return EMPTY
+        return message(
+            "the last {samples} samples found no room in run or journal, and are lost", samples=samples
+        )
 
     def _told(
         self, stored: StoredRun | None, samples: int, fault: Exception | None, journal_fault: Exception | None
@@ -277,13 +284,19 @@ class RunFile:
         lacking = self.statistics.losses().samples - samples
         first = fault or journal_fault
         if first is not None:
-            remedy = self._remedy(journal_fault) if lacking or journal_fault is None else ""
-            said = (str(first) or type(first).__name__).rstrip(".")
-            return CloseResult(path, end_reason(first), ". ".join(filter(None, (said, remedy))))
+            remedy = self._remedy(journal_fault) if lacking or journal_fault is None else EMPTY
+            return CloseResult(path, end_reason(first), _sentences(message_of(first), remedy))
         if lacking:
-            return CloseResult(path, message=f"{lacking} samples are only in the journal. {self._remedy()}")
+            return CloseResult(
+                path,
+                message=_sentences(
+                    message("{samples} samples are only in the journal", samples=lacking), self._remedy()
+                ),
+            )
         if stored is None or not stored.raw_bytes_stored:
-            return CloseResult(path, message=f"no room for the received bytes in the run. {self._remedy()}")
+            return CloseResult(
+                path, message=_sentences(message("no room for the received bytes in the run"), self._remedy())
+            )
         self._journal.remove()
         return CloseResult(path)
 
@@ -293,14 +306,29 @@ class RunFile:
         size = self.statistics.losses().samples * ROW_BYTES + self._journal.size
         return _CLOSING_S + size / _SLOW_BYTES_PER_S
 
-    def _remedy(self, journal_fault: Exception | None = None) -> str:
+    def _remedy(self, journal_fault: Exception | None = None) -> Message:
         journal = self._journal.path
-        held = "All that came" if journal_fault is None else "More than the run has"
-        return f"{held} is in {journal}: rebuild the run with slipstand recover {journal.parent}"
+        if journal_fault is None:
+            return message(
+                "All that came is in {journal}: rebuild the run with slipstand recover {folder}",
+                journal=journal,
+                folder=journal.parent,
+            )
+        return message(
+            "More than the run has is in {journal}: rebuild the run with slipstand recover {folder}",
+            journal=journal,
+            folder=journal.parent,
+        )
 
     def _known_path(self) -> str:
         has_path = self._path.done() and self._path.exception() is None
         return str(self._path.result()) if has_path else ""
+
+
+def _sentences(*parts: Message) -> Message:
+    """Join those parts that say anything."""
+    spoken = [part for part in parts if part]
+    return joined(spoken, ". ") if spoken else EMPTY
 
 
 def run_block(rows: list[CalibratedBlock], start_index: int, rate_hz: float) -> RunBlock:

@@ -54,13 +54,23 @@ def _texts(settings: Mapping[str, Any], before: str = "") -> dict[str, str]:
 def check_run_settings(settings: RunSettings) -> None:
     """Raise RunSettingsError for settings that no run can have."""
     if settings.trigger not in TRIGGERS:
-        raise RunSettingsError(f"trigger {settings.trigger!r} is not known: give {' or '.join(TRIGGERS)}")
+        raise RunSettingsError(
+            "trigger {trigger!r} is not known: give {triggers}",
+            trigger=settings.trigger,
+            triggers=" or ".join(TRIGGERS),
+        )
     if not 0.0 <= settings.pretrigger_s <= PRETRIGGER_MAX_S:
-        raise RunSettingsError(f"pretrigger {settings.pretrigger_s:g} s: give 0 to {PRETRIGGER_MAX_S:g} s")
+        raise RunSettingsError(
+            "pretrigger {pretrigger_s:g} s: give 0 to {longest_s:g} s",
+            pretrigger_s=settings.pretrigger_s,
+            longest_s=PRETRIGGER_MAX_S,
+        )
     for name in ("duration_s", "trigger_timeout_s", "pullback_tolerance_m"):
         value = getattr(settings, name)
         if value is not None and not 0.0 < value < math.inf:
-            raise RunSettingsError(f"{name} = {value:g} must be a finite number above 0")
+            raise RunSettingsError(
+                "{name} = {value:g} must be a finite number above 0", name=name, value=value
+            )
 
 
 def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:

@@ -70,7 +70,7 @@ class ProgressPrinter:
             case Connected(device, firmware, rate_hz):
                 out.print_status(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
             case Reconnecting() | Reconnected():
-                out.print_status(event.message)
+                out.print_status(str(event.message))
             case StateChanged():
                 self._on_state(event)
             case RunEnded():
@@ -152,7 +152,7 @@ class StatusLine:
         if not isinstance(event, LiveResult):
             return
         if event.message:
-            out.print_status(event.message)
+            out.print_status(str(event.message))
         elif text := result_text(event):
             self._show(text)
 

@@ -126,7 +126,7 @@ def _report(done: list[RunEnded], count: int, as_json: bool) -> None:
 
 def run_document(ended: RunEnded) -> dict[str, Any]:
     """JSON object of one recorded run (INTERFACE, `record --json`)."""
-    document: dict[str, Any] = msgspec.to_builtins(ended)
+    document: dict[str, Any] = msgspec.to_builtins(ended) | {"message": str(ended.message)}
     del document["type"], document["remaining"]
     return {"run": document.pop("path")} | document
 

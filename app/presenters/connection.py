@@ -14,6 +14,7 @@ from app.presenters.error_reports import ErrorReport, error_report
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from messages.i18n import gettext
+from messages.message import message_of
 
 
 class Engine(Protocol):
@@ -181,7 +182,7 @@ class Connection:
         opening, self._opening = self._opening, None
         error = opening.exception()
         if error is not None:
-            return [Failed(" ".join(str(error).split()) or type(error).__name__)]
+            return [Failed(message_of(error))]
         self._opened = opening.result()
         simulation = self._opened.simulation
         return [] if simulation is None else [SimulationStarted(simulation.series, simulation.true_friction)]

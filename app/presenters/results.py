@@ -106,7 +106,7 @@ def make_result(run: AnalysedRun, true_friction: float | None = None) -> Result:
     )
 
 
-def failed_result(message: str, path: str, ended: str) -> Result:
+def failed_result(message: Message | str, path: str, ended: str) -> Result:
     """Say of a stored run that nothing could be found in it, and why."""
     return Result(
         headline=ResultRow("", "", gettext("No result")),

@@ -37,6 +37,7 @@ from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
+from messages.message import Message
 
 RECONNECT = N_("Connect again")
 ANALYSE = LazyFunction("app.presenters.analysis_task", "analyse_run")
@@ -363,7 +364,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.on_opening(event.path)
         self._workers.analysis.submit(ANALYSE, event.path)
 
-    def _failure_notice(self, message: str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
+    def _failure_notice(self, message: Message | str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
         """Notice of an error; if it has left a run unfinished, recovery is offered first."""
         if self._count_unfinished():
             return Notice(sentence(message), Tone.BAD, RECOVER, LATER)

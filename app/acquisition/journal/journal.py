@@ -19,6 +19,7 @@ from app.acquisition.journal.records import JournalHeader, MetadataRecord, encod
 from app.runs.disk import is_disk_full
 from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
+from messages.message import EMPTY, Message, message
 
 
 class Journal:
@@ -66,15 +67,21 @@ class Journal:
         return self._written
 
     @property
-    def move_message(self) -> str:
-        """Why and whereto it has moved, in a sentence; "" if it has not."""
+    def move_message(self) -> Message:
+        """Why and whereto the journal has moved; empty if it has not."""
         error = self._file.move_cause
         if error is None:
-            return ""
-        fault = (
-            "is full" if is_disk_full(error) else f"cannot be written any more ({error.strerror or error})"
+            return EMPTY
+        if is_disk_full(error):
+            return message(
+                "the folder of the run is full: the received bytes are kept in {path}", path=self.path
+            )
+        return message(
+            "the folder of the run cannot be written any more ({reason}): the received bytes are kept in"
+            " {path}",
+            reason=error.strerror or error,
+            path=self.path,
         )
-        return f"the folder of the run {fault}: the received bytes are kept in {self.path}"
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
         """Hand a record over and return the byte of the journal at which it begins. Does not wait.
@@ -89,7 +96,9 @@ class Journal:
         self._check()
         if self._records.qsize() >= self._QUEUE_RECORDS:
             raise JournalError(
-                f"{self.path}: the disk is too slow, {self._QUEUE_RECORDS} reads wait. Use a faster disk"
+                "{path}: the disk is too slow, {reads} reads wait. Use a faster disk",
+                path=self.path,
+                reads=self._QUEUE_RECORDS,
             )
         record = encode_record(data, arrival_ns, kind)
         with self._appending:
@@ -108,8 +117,9 @@ class Journal:
         self._check()
         if self._thread.is_alive():
             raise JournalError(
-                f"{self.path}: the disk hangs, {self._records.qsize()} reads wait."
-                " Check the disk, or its network"
+                "{path}: the disk hangs, {reads} reads wait. Check the disk, or its network",
+                path=self.path,
+                reads=self._records.qsize(),
             )
 
     def remove(self) -> None:
@@ -187,7 +197,7 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
     try:
         file = create_journal_file(path, record, fallback_folders)
     except LockHeldError:
-        raise JournalError(f"{path} is being written by another program. Record again") from None
+        raise JournalError("{path} is being written by another program. Record again", path=path) from None
     except OSError as error:
         raise _error(path, error) from None
     return Journal(file, header.identifier)
@@ -195,6 +205,10 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
 
 def _error(path: Path, error: OSError) -> JournalError:
     if is_disk_full(error):
-        return JournalFullError(f"{path}: the disk is full. Free some space, or record to another disk")
+        return JournalFullError(
+            "{path}: the disk is full. Free some space, or record to another disk", path=path
+        )
     reason = error.strerror or str(error)
-    return JournalError(f"{path} cannot be written ({reason}). Choose a folder that you may write to")
+    return JournalError(
+        "{path} cannot be written ({reason}). Choose a folder that you may write to", path=path, reason=reason
+    )

@@ -145,12 +145,18 @@ def read_summary(path: Path) -> JournalSummary:
                 notes[type(note)] = note
         is_torn = path.stat().st_size > end
     except OSError as error:
-        raise RecoveryError(f"{path} cannot be read ({error.strerror or error}). Check its rights") from None
+        raise RecoveryError(
+            "{path} cannot be read ({reason}). Check its rights", path=path, reason=error.strerror or error
+        ) from None
     except ValueError:
-        raise RecoveryError(f"{path} is not a journal of Slipstand. Nothing was done to it") from None
+        raise RecoveryError(
+            "{path} is not a journal of Slipstand. Nothing was done to it", path=path
+        ) from None
     header = notes.get(JournalHeader)
     if not isinstance(header, JournalHeader) or not header.metadata.rate_hz:
-        raise RecoveryError(f"{path} was cut off before its first sample. Delete it, it holds no data")
+        raise RecoveryError(
+            "{path} was cut off before its first sample. Delete it, it holds no data", path=path
+        )
     return _story(path, header, notes, wire_bytes, is_torn)
 
 
@@ -160,7 +166,9 @@ def _note(path: Path, record: JournalRecord) -> MetadataRecord:
     except msgspec.DecodeError as error:
         fault = " ".join(str(error).split())[:120]
         raise RecoveryError(
-            f"{path} is of another version of Slipstand ({fault}). Recover it with that one"
+            "{path} is of another version of Slipstand ({fault}). Recover it with that one",
+            path=path,
+            fault=fault,
         ) from None
 
 

@@ -87,7 +87,7 @@ def recover_folder(
         There is no such folder.
     """
     if not folder.is_dir():
-        raise RecoveryError(f"{folder}: there is no such folder. Give a folder with runs")
+        raise RecoveryError("{folder}: there is no such folder. Give a folder with runs", folder=folder)
     done = []
     for journal in find_journals(folder):
 
@@ -157,7 +157,9 @@ def _recover(story: JournalSummary, place: Path, progress: Progress) -> Recovery
         rebuilt = rebuild(story, made, progress)
         if rebuilt is None:
             raise RecoveryError(
-                f"{story.path} holds {story.wire_bytes} bytes but no sample. Delete it if it is not needed"
+                "{path} holds {bytes} bytes but no sample. Delete it if it is not needed",
+                path=story.path,
+                bytes=story.wire_bytes,
             )
         return _placed(story, place, rebuilt, earlier)
 
@@ -165,7 +167,9 @@ def _recover(story: JournalSummary, place: Path, progress: Progress) -> Recovery
 def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Path | None) -> Recovery:
     made, path, kept = Path(rebuilt.stored.path), earlier, None
     if not rebuilt.stored.raw_bytes_stored:
-        raise RecoveryError(f"{story.path}: its bytes did not fit into the run. Free some space on the disk")
+        raise RecoveryError(
+            "{path}: its bytes did not fit into the run. Free some space on the disk", path=story.path
+        )
     state = RecoveryState.RECOVERED
     if path is None:
         path = move_to_free_name(made, place / made.name)
@@ -216,7 +220,9 @@ def _await_writer(story: JournalSummary, folder: Path) -> None:
     deadline = time.monotonic() + _WRITER_S
     while story.opened is not None and _is_being_written(story, folder):
         if time.monotonic() > deadline:
-            raise RecoveryError(f"{story.path}: its run file is still being written. Try again in a minute")
+            raise RecoveryError(
+                "{path}: its run file is still being written. Try again in a minute", path=story.path
+            )
         time.sleep(0.05)
 
 

@@ -101,7 +101,9 @@ class Replay:
             blocks = [block for read in reads for block in self._decoded(read)]
         except DriverError as error:
             raise RecoveryError(
-                f"{self._story.path}: its bytes make no sense ({error}). It stays as it is"
+                "{path}: its bytes make no sense ({error}). It stays as it is",
+                path=self._story.path,
+                error=error,
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = calibrate(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
@@ -163,7 +165,9 @@ def _source(story: JournalSummary) -> SampleSource:
         source = _made(header.port, story.rate_hz, header.metadata.device.settings)
         source.prepare()
     except DriverError as error:
-        raise RecoveryError(f"{story.path} cannot be decoded ({error}). It stays as it is") from None
+        raise RecoveryError(
+            "{path} cannot be decoded ({error}). It stays as it is", path=story.path, error=error
+        ) from None
     return source
 
 

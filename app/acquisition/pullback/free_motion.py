@@ -9,10 +9,17 @@ from app.acquisition.pullback.averages import BinAverages, Floats, RecentAverage
 from app.acquisition.pullback.hold import Hold
 from app.acquisition.pullback.plan import Excursion, PullbackMeasurement, PullbackPlan, Transition
 from app.acquisition.pullback.stationarity import fit_parabola_start, noise_m
+from messages.message import EMPTY, Message, message
 
-LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
-NO_SLIP_NOTE = "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"
-SILENT_PLATE_NOTE = "Gauge 2 gives no reading, so nobody knows whether the plate slips. Check its cable"
+LET_DOWN_NOTE = message(
+    "The table was let down, not released. Pull back again, hold still, and let go at once"
+)
+NO_SLIP_NOTE = message(
+    "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"
+)
+SILENT_PLATE_NOTE = message(
+    "Gauge 2 gives no reading, so it is unknown whether the plate slips. Check its cable"
+)
 
 _RELEASE_FIT_S = 0.04
 _PARABOLA_S = 0.01
@@ -46,7 +53,7 @@ class FreeMotion:
         From which it was released.
     noticed_at : float
         Sample at which the release was noticed.
-    remark : str
+    remark : Message
         What there is to say of this release, once it is sure.
     """
 
@@ -57,7 +64,7 @@ class FreeMotion:
         facts: PullbackMeasurement,
         hold: Hold,
         noticed_at: float,
-        remark: str,
+        remark: Message,
     ) -> None:
         self._plan = plan
         self._readings = readings
@@ -172,6 +179,6 @@ class FreeMotion:
         falling[:, 1] = self._facts.side * (self._from.table_m - falling[:, 1])
         return round(fit_parabola_start(falling))
 
-    def _turn(self, state: PullbackState, index: float, note: str = "") -> Transition:
+    def _turn(self, state: PullbackState, index: float, note: Message = EMPTY) -> Transition:
         self._state = state
         return Transition(state, round(index), note, is_stored=bool(note))

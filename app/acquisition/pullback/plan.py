@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from app.acquisition.messages import EndReason, PullbackState
+from messages.message import EMPTY, Message
 
 _USUAL = 1.5
 """Reach of a slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand."""
@@ -155,7 +156,7 @@ class Transition:
 
     state: PullbackState
     index: int
-    note: str = ""
+    note: Message = EMPTY
     """What the operator must know, where something did not go as it should."""
     is_stored: bool = False
     """The note says something about the run itself, and belongs into its file."""

@@ -13,6 +13,7 @@ from app.acquisition.pullback.free_motion import FreeMotion
 from app.acquisition.pullback.hold import Hold, HoldReference
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
 from app.acquisition.pullback.stationarity import StationaryLevel, ZeroEstimator, ZeroLevel, noise_m
+from messages.message import EMPTY, Message
 
 _TICK_S = 0.02
 """How often slow questions are asked; the release is looked for at each bin."""
@@ -291,10 +292,10 @@ class PullbackStateMachine:
         self._free = FreeMotion(self._plan, self._readings, self.measurement, hold, index, remark)
         self._turn(PullbackState.RELEASED, self.measurement.release_index or index)
 
-    def _remark(self, hold: Hold, index: float) -> str:
+    def _remark(self, hold: Hold, index: float) -> Message:
         """What there is to say of a release that came before it was armed."""
         if self.state is PullbackState.ARMED:
-            return ""
+            return EMPTY
         if self.state is PullbackState.PULLING and self._plan.target_m is not None:
             return operator_messages.off_target_note(abs(self.measurement.pulled_m), self._plan.target_m)
         return operator_messages.not_steady_note((index - hold.since) / self._plan.rate_hz)
@@ -338,10 +339,10 @@ class PullbackStateMachine:
                 self._hinted.add(kind)
                 self._turns.append(Transition(self.state, end_index, hint))
 
-    def _hint(self, now: float) -> str:
+    def _hint(self, now: float) -> Message:
         """Why it does not go on by itself, where that may not be seen."""
         if now - self._turned_at < self._span(operator_messages.HINT_AFTER_S):
-            return ""
+            return EMPTY
         if self.state is PullbackState.ZERO:
             is_silent = self._patience.is_silent(self._seen_at, now)
             return operator_messages.NO_READING_NOTE if is_silent else operator_messages.RESTLESS_NOTE
@@ -350,9 +351,11 @@ class PullbackStateMachine:
             if drift_m_per_s or now >= self._filled_index:
                 return operator_messages.drift_hint(drift_m_per_s)
             return operator_messages.filling_hint(self._plan.pretrigger_s)
-        return ""
+        return EMPTY
 
-    def _turn(self, state: PullbackState, index: float, note: str = "", *, is_kept: bool = False) -> None:
+    def _turn(
+        self, state: PullbackState, index: float, note: Message = EMPTY, *, is_kept: bool = False
+    ) -> None:
         self._take_turn(Transition(state, round(index), note, is_kept))
 
     def _take_turn(self, turn: Transition) -> None:

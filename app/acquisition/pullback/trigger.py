@@ -9,6 +9,7 @@ from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Tra
 from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.reads import ReadHistory
+from messages.message import EMPTY, Message
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (
@@ -35,7 +36,7 @@ class Trigger(Protocol):
         """Where table and plate stand."""
 
     @property
-    def note(self) -> str:
+    def note(self) -> Message:
         """What there is to say beforehand."""
 
     @property
@@ -138,7 +139,7 @@ class NoTrigger:
     ) -> None:
         self.state = PullbackState.RECORDING
         self.position = StandPosition()
-        self.note = ""
+        self.note = EMPTY
         self.is_at_rest = self.awaits_release = False
         self.start_index: int | None = armed_index
         self.end: tuple[int, EndReason] | None = None
@@ -159,7 +160,7 @@ class NoTrigger:
     def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
         """Take the samples that come next; return the new states."""
         turns = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
-        return [replace(turn, note="") for turn in turns if turn.state in _SEEN_WITHOUT_TRIGGER]
+        return [replace(turn, note=EMPTY) for turn in turns if turn.state in _SEEN_WITHOUT_TRIGGER]
 
 
 def create_trigger(

@@ -15,6 +15,7 @@ from drivers.port import OpenPort, PortConfig, PortInfo
 from drivers.port_reader import PortReader, ReaderEnd, read_for
 from drivers.registry import find_driver
 from drivers.source import CancellableLink, SampleSource
+from messages.message import message
 
 
 class PortOpener(Protocol):
@@ -51,8 +52,11 @@ def create_source(
     source = protocol.make_source(settings.device, rate_hz)
     if source.channels == 1:
         raise SettingsError(
-            f"{settings.protocol} is set to one gauge, and two are recorded: "
-            "give the port of the other device too, with --relative-port"
+            message(
+                "{protocol} is set to one gauge, and two are recorded: give the port of the other device"
+                " too, with --relative-port",
+                protocol=settings.protocol,
+            )
         )
     return source
 
@@ -64,7 +68,9 @@ def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     if not isinstance(source, PairSource):
         return _Single(choice)
     if settings.relative_url == settings.url:
-        raise SettingsError(f"both gauges are said to be at {settings.url}: give the port of each device")
+        raise SettingsError(
+            message("both gauges are said to be at {url}: give the port of each device", url=settings.url)
+        )
     return _Pair((choice, PortConfig(settings.relative_url, baud, settings.parity)), source)
 
 
@@ -218,7 +224,11 @@ class Reconnection:
                 self._failure = error
             except Exception as error:  # a search that dies unseen would be a device lost for ever
                 self._failure = DriverError(
-                    f"looking for the device failed ({type(error).__name__}: {error})"
+                    message(
+                        "looking for the device failed ({kind}: {error})",
+                        kind=type(error).__name__,
+                        error=error,
+                    )
                 )
             else:
                 self._is_done.set()

@@ -20,6 +20,7 @@ from drivers.port import OpenPort
 from drivers.port_reader import ReaderEndReason
 from drivers.samples import DeviceIdentity, Losses
 from drivers.source import SampleSource
+from messages.message import EMPTY, Message, as_message, message, message_of
 
 PATIENCE_S = 10.0
 """A run waits so long for a lost device; the search goes on."""
@@ -30,8 +31,8 @@ class DeviceLost:
     """The device is gone, or says nothing intelligible: it is looked for from now on."""
 
     reason: EndReason
-    message: str
-    tried: str = ""
+    message: Message
+    tried: Message = EMPTY
     """Why the latest attempt to find it failed."""
 
 
@@ -39,7 +40,7 @@ class DeviceLost:
 class SearchFailed:
     """It is not found, for another reason than before."""
 
-    message: str
+    message: Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +51,20 @@ class DeviceFound:
     gap_s: float
 
     @property
-    def message(self) -> str:
+    def message(self) -> Message:
         """In a sentence."""
-        return f"the device was away and is back at {self.url}: {self.gap_s:.2f} s are missing and marked"
+        return message(
+            "the device was away and is back at {port}: {gap_s:.2f} s are missing and marked",
+            port=self.url,
+            gap_s=self.gap_s,
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class StreamNotice:
     """Samples come, but something is to be said of them, or of this computer."""
 
-    message: str
+    message: Message
 
 
 StreamEvent: TypeAlias = DeviceLost | SearchFailed | DeviceFound | StreamNotice
@@ -70,7 +75,7 @@ class StreamFault:
     """Why a run must end that waits for samples."""
 
     reason: EndReason
-    message: str
+    message: Message
 
 
 def engine_events(news: StreamEvent) -> tuple[Event, ...]:
@@ -119,7 +124,7 @@ class LiveStream:
         self._port = connection.port.info
         self._search: Reconnection | None = None
         self._is_returning = False
-        self._lost = DeviceLost(EndReason.DEVICE_LOST, "")
+        self._lost = DeviceLost(EndReason.DEVICE_LOST, EMPTY)
         self._silence = StallDetector(self._port.device, source, connection.start_ns)
         self._losses = Losses()
         self._pace = RateMonitor(source.rate_hz)
@@ -165,11 +170,21 @@ class LiveStream:
         is_hopeless = lost.reason is EndReason.STALLED and isinstance(failure, NoDataError)
         if not is_hopeless and self._search.elapsed_s() < PATIENCE_S:
             return None
-        waited = "beginning anew did not help" if is_hopeless else f"it was not back within {PATIENCE_S:g} s"
-        missing_s = self._silence.silent_s()
-        return StreamFault(
-            lost.reason, f"{lost.message}; {waited}, and the last {missing_s:.1f} s of the run are missing"
-        )
+        if is_hopeless:
+            end = message(
+                "{cause}; beginning anew did not help, and the last {missing_s:.1f} s of the run are missing",
+                cause=lost.message,
+                missing_s=self._silence.silent_s(),
+            )
+        else:
+            end = message(
+                "{cause}; it was not back within {waited_s:g} s, and the last {missing_s:.1f} s of the"
+                " run are missing",
+                cause=lost.message,
+                waited_s=PATIENCE_S,
+                missing_s=self._silence.silent_s(),
+            )
+        return StreamFault(lost.reason, end)
 
     def clock(self) -> ClockEstimate | None:
         """How the device's clock goes by the host's; None while that cannot be told."""
@@ -199,7 +214,7 @@ class LiveStream:
         StreamEndedError
             When this computer is too slow to take what comes, or what comes makes no sense.
         """
-        self._news.extend(StreamNotice(str(note)) for note in self._host.check())
+        self._news.extend(StreamNotice(as_message(note)) for note in self._host.check())
         if self._connection is None:
             self._look_for_device(timeout_s)
         if self._connection is None:
@@ -231,7 +246,7 @@ class LiveStream:
     def _chunk(self, read: RawRead) -> DecodedRead:
         arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
-        self._news.extend(StreamNotice(str(note)) for note in self._source.take_warnings())
+        self._news.extend(StreamNotice(as_message(note)) for note in self._source.take_warnings())
         before, self._losses = self._losses, replace(self._source.losses)
         added = losses_between(self._losses, before)
         if added.restarts:
@@ -254,16 +269,16 @@ class LiveStream:
         try:
             blocks = list(self._source.decode(data, arrival_ns))
         except DriverError as error:
-            raise StreamEndedError(EndReason.DEVICE_LOST, str(error)) from error
+            raise StreamEndedError(EndReason.DEVICE_LOST, message_of(error)) from error
         return tuple(calibrate(block, self._gauges) for block in blocks)
 
     def _check(self, connection: Connection, *, is_all_taken: bool) -> None:
         ended = connection.ended
         if ended is not None and ended.reason is ReaderEndReason.QUEUE_FULL:
             if is_all_taken:
-                raise StreamEndedError(EndReason.WRITE_ERROR, str(ended.message))
+                raise StreamEndedError(EndReason.WRITE_ERROR, as_message(ended.message))
         elif ended is not None:
-            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, str(ended.message)))
+            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, as_message(ended.message)))
         elif self._silence.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
             self._lose(connection, DeviceLost(EndReason.STALLED, self._silence.message()))
 
@@ -284,9 +299,9 @@ class LiveStream:
 
     def _tell_of(self, search: Reconnection | None) -> None:
         failure = search.failure if search is not None else None
-        if failure is not None and str(failure) != self._lost.tried:
-            self._lost = replace(self._lost, tried=str(failure))
-            self._news.append(SearchFailed(str(failure)))
+        if failure is not None and message_of(failure) != self._lost.tried:
+            self._lost = replace(self._lost, tried=message_of(failure))
+            self._news.append(SearchFailed(message_of(failure)))
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:

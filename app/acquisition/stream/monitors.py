@@ -6,9 +6,13 @@ from drivers.clock import ClockEstimate, ClockFit
 from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
 from drivers.source import SampleSource
+from messages.i18n import N_
+from messages.message import EMPTY, Message, message
 
-RATE_WORDS = "samples a second instead of"
-"""Stand in each note on a rate."""
+RATE_TEMPLATE = N_(
+    "the device sends {rate_hz:.6g} samples a second instead of {nominal_hz:g}: check its rate; the analysis"
+    " allows for it"
+)
 
 _SAID = 0.01
 _SURE = 5.0
@@ -70,7 +74,7 @@ class RateMonitor:
             self._recent, self._recent_ns = self.estimate(), self._latest_ns
         return self._recent
 
-    def add(self, index: int, arrival_ns: int) -> str:
+    def add(self, index: int, arrival_ns: int) -> Message:
         """Take the sample that came last, and say when the rate has become wrong; else "".
 
         Parameters
@@ -84,7 +88,7 @@ class RateMonitor:
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
         if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
-            return ""
+            return EMPTY
         self._whole.add(index, arrival_ns)
         if arrival_ns - before_ns > self._hole_ns:
             self._holes_ns += arrival_ns - before_ns
@@ -92,7 +96,7 @@ class RateMonitor:
             self._begin_window(arrival_ns)
         self._lately.add(index, arrival_ns)
         if arrival_ns - self._window_ns < _WINDOW_S * 1e9:
-            return ""
+            return EMPTY
         return self._look(arrival_ns)
 
     def _begin(self) -> None:
@@ -104,7 +108,7 @@ class RateMonitor:
     def _begin_window(self, arrival_ns: int) -> None:
         self._lately, self._window_ns = ClockFit(self._rate_hz), arrival_ns
 
-    def _look(self, arrival_ns: int) -> str:
+    def _look(self, arrival_ns: int) -> Message:
         """At the end of a window: a wrong rate is off by as much as in the window before.
 
         Where a busy host takes the bytes late, each window shows another rate.
@@ -114,7 +118,7 @@ class RateMonitor:
         self._begin_window(arrival_ns)
         was_wrong = self._is_wrong
         self._is_wrong = lately is not None and before is not None and _agree_on_wrong(lately, before)
-        return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else ""
+        return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else EMPTY
 
 
 def is_rate_wrong(estimate: ClockEstimate) -> bool:
@@ -131,12 +135,9 @@ def _agree_on_wrong(one: ClockEstimate, other: ClockEstimate) -> bool:
     )
 
 
-def rate_note(estimate: ClockEstimate, rate_hz: float) -> str:
-    """What there is to say of a rate that is off."""
-    return (
-        f"the device sends {estimate.rate_hz:.6g} {RATE_WORDS} {rate_hz:g}:"
-        " check its rate; the analysis allows for it"
-    )
+def rate_note(estimate: ClockEstimate, rate_hz: float) -> Message:
+    """Report a wrong rate."""
+    return message(RATE_TEMPLATE, rate_hz=estimate.rate_hz, nominal_hz=rate_hz)
 
 
 STALLED_S = 3.0
@@ -201,12 +202,18 @@ class StallDetector:
         self._looked_ns = now_ns
         return now_ns - self._quiet_ns > self._limit_s * 1e9
 
-    def message(self) -> str:
-        """What to say then."""
+    def message(self) -> Message:
+        """Report the stall."""
         if not self._rubbish:
-            return (
-                f"port {self._url} is open but silent for {self._limit_s:g} s: check the device, "
-                "reset it and record again"
+            return message(
+                "port {port} is open but silent for {limit_s:g} s: check the device, reset it and record"
+                " again",
+                port=self._url,
+                limit_s=self._limit_s,
             )
-        said = describe_unreadable(self._rubbish, self._protocol)
-        return f"port {self._url} has brought no sample for {self._limit_s:g} s: {said}"
+        return message(
+            "port {port} has brought no sample for {limit_s:g} s: {cause}",
+            port=self._url,
+            limit_s=self._limit_s,
+            cause=describe_unreadable(self._rubbish, self._protocol),
+        )

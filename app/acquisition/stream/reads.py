@@ -9,6 +9,7 @@ from typing import TypeAlias
 from app.acquisition.stream.calibration import CalibratedBlock, concatenate
 from drivers.errors import QueueFullError
 from drivers.samples import Losses
+from messages.message import message
 
 _WAITING_READS = 4096
 
@@ -49,8 +50,10 @@ class ReadQueue:
                 self._tap(read)
             if len(self._waiting) >= _WAITING_READS:
                 raise QueueFullError(
-                    f"this computer is too slow: {_WAITING_READS} reads wait to be decoded."
-                    " Close other programs"
+                    message(
+                        "this computer is too slow: {reads} reads wait to be decoded. Close other programs",
+                        reads=_WAITING_READS,
+                    )
                 )
             self._waiting.append(read)
             self._changed.notify()
