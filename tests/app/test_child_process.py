@@ -28,6 +28,7 @@ from app.child_process import (
     encode_line,
     json_decoder,
 )
+from messages.message import message
 from tests.drills.processes import gone
 
 COMMANDS = [
@@ -99,19 +100,19 @@ def test_what_is_no_command_closes_the_channel(pipe):
 def test_events_come_out_as_lines_and_failures_in_one(pipe):
     sender = event_sender(pipe)
     sender.send(Health(1000.0, 5, 0, 0, 0, 0, 10))
-    sender.send(Failed("a fault\nin two lines"))
+    sender.send(Failed(message("a fault\nin two lines")))
     sender.close()
     pipe.close(pipe.write)
     with os.fdopen(os.dup(pipe.read), "rb") as stream:
         events = [decode_event(line) for line in stream]
-    assert events == [Health(1000.0, 5, 0, 0, 0, 0, 10), Failed("a fault\nin two lines")]
+    assert events == [Health(1000.0, 5, 0, 0, 0, 0, 10), Failed(message("a fault\nin two lines"))]
 
 
 def test_an_owner_that_does_not_read_holds_nobody_up(pipe):
     sender = event_sender(pipe)
     for number in range(20_000):
         sender.send(Health(1000.0, number, 0, 0, 0, 0, 0))
-    sender.send(Failed("the last word"))
+    sender.send(Failed(message("the last word")))
     os.set_blocking(pipe.read, False)
     received = b""
 
@@ -129,7 +130,7 @@ def test_an_owner_that_does_not_read_holds_nobody_up(pipe):
 def test_an_owner_that_is_gone_is_no_fault(pipe):
     sender = event_sender(pipe)
     pipe.close(pipe.read)
-    sender.send(Failed("nobody hears"))
+    sender.send(Failed(message("nobody hears")))
     sender.close()
 
 

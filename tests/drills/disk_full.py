@@ -271,7 +271,7 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
         return
     (journal,) = places
     report.moved += bench.refuge in journal.parents
-    if str(journal) not in ended.message and ended.samples != in_file:
+    if str(journal) not in str(ended.message) and ended.samples != in_file:
         raise ValueError(f"nobody is told of {journal.name}: {ended.message}")
     held = max(_recovered_rows(bench, journal), in_file)
     report.recovered += held
@@ -279,7 +279,7 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
     is_more = held > ended.samples and read_summary(journal).ended is not None
     if held < ended.samples or is_more:
         raise ValueError(f"{ended.samples} samples were told, {held} are held: {ended.message}")
-    report.lost_runs += "are lost" in ended.message
+    report.lost_runs += "are lost" in str(ended.message)
 
 
 def _checked_rows(bench: Bench, path: Path) -> int:

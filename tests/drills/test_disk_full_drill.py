@@ -28,6 +28,6 @@ def test_a_read_only_folder_is_refused_and_the_connection_stays(tmp_path):
         subprocess.run(["mount", "-o", "remount,ro", str(bench.folder)], check=True)
         refused = recorded(bench, bench.folder)
         assert (refused.ended, refused.path) == (EndReason.WRITE_ERROR, "")
-        assert "Read-only file system). Choose a folder that you may write to" in refused.message
+        assert "Read-only file system). Choose a folder that you may write to" in str(refused.message)
         (tmp_path / "elsewhere").mkdir()
         assert recorded(bench, tmp_path / "elsewhere").ended is EndReason.DURATION

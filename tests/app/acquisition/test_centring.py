@@ -22,6 +22,7 @@ from app.acquisition.stream.reads import ReadHistory
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_stand, published_table
+from messages.message import NO_MESSAGE
 
 RATE_HZ = 500.0
 PLAN = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033)
@@ -147,7 +148,7 @@ def test_a_plate_that_is_never_put_back_ends_the_wait():
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, trigger_timeout_s=4.0)
     _, turns, _ = follow(plan, table, relative)
     assert turns[-1].end_reason is EndReason.TRIGGER_TIMEOUT
-    assert "the plate was not pushed back" in turns[-1].note
+    assert "the plate was not pushed back" in str(turns[-1].note)
 
 
 def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder():
@@ -157,8 +158,8 @@ def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder()
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert notes(turns) == []
     trigger = create_trigger(RunSettings("/runs"), plan, 0, ReadHistory(1000))
-    assert trigger.note == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
-    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == ""
+    assert str(trigger.note) == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
+    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == NO_MESSAGE
 
 
 def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():

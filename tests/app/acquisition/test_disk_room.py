@@ -58,7 +58,7 @@ def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_pa
     assert watch.update(int(closing + 61 * per_s), journal_bytes) is None
     news = watch.update(int(closing + 59 * per_s), journal_bytes)
     assert not news.must_end
-    assert "enough for 59 s more" in news.note
+    assert "enough for 59 s more" in str(news.note)
     assert watch.update(int(closing + 59 * per_s), journal_bytes) is None
     assert watch.update(int(closing + 2.9 * per_s), journal_bytes).must_end
     assert watch.update(None, journal_bytes) is None

@@ -140,7 +140,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_pull(tmp_path, sh
     (tmp_path / "file").write_text("")
     ended = record_run(port_of(shared), run_in(tmp_path / "file"), *FILES)
     assert (ended.ended, ended.path, ended.samples) == (EndReason.WRITE_ERROR, "", 0)
-    assert "Choose a folder that you may write to" in ended.message
+    assert "Choose a folder that you may write to" in str(ended.message)
 
 
 def test_a_run_without_room_is_refused_and_the_next_one_recorded(tmp_path, shared):
@@ -148,7 +148,7 @@ def test_a_run_without_room_is_refused_and_the_next_one_recorded(tmp_path, share
         engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=1e9)))
         refused = until(engine, RunEnded)
         assert (refused.ended, refused.path) == (EndReason.DISK_FULL, "")
-        assert "Free some space or record to another disk" in refused.message
+        assert "Free some space or record to another disk" in str(refused.message)
         assert list(tmp_path.iterdir()) == []
         engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=0.3)))
         assert until(engine, RunEnded).ended is EndReason.DURATION

@@ -29,7 +29,7 @@ def test_a_killed_writer_ends_the_run_of_which_nothing_is_lost(tmp_path):
         os.kill(writer, signal.SIGKILL)
         ended = until(engine, RunEnded)
         assert ended.ended is EndReason.WRITE_ERROR
-        assert f"slipstand recover {tmp_path}" in ended.message
+        assert f"slipstand recover {tmp_path}" in str(ended.message)
         left = open_run(ended.path)
         (recovered,) = recover_folder(tmp_path)
         run = open_run(ended.path)
@@ -59,7 +59,7 @@ def test_a_killed_engine_is_noticed_at_once_and_leaves_no_process(tmp_path, shar
         while not isinstance(event, Failed):
             event = engine.wait(1.0)
             assert time.monotonic() < killed_s + 10.0
-        assert f"slipstand recover {tmp_path}" in event.message
+        assert f"slipstand recover {tmp_path}" in str(event.message)
         assert all(gone(child) for child in children)
     (recovered,) = recover_folder(tmp_path)
     assert recovered.state is RecoveryState.RECOVERED

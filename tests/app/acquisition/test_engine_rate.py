@@ -72,7 +72,7 @@ def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quick
         port = PortSettings("fake://", "slipstand-binary")
         Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner).run()
     assert owner.ended is not None
-    assert ("instead of 100" in owner.ended.message) == (quicker != 1.0), owner.ended.message
+    assert ("instead of 100" in str(owner.ended.message)) == (quicker != 1.0), owner.ended.message
     ending = open_run(owner.ended.path).end
     assert 0.0 < ending.clock_scale_uncertainty < 1e-3
     assert ending.clock_scale == pytest.approx(1 / quicker, abs=5 * ending.clock_scale_uncertainty)

@@ -49,7 +49,7 @@ def test_a_plate_too_far_off_is_said_at_once_with_where_it_belongs(tmp_path):
         (ended,) = record_runs(port_of(simulated), run_in(tmp_path), *FILES, listen)
     assert asked[0].plate_m == pytest.approx(0.016, abs=1e-4)
     assert (asked[0].plate_wanted_m, asked[0].side) == (0.0, 0)
-    assert "was not pushed back before the pull" in ended.message
+    assert "was not pushed back before the pull" in str(ended.message)
 
 
 def test_interrupted_between_two_runs_the_first_is_kept_and_nothing_else(tmp_path, monkeypatch):

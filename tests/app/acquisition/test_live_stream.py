@@ -207,7 +207,7 @@ def test_a_run_waits_for_a_lost_device_only_so_long_and_the_search_goes_on(devic
     listener.listen(lambda: listener.stream.fault is not None)
     fault = listener.stream.fault
     assert fault.reason is EndReason.DEVICE_LOST
-    assert "plug its cable in again; it was not back within 1 s, and the last 1." in fault.message
+    assert "plug its cable in again; it was not back within 1 s, and the last 1." in str(fault.message)
     assert sum(isinstance(news, SearchFailed) for news in listener.news) == 1
     device.plug_in()
     listener.listen(lambda: listener.heard(DeviceFound))
@@ -223,7 +223,7 @@ def test_a_stall_is_met_with_one_attempt_to_begin_anew(device, listener, says, w
     listener.listen(lambda: listener.stream.fault is not None)
     fault = listener.stream.fault
     assert fault.reason is EndReason.STALLED
-    assert words in fault.message
+    assert words in str(fault.message)
     assert device.opened >= 2
     device.says = "samples"
     listener.listen(lambda: listener.heard(DeviceFound))
@@ -256,7 +256,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
         listener.listen(lambda: listener.heard(StreamNotice), 60.0)
         listener.listen_for(0.5)
     (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
-    assert "instead of 1000: check its rate" in noticed.message
+    assert "instead of 1000: check its rate" in str(noticed.message)
     assert listener.stream.clock().rate_hz == pytest.approx(1050.0, rel=0.01)
 
 

@@ -15,7 +15,7 @@ def notes(scale: float, lateness_s: np.ndarray, seconds: float = 20.0) -> list[s
     late_s = np.interp(indices, np.linspace(0, indices[-1], len(lateness_s)), lateness_s)
     arrivals_ns = ((indices / (RATE_HZ * scale) + late_s) * 1e9).astype(np.int64)
     said = [pace.add(int(i), int(t)) for i, t in zip(indices, arrivals_ns, strict=True)]
-    return [note for note in said if note]
+    return [str(note) for note in said if note]
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.97, 1.03, 2.0])

@@ -105,7 +105,7 @@ def test_the_skew_is_in_the_run_and_in_words(tmp_path, writer):
     run = open_run(ended.path)
     assert ended.skew_s == run.end.skew_s == pytest.approx(LATER_S, abs=2e-4)
     assert 4e-4 < ended.skew_standard_uncertainty_s == run.end.skew_standard_uncertainty_s < 6e-4
-    assert "gauge 2 was read 0.7" in run.end.message
+    assert "gauge 2 was read 0.7" in str(run.end.message)
     counts = load_counts(run)
     first = next(
         row for row in range(len(COUNTS)) if (COUNTS[row : row + len(counts), 0] == counts[:, 0]).all()
@@ -121,4 +121,4 @@ def test_a_run_of_two_devices_whose_engine_died_has_its_skew(tmp_path, writer):
     ending = open_run(recovered.run).end
     assert ending.skew_s == pytest.approx(LATER_S, abs=2e-4)
     assert ending.message.startswith("Slipstand was ended while it recorded")
-    assert "gauge 2 was read 0.7" in ending.message
+    assert "gauge 2 was read 0.7" in str(ending.message)

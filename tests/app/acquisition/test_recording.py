@@ -34,6 +34,7 @@ from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses, SampleBlock, SampleStatus
+from messages.message import message
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
@@ -166,7 +167,7 @@ def test_a_run_goes_from_pretrigger_to_duration_to_the_sample(
     first = int(np.flatnonzero((bench.writer.counts[0] == COUNTS).all(axis=1))[0])
     np.testing.assert_array_equal(bench.writer.counts, COUNTS[first : first + before + after])
     assert abs(first + before - RELEASED) <= 1
-    assert ended.message == ""
+    assert str(ended.message) == ""
 
 
 def test_states_and_file_are_told_in_order(tmp_path):
@@ -249,7 +250,7 @@ def test_an_unfilled_pretrigger_is_said(tmp_path):
     bench.history.next_index = late
     bench.play(len(COUNTS))
     ended = bench.ended()
-    assert "only 0.6 s of the 1 s before the release" in ended.message
+    assert "only 0.6 s of the 1 s before the release" in str(ended.message)
     assert ended.samples == pytest.approx(300 + 250, abs=1)
     assert ended.release_s == pytest.approx(0.6, abs=0.003)
 
@@ -257,11 +258,11 @@ def test_an_unfilled_pretrigger_is_said(tmp_path):
 def test_stopped_before_a_release_it_keeps_what_came_since_arming(tmp_path):
     bench = Bench(tmp_path, heard=100)
     bench.play(400)
-    bench.recording.end(EndReason.INTERRUPTED, "told to stop")
-    bench.recording.end(EndReason.STOPPED, "a second end changes nothing")
+    bench.recording.end(EndReason.INTERRUPTED, message("told to stop"))
+    bench.recording.end(EndReason.STOPPED, message("a second end changes nothing"))
     ended = bench.ended()
     assert (ended.ended, ended.samples, ended.release_s) == (EndReason.INTERRUPTED, 300, None)
-    assert ended.message == "told to stop"
+    assert str(ended.message) == "told to stop"
     np.testing.assert_array_equal(bench.writer.counts, COUNTS[100:400])
 
 
@@ -276,9 +277,9 @@ def test_stopped_after_a_long_wait_it_keeps_what_the_history_holds(tmp_path):
 
 def test_without_a_single_sample_there_is_no_file_and_no_journal_left(tmp_path):
     bench = Bench(tmp_path)
-    bench.recording.end(EndReason.STALLED, "silent")
+    bench.recording.end(EndReason.STALLED, message("silent"))
     ended = bench.ended()
-    assert (ended.path, ended.samples, ended.message) == ("", 0, "silent")
+    assert (ended.path, ended.samples, str(ended.message)) == ("", 0, "silent")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -288,7 +289,7 @@ def test_no_release_in_time_is_said_and_the_last_seconds_kept(tmp_path):
     bench.play(300)
     ended = bench.ended()
     assert ended.ended is EndReason.TRIGGER_TIMEOUT
-    assert "no release" in ended.message
+    assert "no release" in str(ended.message)
     assert ended.samples >= 250
 
 
@@ -351,7 +352,7 @@ def test_the_journal_holds_all_reads_of_the_run_from_where_the_writer_was_told(t
     bench.play(len(COUNTS))
     ended = bench.ended()
     path = Path(writer.request.journal.path)
-    assert str(path) in ended.message
+    assert str(path) in str(ended.message)
     everything = [r.data for r in read_journal(path) if r.kind is RecordKind.WIRE]
     assert everything[0] == b"0;"  # what was heard before arming is there too
     copied = [r.data for r in read_journal(path, writer.request.journal.start) if r.kind is RecordKind.WIRE]
@@ -382,7 +383,7 @@ def test_a_failing_writer_ends_the_run_with_its_reason_and_keeps_the_journal(tmp
     bench.recording.poll()
     ended = bench.ended()
     assert ended.ended is reason
-    assert "too slow" in ended.message or "disk full" in ended.message
+    assert "too slow" in str(ended.message) or "disk full" in str(ended.message)
     assert [path.name for path in tmp_path.iterdir()] == ["run.journal"]
 
 
@@ -392,7 +393,7 @@ def test_a_clock_that_is_far_off_is_said_and_stored(tmp_path, scale, is_said):
     bench = Bench(tmp_path, clock=clock)
     bench.play(len(COUNTS))
     ended = bench.ended()
-    assert ("instead of 500" in ended.message) is is_said
+    assert ("instead of 500" in str(ended.message)) is is_said
     assert bench.writer.ending.clock_scale == scale
     assert bench.writer.ending.clock_scale_uncertainty == 1e-4
 
@@ -412,9 +413,9 @@ def test_what_is_enough_ends_only_a_run_without_a_set_duration(tmp_path, duratio
 def test_a_run_keeps_a_hundred_notes_and_counts_the_others(tmp_path):
     bench = Bench(tmp_path)
     for number in range(150):
-        bench.recording.add_note(f"the device was away for the {number}th time")
+        bench.recording.add_note(message("the device was away for the {number}th time", number=number))
     bench.play(len(COUNTS))
-    message = bench.ended().message
-    assert "for the 99th time" in message
-    assert "for the 100th time" not in message
-    assert message.endswith("50 further notes are left out")
+    text = str(bench.ended().message)
+    assert "for the 99th time" in text
+    assert "for the 100th time" not in text
+    assert text.endswith("50 further notes are left out")

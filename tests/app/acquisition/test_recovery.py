@@ -138,7 +138,7 @@ def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_pat
     left_out = protocol == "csv"  # the first line may be the end of one
     np.testing.assert_array_equal(load_counts(run), COUNTS[left_out:][last - len(run) : last])
     assert run.end.ended == "interrupted"
-    assert "rebuilt from its journal" in run.end.message
+    assert "rebuilt from its journal" in str(run.end.message)
     assert run.events.release_s == 1.0
     assert run.events.pulled_back_s < 0.8
     assert run.end.dwell_s == pytest.approx(1.0 - run.events.pulled_back_s)
@@ -295,7 +295,7 @@ def test_a_file_that_its_writer_has_not_closed_is_waited_for(tmp_path, writer, m
     with recording_lock(path):
         (left,) = recover_folder(tmp_path)
     assert left.state is RecoveryState.FAILED
-    assert "still being written" in left.message
+    assert "still being written" in str(left.message)
     assert recover_folder(tmp_path)[0].state is RecoveryState.RECOVERED
 
 
@@ -316,9 +316,9 @@ def test_what_is_no_journal_stays_and_is_told_in_one_line(tmp_path, content, sai
     journal.write_bytes(content)
     (left,) = recover_folder(tmp_path)
     assert left.state is RecoveryState.FAILED
-    assert said in left.message
-    assert str(journal) in left.message
-    assert "\n" not in left.message
+    assert said in str(left.message)
+    assert str(journal) in str(left.message)
+    assert "\n" not in str(left.message)
     assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(journal, content)]
 
 

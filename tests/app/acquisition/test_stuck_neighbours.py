@@ -36,7 +36,7 @@ def test_an_engine_killed_in_the_middle_of_a_word_is_told_of():
     with EngineClient(python(HALF)) as engine:
         event = engine.wait(60.0)
         assert isinstance(event, Failed)
-        assert "ended by itself (code 9)" in event.message
+        assert "ended by itself (code 9)" in str(event.message)
 
 
 def test_an_engine_that_still_says_something_is_not_killed(monkeypatch):

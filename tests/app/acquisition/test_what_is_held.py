@@ -78,7 +78,7 @@ def test_what_waits_for_a_journal_that_fails_beside_the_writer_is_not_told_as_ta
     taken = bench.writer.ending.losses.samples
     assert taken > held > 0
     assert (ended.ended, ended.samples) == (EndReason.DISK_FULL, held)
-    assert f"the last {taken - held} samples found no room in run or journal" in ended.message
+    assert f"the last {taken - held} samples found no room in run or journal" in str(ended.message)
     assert not is_being_recorded(path), "a recovery may take it"
 
 
@@ -91,7 +91,7 @@ def test_what_a_full_journal_does_not_take_is_in_the_file(tmp_path):
     ended = bench.ended()
     assert ended.samples == len(bench.writer.time_s) == bench.next
     assert ended.ended is EndReason.DISK_FULL
-    assert "lost" not in ended.message
+    assert "lost" not in str(ended.message)
 
 
 @settings(deadline=None, max_examples=60, phases=[Phase.explicit, Phase.generate])
@@ -116,7 +116,7 @@ def test_what_is_told_is_what_is_held(tmp_path_factory, room, takes, stores, unt
     taken = writer.ending.losses.samples
     held = max(held_by_journal(folder / "run.journal"), writer.stored)
     assert ended.samples == min(held, taken)
-    assert ("are lost" in ended.message) is (held < taken)
+    assert ("are lost" in str(ended.message)) is (held < taken)
     assert ended.ended is EndReason.DISK_FULL
 
 
