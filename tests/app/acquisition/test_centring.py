@@ -22,7 +22,7 @@ from app.acquisition.stream.reads import ReadHistory
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_stand, published_table
-from messages.message import NO_MESSAGE
+from messages.message import EMPTY
 
 RATE_HZ = 500.0
 PLAN = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033)
@@ -159,7 +159,7 @@ def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder()
     assert notes(turns) == []
     trigger = create_trigger(RunSettings("/runs"), plan, 0, ReadHistory(1000))
     assert str(trigger.note) == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
-    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == NO_MESSAGE
+    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == EMPTY
 
 
 def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():
