@@ -39,16 +39,16 @@ def test_a_run_without_room_is_refused_with_figures(disk, tmp_path):
     ):
         check_disk_space(tmp_path, AT_ONCE, DEMAND)
     disk(DEMAND.of_run(AT_ONCE))
-    assert check_disk_space(tmp_path, AT_ONCE, DEMAND) == ""
+    assert str(check_disk_space(tmp_path, AT_ONCE, DEMAND)) == ""
     disk(None)
-    assert check_disk_space(tmp_path, AT_ONCE, DEMAND) == ""
+    assert str(check_disk_space(tmp_path, AT_ONCE, DEMAND)) == ""
 
 
 def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
     disk(DEMAND.of_run(PULLBACK) + 300 * DEMAND.journal_bytes_per_s)
-    assert "if the release comes within 5 minutes" in check_disk_space(tmp_path, PULLBACK, DEMAND)
+    assert "if the release comes within 5 minutes" in str(check_disk_space(tmp_path, PULLBACK, DEMAND))
     disk(DEMAND.of_run(PULLBACK) + DEMAND.of_waiting(PULLBACK))
-    assert check_disk_space(tmp_path, PULLBACK, DEMAND) == ""
+    assert str(check_disk_space(tmp_path, PULLBACK, DEMAND)) == ""
 
 
 def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_path):
