@@ -1,8 +1,7 @@
 """Identification while the motion still dies away: running friction, period and damping.
 
-The first time that a release and a few swings are there, minima are searched as for a whole record; from
-then on each law is only refined from where it stood. When none explains the readings any more, the motion
-has branched elsewhere, and the search is repeated.
+Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law is
+refined from its last minimum. When no law explains the readings any more, the search is repeated.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +37,7 @@ _AGAIN = 1.1
 """A search that found no law that fits is not repeated before the record is longer by this factor."""
 _STEPS = 3
 _ANEW_S = 0.5
-"""How often all of the record is looked at anew once slip has ended; meanwhile the chosen law is refined."""
+"""Interval of full analyses once slip has ended; between them the chosen law is refined."""
 _SAME_START = 0.1
 """Tails that begin so close, in periods, are one."""
 _TAIL_PERIODS = 10.0
@@ -104,7 +103,7 @@ class LiveIdentification:
         return known.state
 
     def _refine(self, record: Record, now_s: float) -> "_LiveFit | None":
-        """The law that was chosen, refined with what has come since; None when it is time to look anew."""
+        """Refine the chosen law with the new readings; None when a full analysis is due."""
         last = self._last
         if last is None or last.decay.tail is None or now_s > last.anew_s + _ANEW_S:
             return None
@@ -145,7 +144,7 @@ class LiveIdentification:
         return replace(known, state=_judged(known.state, narrowing, judged.adequate))
 
     def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:
-        """Refine every law, or search anew where there is none yet or all have lost the motion."""
+        """Refine every law; search again where there is none yet or none explains the readings."""
         some = problem.decimated(_READINGS, decay.dense_until_s)
         if self._minima:
             fits = [
@@ -168,7 +167,7 @@ class LiveIdentification:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _LiveFit:
-    """What the next update begins with; `anew_s` is when the whole record was last looked at."""
+    """What the next update begins with; `anew_s` is the time of the last full analysis."""
 
     state: LiveState
     decay: FreeDecay

@@ -1,4 +1,4 @@
-"""The joint fit of both gauges: start values that need no guess, then refinement, for each friction law."""
+"""Search for the lowest minimum of chi-square, for each friction law."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ _MOST = 3000
 _DOUBT = 100.0
 """Minima whose chi-square of some readings differs by less are compared with most readings."""
 _TIE = 10.0
-"""Most readings of a record may be in error by so much about which of two minima is lower."""
+"""Chi-square with most readings may err by this much about which of two minima is lower."""
 _HOPELESS = 1000.0
-"""A law so far above its rival with some readings is not refined: most readings will not turn that round."""
+"""A law whose chi-square exceeds that of its rival by more, with some readings, is fitted roughly only."""
 _ROUGH_STEPS, _LAST_STEPS = 15, 15
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60), np.geomspace(2.65, 6.0, 56)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
@@ -99,7 +99,7 @@ class Search:
         The same with prior knowledge from tail, hold and parabolas, for windows that hold too little.
     period_s : float
     slip_end_s : float
-        Readings before it are looked at closely.
+        Most readings of a decimated problem lie before it.
     """
 
     problem: FitProblem
@@ -190,7 +190,7 @@ class Search:
         return [fits[model] for model in laws]
 
     def _best_minima(self, law: FrictionLaw, rough: list[Minimum]) -> list[Minimum]:
-        """Those of several close minima that most readings cannot tell apart."""
+        """Minima of nearly the same chi-square, refined with most readings; the best few."""
         most = self.problem.decimated(_MOST, self.slip_end_s)
         fine = [most.minimise(minimum.parameters, law, 12) for minimum in rough]
         if law.has_static_friction:

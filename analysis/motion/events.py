@@ -164,7 +164,7 @@ def _limit_reached(
 
 @compiled_part
 def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[float, float]:
-    """How long the masses move together from this state (inf: for ever), and the sign of the slip then.
+    """Duration of the stick from this state (inf: without end), and the sign of the slip that follows.
 
     The extremes of the joint acceleration decay, so the next one of each direction decides.
     """

@@ -27,7 +27,7 @@ from analysis.motion.events import (
 
 BLOCK = 256
 _ANCHORED = 32
-"""One in so many rotations starts anew: their rounding errors add up."""
+"""Rotations between two exact evaluations: their rounding errors add up."""
 _SMALL_ANGLE, _SMALL_DECAY = 0.5, 0.02
 """Up to these a rotation and a decay have series of a few terms."""
 _C4, _C6, _C8, _C10, _C12, _C14 = ((-1.0) ** (k // 2) / math.factorial(k) for k in range(4, 16, 2))

@@ -148,7 +148,7 @@ _SIGNAL_MIN = 20.0
 """Least ratio of mean squares, oscillation over residual: noise reaches about 5 at its best frequency."""
 _EXPLAINED_MIN = 0.75
 _LOSS_MIN = 3e-3
-"""Least share of the amplitude that must be lost over the record; a steadier one tells no damping."""
+"""Least share of the amplitude that must be lost over the record; with less, damping is not determined."""
 _AMPLITUDE = (1, 3, 4)
 """Places of swing, damping and friction among the parameters; the frequency is known far better."""
 _SIGMAS = 3.0

@@ -70,7 +70,7 @@ def identify_one_mass(
 
 
 def single_channel(time_s: Floats, value: Floats) -> Record:
-    """A record of one channel (n,) at `time_s` (n,), of a body of which nothing else is known."""
+    """Record of one channel (n,) at `time_s` (n,), of a body with unknown masses."""
     return Record(
         np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64), None, StandMasses(1.0, 1.0)
     )
@@ -217,7 +217,7 @@ def _clip_coulomb(budget: UncertaintyBudget, significant: bool) -> None:
 def _classical_figures(
     readings: Channel, solution: FreeDecayFit, budget: UncertaintyBudget, significant: bool
 ) -> list[ResultWarning]:
-    """Note the plain log decrement, and say so where friction biases it."""
+    """Add the plain log decrement to the budget; warn where friction biases it."""
     found = solution.fit
     parameters = found.parameters
     quarter_s = 0.25 * parameters.period_s if found.order == 1 else 0.0

@@ -14,7 +14,7 @@ from messages.message import message
 DELAY_MAX_S = 0.5
 """A gauge later than this is not read in the same test."""
 SAMPLES_MIN = 50
-"""Fewer readings than this hold no decay that could be told from anything else."""
+"""With fewer readings a decay cannot be distinguished from noise or drift."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

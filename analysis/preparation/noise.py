@@ -91,7 +91,7 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
 
 
 def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
-    """Say how gauge 1 or 2 drifts, and what is made of it."""
+    """Warning of the drift of gauge 1 or 2; None as drift means that it is not steady."""
     if drift_m_per_s is None:
         text = message(
             "gauge {gauge} drifts or jumps after slip, not steadily: f_d may be biased. Let the"
@@ -164,7 +164,7 @@ def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
 
 
 def hum_warning(gauge: str, hum: tuple[float, float]) -> ResultWarning:
-    """Say that a gauge hums."""
+    """Warning of mains hum, given frequency (Hz) and amplitude (m)."""
     text = message(
         "{gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
         " of the amplifier.",

@@ -1,4 +1,4 @@
-"""Whether readings can be those of a shaking stand at all: wrong units are told before any work."""
+"""Checks that readings can be those of a shaking stand, so that wrong units are named first."""
 
 import numpy as np
 
@@ -84,7 +84,7 @@ def estimate_period(table: Channel, release: Release) -> float:
     Raises
     ------
     RecordError
-        The record ends before a period can be told, or it is not one of a stand.
+        The record ends within one and a quarter swings, or no stand has this period.
     """
     swing = table.between(release.time_s, np.inf)
     try:

@@ -84,7 +84,7 @@ def period_and_damping(parameters: Floats) -> tuple[float, float]:
 
 
 def add_constants(constants: DecayConstants, budget: UncertaintyBudget) -> None:
-    """Note period, damping and stiffness."""
+    """Add period, damping and stiffness to the budget."""
     for name, unit, function in _DECAY_QUANTITIES:
         weights = numerical_gradient(function, constants.point)
         budget.add(name, function(constants.point), unit, constants.uncertainty.contributions(weights))

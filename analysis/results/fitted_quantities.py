@@ -160,7 +160,7 @@ CHI_SQUARE_RISE_95 = 3.841458820694124
 _QUADRATIC = 0.15
 """Relative deviation from that rise up to which a parabola is good enough."""
 _DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)
-"""Where chi-square is looked at, in units of the reach of a parabola."""
+"""Distances at which chi-square is evaluated, in units of the half interval of a parabola."""
 _HOPELESS = 14.0
 """Rise from which on a density of exp(-rise / 2) adds nothing to the interval."""
 _FINE = 2001

@@ -41,7 +41,7 @@ class JointFit:
     chosen : Fit
         The likeliest law (lowest BIC) among `candidates`.
     candidates : list of Fit
-        Laws whose parameters the record tells apart.
+        Fits of the laws whose parameters the record identifies.
     uncertainty : ParameterUncertainty
     selection : ModelSelection
     """
@@ -71,7 +71,7 @@ def choose_law(record: Record, decay: FreeDecay, problem: FitProblem, fits: list
     Raises
     ------
     RecordError
-        No law can be told from the record, or f_d is beyond that of any plates.
+        The record identifies no law, or f_d exceeds that of any dry plates.
     """
     candidates = identifiable_fits(fits)
     chosen = min(candidates, key=lambda fit: fit.bic)

@@ -1,8 +1,8 @@
 """Whether the masses given agree with the motion.
 
-While the plate slides the table swings by itself, with c/m1 instead of c/(m1 + m2): the record tells the
-ratio of the masses, though not the masses. Where no law explains a record, a wrong ratio may be why. It is
-looked for in the first slips, and must then explain the whole record.
+While the plate slides, the table swings alone, with c/m1 instead of c/(m1 + m2). So the record determines the
+ratio of the masses. Where no law explains a record, a wrong ratio may be the cause. The ratio is estimated
+from the first slips and must then explain the whole record.
 """
 
 from dataclasses import replace
@@ -28,7 +28,7 @@ _LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
 _ALIKE = 0.05
 """Relative deviation of the ratio of the masses up to which they may be each other's."""
 _WINDOW_PERIODS = 1.5
-"""The first slips, which tell the ratio of the masses best."""
+"""The first slips determine the ratio of the masses best."""
 _TOLERANCE = 1e-2
 _LOOSE = 0.5
 """Relative standard deviation with which the table mass is free."""
@@ -41,7 +41,7 @@ _BETTER = 0.1
 
 
 def mass_warnings(joint: JointFit) -> list[ResultWarning]:
-    """Say so where another table mass would explain most of what the best law leaves unexplained."""
+    """Warn where another table mass explains most of what the best law leaves unexplained."""
     record, decay = joint.record, joint.decay
     if decay.plateau is None or decay.relative is None:
         return []
@@ -61,7 +61,7 @@ def mass_warnings(joint: JointFit) -> list[ResultWarning]:
 
 
 def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
-    """Say what table would explain the motion, and whether the ratio is that given, upside down."""
+    """Warning with the table mass that explains the motion, and whether both masses look swapped."""
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     text = message(
         "a table of {found} kg under the plate of {plate} kg would explain this motion, one of {given} kg"

@@ -37,7 +37,7 @@ _SLIP_DOUBT = 2.0
 
 
 def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> None:
-    """Note both bounds of f_s as the chosen law and the record set them.
+    """Add both bounds of f_s to the budget.
 
     Where a law with f_s explains the record, they are those of its motion: the largest demand that the
     joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
@@ -60,7 +60,7 @@ def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> No
 def add_no_slip_bound(
     record: Record, constants: DecayConstants, decay: FreeDecay, budget: UncertaintyBudget
 ) -> None:
-    """Note the least f_s that keeps the plate from slipping, in a decay that has a tail from the release on.
+    """Add the least f_s that prevents slip, for a decay whose tail begins at the release.
 
     The joint acceleration over g, less what a slip too small to be seen may have begun at: a demand that
     falls short of f_s by d at its peak A makes the plate slip by 1.5 g (1 + m2/m1) d^2 / (A k1^2).
@@ -195,8 +195,8 @@ class SlipEnd:
 def find_slip_end(joint: JointFit) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
-    The last slips are often smaller than the noise, so that gauge 2 alone tells the end to a quarter period
-    and too early rather than too late.
+    The last slips are often smaller than the noise. Gauge 2 alone gives the end to a quarter period, rather
+    too early than too late.
 
     Returns
     -------
