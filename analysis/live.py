@@ -1,7 +1,7 @@
 """Identification while the motion still dies away: running friction, period and damping.
 
-Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law is
-refined from its last minimum. When no law explains the readings any more, the search is repeated.
+Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law
+is refined from its last minimum. When no law explains the readings any more, the search is repeated.
 """
 
 from dataclasses import dataclass, replace
