@@ -9,14 +9,12 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QFrame,
     QGridLayout,
-    QHBoxLayout,
     QHeaderView,
     QLineEdit,
     QPushButton,
     QScrollArea,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -34,6 +32,7 @@ from app.qt.gauges.residual_plot import ResidualPlot
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import CheckBox, ComboBox
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -121,23 +120,18 @@ class CalibratePanel(QScrollArea):
 
     def _lay_out(self) -> None:
         inside = QWidget()
-        columns = QHBoxLayout(inside)
-        columns.setContentsMargins(16, 8, 16, 8)
-        columns.setSpacing(16)
-        right = QVBoxLayout()
-        right.setSpacing(8)
-        for part in (self._plot, self._merits, self._cautions):
-            right.addWidget(part)
-        right.addLayout(self._form_grid())
-        right.addWidget(self._use)
-        below = QHBoxLayout()
-        below.addWidget(self._save)
-        below.addWidget(self._again)
-        below.addStretch(1)
-        right.addLayout(below)
-        right.addStretch(1)
-        columns.addWidget(self._readings)
-        columns.addLayout(right, 1)
+        buttons = make_row(self._save, self._again, STRETCH, spacing=8)
+        right = make_column(
+            self._plot,
+            self._merits,
+            self._cautions,
+            self._form_grid(),
+            self._use,
+            buttons,
+            STRETCH,
+            spacing=8,
+        )
+        make_row(self._readings, (right, 1), spacing=16, margins=(16, 8), of=inside)
         self.setProperty("role", "column")
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -207,13 +201,7 @@ class _ReadingColumn(QWidget):
         self._dial.selectAll()
 
     def _lay_out(self) -> None:
-        buttons = QHBoxLayout()
-        buttons.addWidget(self._undo)
-        buttons.addWidget(self._restart)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        for part in (
+        make_column(
             self._gauge,
             label(gettext(_HOW), muted=True, wrap=True),
             self._live,
@@ -221,10 +209,11 @@ class _ReadingColumn(QWidget):
             self._dial,
             self._waiting,
             self._message,
-        ):
-            layout.addWidget(part)
-        layout.addLayout(buttons)
-        layout.addWidget(self._table, 1)
+            make_row(self._undo, self._restart, spacing=8),
+            (self._table, 1),
+            spacing=8,
+            of=self,
+        )
 
 
 class _ReadingsTable(QTableWidget):

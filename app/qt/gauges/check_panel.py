@@ -2,15 +2,14 @@
 
 from dataclasses import replace
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
 
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.state import NAMES, CheckForm, CheckKind, CheckState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
-from app.qt.widgets.layouts import make_form_grid, make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -97,26 +96,23 @@ class CheckPanel(QWidget):
     def _lay_out(self) -> None:
         page = QWidget()
         page.setMaximumWidth(_WIDTH)
-        column = QVBoxLayout(page)
-        column.setContentsMargins(16, 8, 16, 8)
-        column.setSpacing(12)
-        column.addWidget(label(gettext(_HOW), muted=True, wrap=True))
-        column.addLayout(make_form_grid(self._named_fields()))
-        column.addWidget(self._instruction)
-        column.addWidget(self._waiting)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
         self._advance.setProperty("primary", "true")
-        for button in (self._advance, self._cancel):
-            buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
-        buttons.addStretch(1)
-        column.addLayout(buttons)
-        for part in (self._message, self._verdict, self._values, self._warnings):
-            column.addWidget(part)
-        column.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(make_scroll_area(page, name=gettext("Check of a gauge")))
+        make_column(
+            label(gettext(_HOW), muted=True, wrap=True),
+            make_form_grid(self._named_fields()),
+            self._instruction,
+            self._waiting,
+            make_row(self._advance, self._cancel, STRETCH, spacing=8),
+            self._message,
+            self._verdict,
+            self._values,
+            self._warnings,
+            STRETCH,
+            spacing=12,
+            margins=(16, 8),
+            of=page,
+        )
+        make_column(make_scroll_area(page, name=gettext("Check of a gauge")), of=self)
 
     def _named_fields(self) -> list[tuple[str, QWidget]]:
         for name, field in self._fields.items():

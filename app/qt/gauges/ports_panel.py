@@ -6,7 +6,7 @@ from app.presenters.gauges.ports import PortsPresenter
 from app.presenters.gauges.state import PortCard, PortsState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -105,19 +105,7 @@ class PortsPanel(QWidget):
         return second
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
+        head = make_row(self._look, self._stop, self._query_silent, STRETCH, spacing=12)
         head.setContentsMargins(16, 8, 16, 0)
-        head.setSpacing(12)
-        for part in (self._look, self._stop, self._query_silent):
-            head.addWidget(part)
-        head.addStretch(1)
-        said = QVBoxLayout()
-        said.setContentsMargins(16, 0, 16, 0)
-        said.addWidget(self._progress)
-        said.addWidget(self._message)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        layout.addLayout(head)
-        layout.addLayout(said)
-        layout.addWidget(self._list, 1)
+        text = make_column(self._progress, self._message, margins=(16, 0))
+        make_column(head, text, (self._list, 1), spacing=8, of=self)

@@ -1,21 +1,20 @@
-"""What can be done to the selected runs, how far it is, and what came of it."""
+"""Actions on the selected runs, their progress and outcome."""
 
 from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtWidgets import (
     QFrame,
-    QHBoxLayout,
     QProgressBar,
     QPushButton,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunsState
+from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -51,7 +50,7 @@ class ActionBar(QFrame):
         self._lay_out()
 
     def add_keys(self, screen: QWidget, table: QWidget) -> None:
-        """Let keys press the buttons; single letters only in the table, where nothing is written."""
+        """Bind keys to the buttons; single letters only in the table, where nothing is typed."""
         for button, keys, words in (
             (self._open, ("Return", "Enter"), gettext("Show the run on Identify")),
             (
@@ -103,18 +102,10 @@ class ActionBar(QFrame):
         self._list.setVisible(not self._list.isVisible())
 
     def _lay_out(self) -> None:
-        line = QHBoxLayout()
-        line.setSpacing(8)
-        for button in (self._open, self._analyse, self._export, self._trash, self._undo):
-            line.addWidget(button)
-        line.addSpacing(8)
-        line.addWidget(self._message, 1)
-        for widget in (self._details, self._bar, self._cancel):
-            line.addWidget(widget)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 8, 12, 8)
-        layout.addLayout(line)
-        layout.addWidget(self._list)
+        buttons = make_row(self._open, self._analyse, self._export, self._trash, self._undo, spacing=8)
+        line = make_row(buttons, (self._message, 1), self._details, self._bar, self._cancel, spacing=8)
+        line.insertSpacing(1, 8)
+        make_column(line, self._list, spacing=6, margins=(12, 8), of=self)
 
 
 def _button(text: str, act: Callable[[], None]) -> QPushButton:

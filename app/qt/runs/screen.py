@@ -7,12 +7,10 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,6 +24,7 @@ from app.qt.runs.table import RunsTable
 from app.qt.screens import WindowDialogs
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext, ngettext
@@ -186,48 +185,31 @@ class RunsScreen(QWidget):
         self._status.setAccessibleName(gettext("Which runs"))
         for status in StatusFilter:
             self._status.addItem(gettext(status.value), status)
-        top = QHBoxLayout()
-        top.setSpacing(8)
-        top.addWidget(self._text, 1)
-        for widget in (self._series, self._status, self._count, self._import, self._folder):
-            top.addWidget(widget)
+        top = make_row(
+            (self._text, 1), self._series, self._status, self._count, self._import, self._folder, spacing=8
+        )
         self._middle.addWidget(self._table)
         self._middle.addWidget(_centred(self._empty))
-        middle = QHBoxLayout()
-        middle.setSpacing(8)
-        middle.addWidget(_card(self._middle), 1)
-        middle.addWidget(self._side)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addLayout(top)
-        layout.addLayout(middle, 1)
-        layout.addWidget(self._actions)
+        middle = make_row((_card(self._middle), 1), self._side, spacing=8)
+        make_column(top, (middle, 1), self._actions, spacing=8, margins=(8, 8), of=self)
 
     def _make_side(self) -> QFrame:
         content = QWidget()
-        column = QVBoxLayout(content)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._preview, 1)
-        column.addWidget(self._metadata)
+        make_column((self._preview, 1), self._metadata, spacing=6, of=content)
         return _card(content)
 
 
 def _card(content: QWidget) -> QFrame:
     card = QFrame()
     card.setProperty("role", "card")
-    inside = QVBoxLayout(card)
-    inside.setContentsMargins(1, 1, 1, 1)
-    inside.addWidget(content)
+    make_column(content, margins=(1, 1), of=card)
     return card
 
 
 def _centred(words: QLabel) -> QWidget:
     page = QWidget()
     words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    layout = QVBoxLayout(page)
-    layout.setContentsMargins(24, 24, 24, 24)
-    layout.addWidget(words)
+    make_column(words, margins=(24, 24), of=page)
     return page
 
 
