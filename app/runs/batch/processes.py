@@ -11,8 +11,6 @@ from typing import TypeVar
 
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 
-Item = TypeVar("Item")
-Answer = TypeVar("Answer")
 
 
 class ProcessExecutor:
