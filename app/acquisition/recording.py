@@ -26,7 +26,7 @@ from app.runs.blocks import BlockLayout
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events, RunMetadata
-from app.runs.writer_messages import OpenRun
+from app.runs.writer_client import OpenRun
 from drivers.clock import ClockEstimate, Skew
 from drivers.samples import Losses
 from messages.message import EMPTY, Message, as_message, joined, message, message_of

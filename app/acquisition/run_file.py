@@ -24,7 +24,7 @@ from app.acquisition.stream.reads import DecodedRead
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
-from app.runs.writer_messages import OpenRun
+from app.runs.writer_client import OpenRun
 from drivers.host_time import host_ns
 from drivers.samples import INCOMPLETE, Losses, SampleStatus
 from messages.message import EMPTY, Message, joined, message, message_of

@@ -32,6 +32,7 @@ from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, AnalysisRequest, 
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs, build_outcome
 from app.runs.listing import resolve_run_files
+from messages.message import message
 
 _MODELS = ("auto", *(law.name for law in LAWS))
 
@@ -169,7 +170,7 @@ def _analyze_with_figure(task: AnalysisTask, figure: Path) -> Generator[Analysis
             analysis = analyze_run(path, task.request, save=task.save, progress=update)
         save_figure(analysis, figure)
     except Exception as error:
-        yield AnalysisOutcome(task.path, error=error_text(error))
+        yield AnalysisOutcome(task.path, error=message("{error}", error=error_text(error)))
     else:
         yield build_outcome(analysis)
 
@@ -177,9 +178,10 @@ def _analyze_with_figure(task: AnalysisTask, figure: Path) -> Generator[Analysis
 def _report_run(outcome: AnalysisOutcome, as_json: bool) -> dict[str, Any]:
     """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
     if outcome.document is None:
-        said = outcome.error if outcome.run in outcome.error else f"{outcome.run}: {outcome.error}"
+        fault = str(outcome.error)
+        said = fault if outcome.run in fault else f"{outcome.run}: {fault}"
         out.print_status(f"error: {said}")
-        return {"run": outcome.run, "error": outcome.error}
+        return {"run": outcome.run, "error": fault}
     print_interrupted_run(Path(outcome.run), outcome.ended)
     if not as_json:
         print_analysis(outcome.document, outcome.unit)

@@ -19,8 +19,7 @@ from app.cli.errors import CommandError
 from app.cli.options import Directory, JobOptions, Json, calibration_file, number, with_options
 from app.cli.recording import record_with_progress
 from app.runs.analyze import AnalysisRequest, analyze_run
-from app.runs.batch.executors import ExecutorOptions, open_executor
-from app.runs.batch.ordered_map import FailedItem
+from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import map_runs
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_runs
 from app.runs.listing import find_run_files

@@ -45,7 +45,7 @@ def runs(
     with out.progress_bar("looking at new files", total=1.0) as update:
         found = list_runs(directory, wanted, progress=lambda done, count: update(done / count))
     if as_json:
-        out.print_json(msgspec.to_builtins(found))
+        out.print_json([msgspec.to_builtins(run) | {"fault": str(run.fault)} for run in found])
     elif found:
         header = ("run", "series", "begun", "seconds", "ended", "f_d", "conditions")
         out.print_table(header, [_row(run) for run in found])
@@ -68,7 +68,7 @@ def _day(option: str, text: str | None) -> datetime.date | None:
 
 def _row(run: RunSummary) -> tuple[str, ...]:
     if run.fault:
-        return (run.path, "", "", "", "", run.fault, "")
+        return (run.path, "", "", "", "", str(run.fault), "")
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
     ended = run.ended or "unfinished: slipstand recover"
     seconds = f"{run.duration_s:.1f}"

@@ -303,9 +303,9 @@ def _summary(path: Path, validator: Validator) -> tuple[RunSummary, bool]:
         check_openable(path)
         return msgspec.structs.replace(validator.validate(path), path=str(path)), True
     except (NotARunError, DamagedRunError) as error:
-        return RunSummary(path=str(path), fault=str(error)), True
+        return RunSummary(path=str(path), fault=error.message), True
     except RunError as error:
-        return RunSummary(path=str(path), fault=str(error)), False
+        return RunSummary(path=str(path), fault=error.message), False
 
 
 def _series(run: RunSummary) -> list[str]:

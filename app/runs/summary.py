@@ -11,6 +11,7 @@ from app.runs.fields import read_text
 from app.runs.metadata import Conditions
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.saved_analyses import metadata_hash, read_analyses
+from messages.message import Message
 
 
 class RunSummary(msgspec.Struct, frozen=True, gc=False):
@@ -21,7 +22,7 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     """
 
     path: str
-    fault: str = ""
+    fault: Message = Message("")
     title: str = ""
     series: str | None = None
     start_time: datetime.datetime | None = None

@@ -14,7 +14,7 @@ from app.runs.blocks import RunBlock
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
 from app.runs.writer import RunWriter, create_run_in
-from app.runs.writer_messages import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
+from app.runs.writer_client import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
 
 _QUEUE_COMMANDS = 64
 _IDLE_S = 0.05

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analysis.campaign.rows import SeriesRow
 from analysis.catalogue import table_columns
 from analysis.motion.two_mass import Motion, TwoMassParameters
-from app.runs.batch.tasks import error_text
+from app.runs.batch.tasks import error_message
 from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
@@ -23,6 +23,7 @@ from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, SampleStatus
+from messages.message import Message
 
 CLOCK_UNCERTAINTY = 2e-5
 """Relative standard uncertainty of the device's clock, as the runs state it."""
@@ -326,7 +327,7 @@ class RecordedTest(msgspec.Struct, frozen=True):
     """What became of a test: its run, or why there is none."""
 
     path: str
-    error: str = ""
+    error: Message = Message("")
 
 
 def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
@@ -334,7 +335,7 @@ def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
     try:
         return RecordedTest(write_test(test).path)
     except Exception as error:
-        return RecordedTest(test.path, error_text(error))
+        return RecordedTest(test.path, error_message(error))
 
 
 def test_metadata(test: SyntheticTest) -> RunMetadata:

@@ -25,8 +25,7 @@ from app.presenters.campaign.tasks import (
 )
 from app.presenters.results import sentence
 from app.presenters.worker import LazyFunction, ReportProgress
-from app.runs.batch.executors import ExecutorOptions, open_executor
-from app.runs.batch.ordered_map import FailedItem
+from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import map_runs
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, RunCollection, iter_collected
 from app.runs.edits import edit_run, undo_edit

@@ -14,7 +14,7 @@ from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, Pre
 from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:
-    from app.runs.exchange.preview import FilePreview
+    from app.runs.exchange.importing import FilePreview
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16

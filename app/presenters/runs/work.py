@@ -45,8 +45,14 @@ from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields, undo_edit
 from app.runs.errors import RunError
 from app.runs.exchange.exporting import ExportRequest, export_runs
-from app.runs.exchange.importing import CsvImport, even_rate_hz, import_csv, read_record
-from app.runs.exchange.preview import ParseOptions, preview_file
+from app.runs.exchange.importing import (
+    CsvImport,
+    ParseOptions,
+    even_rate_hz,
+    import_csv,
+    preview_file,
+    read_record,
+)
 from app.runs.file_operations import copy_run_into, move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
 from app.runs.reader import open_run

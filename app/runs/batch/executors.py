@@ -1,46 +1,151 @@
-"""Which crew does the work."""
+"""Executors for work on many runs - here, in processes, on a Dask cluster - and an ordered map over them."""
 
+import contextlib
+import importlib
+import logging
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from typing import Protocol, TypeVar
+from dataclasses import dataclass
+from itertools import islice
+from multiprocessing.synchronize import Lock
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
+
+from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
+from app.runs.errors import ClusterError, ExtraMissingError, one_line
+from app.version import __version__
+from messages.message import Message, message
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
+_log = logging.getLogger(__name__)
+
+_SERIAL_RUNS = 8
+"""Up to this many runs are done before worker processes would have started (docs/benchmarks.md)."""
+_CLUSTER_TIMEOUT_S = 5.0
+"""A scheduler in the same network answers in less than 1 s."""
+_QUEUED_PER_WORKER = 8
+"""Items handed over for each worker: one slow run must not leave the others idle."""
+_POLL_S = 0.2
+"""Windows delivers Ctrl-C between two waits only."""
+
 
 class Executor(Protocol):
-    """Workers that share one `concurrent.futures.Executor`. Use it in a `with` statement of `crew_of`."""
+    """Runs work, some items at once. Use it in the `with` statement of `open_executor`."""
 
     @property
     def workers(self) -> int:
-        """How many pieces of work are done at once."""
+        """Number of items that are worked on at once."""
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
-        """Hand over a piece of work; both must be picklable, `work` by its name.
+        """Hand over one item; both arguments must be picklable, `work` by its name.
 
-        The future fails with `concurrent.futures.BrokenExecutor` where a worker died, with whatever was
-        in work then.
+        The future fails with `concurrent.futures.BrokenExecutor` where a worker died.
         """
 
     def renew(self) -> None:
-        """Take new workers, after one died."""
+        """Replace the workers after one died."""
 
     def close(self, *, now: bool) -> None:
-        """End once all is done that is being done; or `now`, and give it up."""
+        """End when the work under way is done, or `now`."""
+
+
+class ExecutorOptions(msgspec.Struct, frozen=True):
+    """Choice of executor.
+
+    Attributes
+    ----------
+    jobs : int or None
+        Largest number of processes; None uses all processors, and this process alone for few runs.
+    dask : str
+        Address of a Dask scheduler; "" for this computer.
+    """
+
+    jobs: int | None = None
+    dask: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FailedItem(Generic[Item]):
+    """An item that killed its worker twice or could not be worked on."""
+
+    item: Item
+    message: Message
+
+
+@contextmanager
+def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
+    """Open an executor for this many runs; an error in the block cancels its work.
+
+    Raises
+    ------
+    ExtraMissingError, ClusterError
+    """
+    executor = _choose(options, runs)
+    try:
+        yield executor
+    except BaseException:
+        executor.close(now=True)
+        raise
+    executor.close(now=False)
+
+
+def processor_count() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def ordered_map(
+    executor: Executor, work: Callable[[Item], Answer], items: Iterable[Item]
+) -> Iterator[Answer | FailedItem[Item]]:
+    """Do `work` on each item and yield the answers in the order of the items.
+
+    When a worker dies, the guilty item is unknown: everything under way is done again, one at a time. An item
+    that kills its worker again is a `FailedItem`.
+
+    Parameters
+    ----------
+    executor
+    work
+        Function of a module.
+    items
+        Taken as needed; any number.
+    """
+    source = iter(items)
+    queued: deque[tuple[Item, Future[Answer]]] = deque()
+    limit = 1 if isinstance(executor, SerialExecutor) else executor.workers * _QUEUED_PER_WORKER
+    try:
+        while True:
+            for item in islice(source, limit - len(queued)):
+                queued.append((item, _submit(executor, work, item)))
+            if not queued:
+                return
+            if isinstance(_wait_for_error(queued[0][1]), BrokenExecutor):
+                suspects = list(queued)
+                queued.clear()
+                yield from _one_at_a_time(executor, work, suspects)
+            else:
+                yield _answer(*queued.popleft())
+    finally:
+        for _, future in queued:
+            future.cancel()
 
 
 class SerialExecutor:
-    """No crew: work is done in this process, at once."""
+    """Runs work in this process, at once."""
 
     workers = 1
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
-        """Do the work. What it raises is in the future, as an interruption is not."""
+        """Do the work. Its exceptions are in the future, interruptions are raised."""
         future: Future[Answer] = Future()
         try:
             future.set_result(work(item))
@@ -52,64 +157,235 @@ class SerialExecutor:
         """Nothing can have died."""
 
     def close(self, *, now: bool) -> None:
-        """Nothing is being done."""
+        """Nothing is under way."""
 
 
-_FEW = 8
-"""Up to so many runs are done before other processes would have begun (docs/benchmarks.md)."""
+class ProcessExecutor:
+    """Worker processes on this computer, started with the first item. None outlives this process.
 
-
-class ExecutorOptions(msgspec.Struct, frozen=True):
-    """Who is to do the work.
-
-    Attributes
+    Parameters
     ----------
-    jobs : int or None
-        Processes at most; None is as many as there are processors, none of them for few runs.
-    dask : str
-        Address of a Dask scheduler, whose workers do it all; "" for this computer.
+    workers : int
+        Largest number of processes.
+    prepare : callable
+        Called by each process before its first item, one process after another: at the very first start one
+        compiles, and the others load the result.
     """
 
-    jobs: int | None = None
-    dask: str = ""
+    def __init__(self, workers: int, prepare: Callable[[], None]) -> None:
+        self.workers = workers
+        self._prepare = prepare
+        self._executor: ProcessPoolExecutor | None = None
+        self._lifeline: tuple[PipeEnd, ...] = ()
+
+    def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
+        """Hand over one item. Raises BrokenProcessPool after a worker died, until `renew`."""
+        with _interrupts_held():  # Ctrl-C must not kill a process that is starting, with a traceback
+            return self._started().submit(work, item)
+
+    def renew(self) -> None:
+        """Start new processes after one died."""
+        _log.warning("a worker process died; the workers are replaced")
+        self.close(now=True)
+
+    def close(self, *, now: bool) -> None:
+        """End the processes when their work is done, or `now`."""
+        if self._executor is None:
+            return
+        if not now:
+            self._executor.shutdown(wait=True, cancel_futures=True)
+        for end in self._lifeline:
+            end.close()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._executor = None
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._executor is None:
+            context = multiprocessing.get_context("spawn")
+            self._lifeline = context.Pipe(duplex=False)
+            self._executor = ProcessPoolExecutor(
+                self.workers,
+                mp_context=context,
+                initializer=_begin,
+                initargs=(self._lifeline[0], context.Lock(), self._prepare),
+            )
+        return self._executor
 
 
-@contextmanager
-def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
-    """Open the crew for so many runs; what it does when the block is left by an error is given up.
+class DaskExecutor:
+    """Workers of a Dask cluster, on computers that see the same run files.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, for example `tcp://lab-server:8786`.
 
     Raises
     ------
-    ExtraMissingError, ClusterError
+    ExtraMissingError
+        Dask's `distributed` is not installed.
+    ClusterError
+        The scheduler does not answer, has no workers, or they have another version of Slipstand.
     """
-    crew = _chosen(options, runs)
-    try:
-        yield crew
-    except BaseException:
-        crew.close(now=True)
-        raise
-    crew.close(now=False)
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._client = _connect(address)
+        try:
+            self._check_workers()
+            self._executor: Any = self._client.get_executor(pure=False)
+        except BaseException:
+            self._client.close()
+            raise
+
+    @property
+    def workers(self) -> int:
+        """Number of items that the cluster works on at once, at present."""
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
+
+    def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
+        """Hand over one item; where a worker dies, Dask gives the item to another one."""
+        future: Future[Answer] = self._executor.submit(work, item)
+        return future
+
+    def renew(self) -> None:
+        """Dask replaces its workers itself."""
+
+    def close(self, *, now: bool) -> None:
+        """Leave the cluster; items that wait there are cancelled."""
+        self._executor.shutdown(wait=not now)
+        self._client.close()
+
+    def _check_workers(self) -> None:
+        try:
+            versions: dict[str, str] = self._client.run(program_version)
+        except Exception as error:
+            raise ClusterError(
+                "the workers of {address} cannot run Slipstand ({kind}: {fault})."
+                " Install it there, in the same version",
+                address=self._address,
+                kind=type(error).__name__,
+                fault=one_line(error)[:120],
+            ) from None
+        if not versions:
+            raise ClusterError(
+                "the cluster at {address} has no workers. Start some: dask worker {address}",
+                address=self._address,
+            )
+        for worker, version in versions.items():
+            if version != __version__:
+                raise ClusterError(
+                    "worker {worker} has Slipstand {version}, here it is {own_version}."
+                    " Install the same version on both",
+                    worker=worker,
+                    version=version,
+                    own_version=__version__,
+                )
 
 
-def processor_count() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def program_version() -> str:
+    """Version of Slipstand where this is called."""
+    return __version__
 
 
-def _chosen(options: ExecutorOptions, runs: int) -> Executor:
+def load_analysis() -> None:
+    """Load what an analysis needs, or compile it. Called in worker processes."""
+    from analysis.warm_up import warm_up
+
+    warm_up()
+
+
+def _choose(options: ExecutorOptions, runs: int) -> Executor:
     if options.dask:
-        from app.runs.batch.dask_executor import DaskExecutor
-
         return DaskExecutor(options.dask)
     jobs = options.jobs
     if jobs is None:
         may_have_children = not multiprocessing.current_process().daemon
-        jobs = processor_count() if runs > _FEW and may_have_children else 1
+        jobs = processor_count() if runs > _SERIAL_RUNS and may_have_children else 1
     jobs = min(jobs, runs)
-    if jobs <= 1:
-        return SerialExecutor()
-    from app.runs.batch.processes import ProcessExecutor, load_analysis
+    return SerialExecutor() if jobs <= 1 else ProcessExecutor(jobs, load_analysis)
 
-    return ProcessExecutor(jobs, load_analysis)
+
+def _submit(executor: Executor, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
+    """Hand over one item; the refusal of an executor becomes a failed future."""
+    try:
+        return executor.submit(work, item)
+    except (BrokenExecutor, RuntimeError, OSError) as error:
+        future: Future[Answer] = Future()
+        future.set_exception(error)
+        return future
+
+
+def _wait_for_error(future: "Future[Answer]") -> BaseException | None:
+    while not wait([future], timeout=_POLL_S).done:
+        pass
+    return future.exception()
+
+
+def _one_at_a_time(
+    executor: Executor, work: Callable[[Item], Answer], suspects: "list[tuple[Item, Future[Answer]]]"
+) -> Iterator[Answer | FailedItem[Item]]:
+    executor.renew()
+    for item, earlier in suspects:
+        future = earlier
+        if isinstance(_wait_for_error(future), BrokenExecutor):
+            future = _submit(executor, work, item)
+        if isinstance(_wait_for_error(future), BrokenExecutor):
+            executor.renew()
+            yield FailedItem(
+                item, message("it killed the process that worked on it, twice: out of memory, or killed")
+            )
+        else:
+            yield _answer(item, future)
+
+
+def _answer(item: Item, future: "Future[Answer]") -> Answer | FailedItem[Item]:
+    error = _wait_for_error(future)
+    if error is None:
+        return future.result()
+    if not isinstance(error, Exception):
+        raise error
+    kind, text = type(error).__name__, one_line(error)[:200]
+    return FailedItem(item, message("its worker failed ({kind}: {text})", kind=kind, text=text))
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Block Ctrl-C here and in processes that are started meanwhile, where the system can."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
+    """Begin a worker process."""
+    exit_with_parent(lifeline)
+    with one_at_a_time:
+        prepare()
+
+
+def _connect(address: str) -> Any:
+    try:
+        distributed = importlib.import_module("distributed")
+    except ImportError:
+        raise ExtraMissingError(
+            "--dask needs Dask's distributed, which is not installed. Install it:"
+            " pip install 'slipstand[cluster]'"
+        ) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # failures are in the answers
+    try:
+        distributed.comm.get_address_host_port(address)  # the client takes 20 s to find a bad address
+        return distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        raise ClusterError(
+            "no Dask scheduler answers at {address!r} ({fault})."
+            " Start one with `dask scheduler`, and give its address, for example tcp://localhost:8786",
+            address=address,
+            fault=one_line(error)[:120] or type(error).__name__,
+        ) from None

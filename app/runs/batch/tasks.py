@@ -7,11 +7,9 @@ from typing import Protocol, TypeVar
 import h5py
 import msgspec
 
-from analysis.record import AnalysisError
 from app.runs.analyze import Analysis, AnalysisRequest, Progress, analyze_run
-from app.runs.batch.executors import Executor, SerialExecutor
-from app.runs.batch.ordered_map import FailedItem, ordered_map
-from app.runs.errors import RunError, internal_error
+from app.runs.batch.executors import Executor, FailedItem, SerialExecutor, ordered_map
+from app.runs.errors import internal_error, one_line
 from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
@@ -20,6 +18,7 @@ from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read
 from app.runs.schema import ENDED
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
+from messages.message import Message, MessageError, message
 
 
 class AnalysisTask(msgspec.Struct, frozen=True):
@@ -50,8 +49,8 @@ class AnalysisOutcome(msgspec.Struct, frozen=True):
         Absolute path.
     document : Document or None
         As `analyze --json` says it; None where the run could not be analysed.
-    error : str
-        Why not, in one line; "" otherwise.
+    error : Message
+        Reason why not; empty otherwise.
     up_to_date : bool
         The document is the one that was kept in the run.
     unit : str
@@ -62,7 +61,7 @@ class AnalysisOutcome(msgspec.Struct, frozen=True):
 
     run: str
     document: Document | None = None
-    error: str = ""
+    error: Message = Message("")
     up_to_date: bool = False
     unit: str = "m"
     ended: str = ""
@@ -76,7 +75,7 @@ def analyze_one(
     try:
         return _analyzed(path, task, progress, validator or shared_validator())
     except Exception as error:
-        return AnalysisOutcome(str(path), error=error_text(error))
+        return AnalysisOutcome(str(path), error=error_message(error))
 
 
 def build_outcome(analysis: Analysis) -> AnalysisOutcome:
@@ -86,10 +85,13 @@ def build_outcome(analysis: Analysis) -> AnalysisOutcome:
     return AnalysisOutcome(analysis.document["run"], analysis.document, unit=run.metadata.unit, ended=ended)
 
 
-def error_text(error: Exception) -> str:
-    """One line on what went wrong with a run; a fault of the program itself is called one."""
-    known = (RunError, AnalysisError, ConfigError, OSError)
-    return " ".join(str(error).split()) if isinstance(error, known) else str(internal_error(error))
+def error_message(error: Exception) -> Message:
+    """Message of an error with a run; a fault of the program itself is named one."""
+    if isinstance(error, MessageError):
+        return error.message
+    if isinstance(error, OSError | ConfigError):
+        return message("{error}", error=one_line(error))
+    return internal_error(error)
 
 
 def validate_and_count(path: Path, validator: Validator) -> int:

@@ -12,15 +12,14 @@ from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.series import RunResult
 from analysis.quantities import BudgetLine, ResultWarning
 from app.runs.analyze import AnalysisRequest
-from app.runs.batch.executors import ExecutorOptions, open_executor
-from app.runs.batch.ordered_map import FailedItem
+from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import map_runs
 from app.runs.campaign.run_result import CollectedRun, CollectTask, RunDetails, collect_run
 from app.runs.file_operations import list_trash
 from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
 from config.schema import ConfigError, Gauges, Stand
-from messages.message import message
+from messages.message import Message, message
 
 Progress = Callable[[float, str], None]
 
@@ -51,12 +50,12 @@ class FailedRun(msgspec.Struct, frozen=True):
     """A run that gives no result, and why, in one line."""
 
     run: str
-    error: str
+    error: Message
 
     @property
     def reason(self) -> str:
         """The error without the path that it begins with."""
-        return self.error.removeprefix(self.run).lstrip(": ")
+        return str(self.error).removeprefix(self.run).lstrip(": ")
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -13,13 +13,14 @@ from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetSource, Quantity
 from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import AnalysisRequest, Progress, analyze_run
-from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
+from app.runs.batch.tasks import error_message, latest_valid_in_file, validate_and_count
 from app.runs.metadata import Conditions, RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
 from app.runs.saved_analyses import Document
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError, Gauges, Stand
+from messages.message import Message
 
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 _OF_CALIBRATION = (
@@ -90,7 +91,7 @@ class CollectedRun(msgspec.Struct, frozen=True):
     """
 
     path: str
-    error: str = ""
+    error: Message = Message("")
     excluded: str = ""
     result: RunResult | None = None
     details: RunDetails | None = None
@@ -120,7 +121,7 @@ def collect_run(
             document, number = analysis.document, analysis.saved_as
         return _account(path, read, document, number)
     except Exception as error:
-        return CollectedRun(task.path, error_text(error), excluded)
+        return CollectedRun(task.path, error_message(error), excluded)
 
 
 def calibration_identity(gauges: Gauges) -> str:

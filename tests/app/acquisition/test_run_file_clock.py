@@ -12,7 +12,7 @@ from app.acquisition.run_file import RunFile
 from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalSpan
 from app.runs.metadata import create_metadata
-from app.runs.writer_messages import OpenRun
+from app.runs.writer_client import OpenRun
 from config.files import load_gauges, load_stand
 
 

@@ -22,7 +22,7 @@ from app.presenters.runs.tasks import (
 from app.presenters.runs.work import csv_import
 from app.presenters.runs.work import execute as execute_task
 from app.runs.errors import ImportFileError, RunError
-from app.runs.exchange.preview import FilePreview, ParseOptions
+from app.runs.exchange.importing import FilePreview, ParseOptions
 from app.runs.reader import open_run
 
 FOUND = FilePreview(

@@ -25,7 +25,7 @@ from app.presenters.worker import (
     Worker,
     WorkerPool,
 )
-from app.runs.batch.processes import ProcessExecutor
+from app.runs.batch.executors import ProcessExecutor
 from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
 

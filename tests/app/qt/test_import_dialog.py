@@ -15,7 +15,7 @@ from app.presenters.runs.state import Overlay, Trace
 from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
-from app.runs.exchange.preview import FilePreview, ParseOptions
+from app.runs.exchange.importing import FilePreview, ParseOptions
 
 FOUND = FilePreview(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",

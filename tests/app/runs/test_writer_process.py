@@ -17,8 +17,7 @@ from app.runs.errors import DiskFullError, MetadataError, WriteError, WriterBehi
 from app.runs.journal import MAGIC, JournalSpan, encode_record
 from app.runs.lock import is_being_recorded
 from app.runs.reader import load_raw_bytes, open_run
-from app.runs.writer_client import WriterClient
-from app.runs.writer_messages import OpenRun
+from app.runs.writer_client import OpenRun, WriterClient
 
 WAIT_S = 60.0
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
@@ -99,7 +98,7 @@ from pathlib import Path
 from runs_kit import block
 from app.runs.metadata import RunMetadata
 from app.runs.writer_client import WriterClient
-from app.runs.writer_messages import OpenRun
+from app.runs.writer_client import OpenRun
 metadata = msgspec.json.decode(Path({metadata!r}).read_bytes(), type=RunMetadata)
 client = WriterClient.start()
 path = client.open(OpenRun({folder!r}, metadata)).result()

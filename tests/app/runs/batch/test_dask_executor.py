@@ -10,8 +10,7 @@ import pytest
 from batch_kit import doubled_slowly
 
 from app.runs.analyze import AnalysisRequest
-from app.runs.batch.executors import ExecutorOptions, open_executor
-from app.runs.batch.ordered_map import ordered_map
+from app.runs.batch.executors import ExecutorOptions, open_executor, ordered_map
 from app.runs.batch.tasks import AnalysisTask, analyze_runs
 from app.runs.errors import ClusterError, ExtraMissingError
 
@@ -66,7 +65,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing(address):
 
 @pytest.mark.parametrize("address", ["nonsense", "tcp://127.0.0.1:1", "http://127.0.0.1:1"])
 def test_nobody_at_the_address_is_said_in_a_line(address, monkeypatch):
-    monkeypatch.setattr("app.runs.batch.dask_executor._PATIENCE_S", 0.3)
+    monkeypatch.setattr("app.runs.batch.executors._CLUSTER_TIMEOUT_S", 0.3)
     with (
         pytest.raises(ClusterError, match="no Dask scheduler answers") as fault,
         open_executor(ExecutorOptions(dask=address), 3),

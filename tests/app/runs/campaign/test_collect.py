@@ -76,7 +76,7 @@ def test_a_run_that_fails_does_not_stop_the_rest(folder):
     gathered = collect_runs([folder, folder / "nix.h5"], CollectOptions(HERE, request=QUICKLY))
     assert len(gathered.runs) == 2
     assert [Path(failure.run).name for failure in gathered.failures] == ["c.h5", "nix.h5"]
-    assert "not an HDF5 file" in gathered.failures[0].error
+    assert "not an HDF5 file" in str(gathered.failures[0].error)
 
 
 def test_a_copy_of_a_run_does_not_count_twice(folder):

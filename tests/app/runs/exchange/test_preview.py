@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.importing import CsvImport, read_record
-from app.runs.exchange.preview import FilePreview, ParseOptions, preview_file
+from app.runs.exchange.importing import CsvImport, FilePreview, ParseOptions, preview_file, read_record
 
 
 def written(folder: Path, text: str, name: str = "record.csv") -> Path:

@@ -8,9 +8,14 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 from batch_kit import doubled, failing, fatal, nothing, waiting
 
-from app.runs.batch.executors import ExecutorOptions, SerialExecutor, open_executor
-from app.runs.batch.ordered_map import FailedItem, ordered_map
-from app.runs.batch.processes import ProcessExecutor
+from app.runs.batch.executors import (
+    ExecutorOptions,
+    FailedItem,
+    ProcessExecutor,
+    SerialExecutor,
+    open_executor,
+    ordered_map,
+)
 
 
 class Unhurried:
@@ -90,7 +95,7 @@ def test_what_was_in_flight_with_a_death_is_done_again_one_by_one():
         2 * number for number in range(40) if number != 5
     ]
     assert isinstance(answers[5], FailedItem)
-    assert "twice" in answers[5].message
+    assert "twice" in str(answers[5].message)
     assert crew.renewed == 2
 
 
