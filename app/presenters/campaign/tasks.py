@@ -113,7 +113,7 @@ class CampaignData:
         By code of the contact.
     runs : dict of CampaignRun
         By path.
-    failures : tuple of (str, str)
+    failures : tuple of (str, Message)
         Path, and why there is no result.
     warnings : tuple of Message
     excluded_by_operator : frozenset of str
@@ -127,7 +127,7 @@ class CampaignData:
     contacts: "tuple[ContactFriction, ...]"
     contact_names: dict[str, str]
     runs: dict[str, CampaignRun]
-    failures: tuple[tuple[str, str], ...]
+    failures: tuple[tuple[str, Message], ...]
     warnings: tuple[Message, ...]
     excluded_by_operator: frozenset[str]
     unsaved_count: int

@@ -11,6 +11,7 @@ from app.presenters.base import Tone
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
 from messages.i18n import N_, gettext
+from messages.message import Message
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
@@ -53,7 +54,7 @@ class RunList:
         """Paths of the runs that can be read."""
         return tuple(path for path in paths if not self._by_path[path].fault)
 
-    def fault(self, path: str) -> str:
+    def fault(self, path: str) -> Message:
         """Why a run cannot be read; empty if it can."""
         return self._by_path[path].fault
 

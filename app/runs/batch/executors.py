@@ -133,7 +133,9 @@ def ordered_map(
                 queued.clear()
                 yield from _one_at_a_time(executor, work, suspects)
             else:
-                yield _answer(*queued.popleft())
+                item, future = queued.popleft()
+                answer: Answer | FailedItem[Item] = _answer(item, future)
+                yield answer
     finally:
         for _, future in queued:
             future.cancel()
@@ -291,7 +293,7 @@ def program_version() -> str:
 
 def load_analysis() -> None:
     """Load what an analysis needs, or compile it. Called in worker processes."""
-    from analysis.warm_up import warm_up
+    from analysis.identify import warm_up
 
     warm_up()
 
@@ -337,7 +339,8 @@ def _one_at_a_time(
                 item, message("it killed the process that worked on it, twice: out of memory, or killed")
             )
         else:
-            yield _answer(item, future)
+            answer: Answer | FailedItem[Item] = _answer(item, future)
+            yield answer
 
 
 def _answer(item: Item, future: "Future[Answer]") -> Answer | FailedItem[Item]:
