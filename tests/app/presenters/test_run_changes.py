@@ -9,6 +9,7 @@ from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreR
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
 from app.presenters.runs.work import MAX_OVERLAID_RUNS, load_overlay
 from app.runs.summary import RunSummary
+from messages.message import message
 
 TWO = ("/runs/a.h5", "/runs/b.h5")
 EDIT = EditRuns(TWO, "plate_mass_kg", 22.5, "me")
@@ -87,7 +88,7 @@ def test_a_line_is_made_anew_only_where_its_run_has_changed() -> None:
     library = RunList()
     library.set_runs((RunSummary(path="/a.h5"), RunSummary(path="/b.h5")))
     first = library.rows(RunFilter(), Column.NAME, descending=False)
-    library.set_runs((RunSummary(path="/a.h5"), RunSummary(path="/b.h5", fault="is no run")))
+    library.set_runs((RunSummary(path="/a.h5"), RunSummary(path="/b.h5", fault=message("is no run"))))
     second = library.rows(RunFilter(), Column.NAME, descending=False)
     assert first[0] is second[0]
     assert first[1] != second[1]

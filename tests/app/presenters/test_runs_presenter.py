@@ -26,6 +26,7 @@ from app.presenters.runs.tasks import (
 )
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from app.runs.summary import RunSummary
+from messages.message import message
 
 
 def run(name: str, minute: int, **facts: object) -> RunSummary:
@@ -52,7 +53,7 @@ B = run(
 )
 C = run("c", 3, series="2SSM1", plate_mass_kg=42.0)
 D = run("d", 4, analyses=1, friction_dynamic=0.2, friction_dynamic_uncertainty=0.01, adequate=False)
-BAD = RunSummary(path="/runs/bad.h5", fault="/runs/bad.h5 is not an HDF5 file. Give a run file")
+BAD = RunSummary(path="/runs/bad.h5", fault=message("/runs/bad.h5 is not an HDF5 file. Give a run file"))
 ALL = (A, B, C, D, BAD)
 
 

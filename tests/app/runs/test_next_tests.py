@@ -15,6 +15,7 @@ from app.runs.next_tests import (
     save_next_tests,
 )
 from app.runs.summary import RunSummary
+from messages.message import message
 
 KEPT = NextTests(
     plan=(PlannedSeries("1FFM0", 3), PlannedSeries("2SSM1", 1)),
@@ -56,7 +57,7 @@ def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
         (RunSummary("a.h5", ended="stopped", analyses=1), True),
         (RunSummary("a.h5", ended="stopped"), False),
         (RunSummary("a.h5", ended="device-lost"), False),
-        (RunSummary("a.h5", fault="being recorded", ended="rest"), False),
+        (RunSummary("a.h5", fault=message("being recorded"), ended="rest"), False),
     ],
 )
 def test_a_run_is_done_that_ended_by_itself_or_was_analysed(run: RunSummary, done: bool) -> None:
