@@ -84,7 +84,8 @@ def test_in_this_process_each_is_done_when_it_is_asked_for():
 def test_work_that_fails_is_told_with_its_item():
     answers = list(ordered_map(SerialExecutor(), failing, range(5)))
     assert answers[:3] == [0, 1, 2]
-    assert answers[3] == FailedItem(3, "its worker failed (ValueError: three is too many)")
+    assert answers[3].item == 3
+    assert str(answers[3].message) == "its worker failed (ValueError: three is too many)"
     assert answers[4] == 4
 
 
