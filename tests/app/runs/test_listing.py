@@ -15,6 +15,7 @@ from app.runs.paths import recordings_directory
 from app.runs.saved_analyses import save_analysis
 from app.runs.validator import Validator
 from app.runs.writer import create_run
+from messages.message import Message
 
 
 @pytest.fixture
@@ -41,8 +42,8 @@ def test_runs_are_listed_oldest_first_and_faults_last(folder):
     listed = list_runs(folder)
     assert _names(listed) == ["c.h5", "b.h5", "a.h5", "20261121T143205_1FFM1_009.h5"]
     assert [summary.samples for summary in listed] == [100, 100, 100, 0]
-    assert "damaged" in listed[-1].fault
-    assert [summary.fault for summary in listed[:-1]] == ["", "", ""]
+    assert "damaged" in str(listed[-1].fault)
+    assert [summary.fault for summary in listed[:-1]] == [Message("")] * 3
     assert all(Path(summary.path).is_absolute() for summary in listed)
 
 
@@ -59,7 +60,7 @@ def test_a_run_being_recorded_is_listed_as_such(tmp_path, metadata):
     writer = create_run(tmp_path / "run.h5", metadata)
     writer.append(block(0, 10))
     (listed,) = list_runs(tmp_path)
-    assert "being recorded" in listed.fault
+    assert "being recorded" in str(listed.fault)
     writer.close(ENDING)
     assert not list_runs(tmp_path)[0].fault
 
@@ -72,7 +73,7 @@ def test_a_run_that_nobody_came_to_look_over_is_looked_over_again(tmp_path, meta
 
     with monkeypatch.context() as patched:
         patched.setattr(Validator, "validate", busy)
-        assert "not looked over" in list_runs(tmp_path)[0].fault
+        assert "not looked over" in str(list_runs(tmp_path)[0].fault)
     assert not list_runs(tmp_path)[0].fault
 
 

@@ -16,6 +16,7 @@ from runs_kit import ANALYSIS, small_run
 from app.runs import listing as library_module
 from app.runs.listing import RunFilter, SummaryCache, index_path, list_runs
 from app.runs.saved_analyses import save_analysis
+from messages.message import Message
 
 SINCE = RunFilter(since=datetime.date(2020, 1, 1))
 
@@ -60,7 +61,7 @@ def test_a_file_that_goes_while_it_is_looked_at_is_left_out(good, monkeypatch):
 
 def test_a_folder_named_like_a_lock_is_none(good):
     good.with_name("good.h5.recording").mkdir()
-    assert [run.fault for run in list_runs(good.parent)] == [""]
+    assert [run.fault for run in list_runs(good.parent)] == [Message("")]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are always text")
@@ -78,13 +79,13 @@ def test_a_date_at_the_end_of_the_calendar_is_a_fault_of_its_file_alone(good, be
         _replaced_text(file, "entry/start_time", begun)
     os.utime(other, (0, 0))
     assert _names(good.parent, SINCE) == ["good.h5"]
-    assert "start_time" in list_runs(good.parent)[-1].fault
+    assert "start_time" in str(list_runs(good.parent)[-1].fault)
 
 
 def test_a_time_that_is_no_number_is_a_fault(good):
     with h5py.File(good, "r+") as file:
         file["entry/motion/time"][-1] = np.nan
-    assert "duration_s is nan" in list_runs(good.parent)[0].fault
+    assert "duration_s is nan" in str(list_runs(good.parent)[0].fault)
 
 
 def test_an_analysis_whose_friction_is_a_word_is_a_fault(good):
@@ -93,7 +94,7 @@ def test_an_analysis_whose_friction_is_a_word_is_a_fault(good):
     document["results"]["friction_dynamic"]["value"] = "=1+1"
     with h5py.File(good, "r+") as file:
         _replaced_text(file, "entry/analysis_001/document", json.dumps(document))
-    assert "friction_dynamic" in list_runs(good.parent)[0].fault
+    assert "friction_dynamic" in str(list_runs(good.parent)[0].fault)
 
 
 def test_a_row_of_the_index_that_cannot_be_read_begins_it_anew(good):
