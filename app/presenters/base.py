@@ -1,4 +1,4 @@
-"""What all screens share: a presenter holds one immutable state and shows it whenever it has changed."""
+"""Base of all screens: presenter with an immutable state, and small values that states are made of."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -11,14 +11,14 @@ Shown = TypeVar("Shown", contravariant=True)
 
 
 class View(Protocol[Shown]):
-    """The passive side: draws a state, and tells the presenter what the operator did."""
+    """Passive view: shows a state, and passes actions of the operator to the presenter."""
 
     def show_state(self, state: Shown) -> None:
-        """Draw `state`; parts that have not changed may be left as they are."""
+        """Show a state; parts that have not changed may stay as they are."""
 
 
 class Presenter(Generic[State]):
-    """Base of all presenters. Works without a view too: one may be attached at any time."""
+    """Base of all presenters. A view may be attached at any time."""
 
     def __init__(self, state: State) -> None:
         self.state = state
@@ -43,7 +43,7 @@ class Presenter(Generic[State]):
 
 
 class Tone(StrEnum):
-    """What a word is coloured by; the word itself always says it too."""
+    """Colour of a text; the text itself always says the same."""
 
     PLAIN = "plain"
     OK = "ok"
@@ -53,7 +53,7 @@ class Tone(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Chip:
-    """A short statement with a tone, and more words for who points at it."""
+    """Short text with a tone and a tool tip."""
 
     text: str
     tone: Tone = Tone.PLAIN
@@ -65,7 +65,7 @@ EMPTY_CHIP = Chip("")
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something the operator must know, shown in the window until it is dismissed.
+    """Message above the screen, shown until it is dismissed.
 
     `action` and `dismiss` are buttons; without an action there is only the latter. `details` can be unfolded
     and copied.
@@ -80,7 +80,7 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Work that goes on elsewhere. `fraction` is None where nobody knows how long it takes."""
+    """Progress of a task; `fraction` is None where it is unknown."""
 
     text: str
     fraction: float | None = None

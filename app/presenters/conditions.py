@@ -1,4 +1,4 @@
-"""Conditions of a test as an operator types them, on Record and in an import."""
+"""Conditions of a test as typed on Record and in an import."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ CONDITION_TITLES = {
     "surface_preparation": N_("Surfaces"),
     "run_in_number": N_("Run-in number"),
 }
-"""By the names of `Conditions`, in the order in which they are asked for."""
+"""By the field names of `Conditions`, in the order of the forms."""
 CONDITION_FIELDS = tuple(CONDITION_TITLES)
 _NUMBERS = ("temperature_c", "humidity_percent")
 
@@ -25,7 +25,7 @@ _NUMBERS = ("temperature_c", "humidity_percent")
 def parse_conditions(
     form: object, other: Mapping[str, str], names: Sequence[str] = CONDITION_FIELDS
 ) -> "Conditions":
-    """Conditions as typed into fields of `form` of these names, with `other` ones. Raises MetadataError."""
+    """Parse fields of `form` by these names, and add `other` conditions. Raises MetadataError."""
     from app.runs.metadata import Conditions
 
     texts = {name: getattr(form, name).strip() for name in names}

@@ -1,4 +1,4 @@
-"""What the window is connected to: an engine, and the simulated stand if it is that which is read."""
+"""Connection of the window: an engine, and the simulated stand if that is the device."""
 
 import contextlib
 import queue
@@ -21,7 +21,7 @@ class Engine(Protocol):
     """A running acquisition engine."""
 
     def send(self, command: Command) -> None:
-        """Give a command."""
+        """Send a command."""
 
     def poll(self) -> list[Event]:
         """Events since the last call."""
@@ -38,28 +38,28 @@ class Simulation(Protocol):
 
     @property
     def port(self) -> PortSettings:
-        """How to read it."""
+        """Settings to connect to it."""
 
     @property
     def series(self) -> str:
-        """What it runs."""
+        """Code of its series."""
 
     @property
     def true_friction(self) -> float:
         """Its f_d."""
 
     def truth(self) -> Truth:
-        """What is true of it, as last told."""
+        """True values and events of the stand, as last reported."""
 
     def disturb(self, text: str) -> None:
-        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+        """Disturb it. Raises SettingsError, SimulatedStandError."""
 
     def stop(self) -> None:
         """End it."""
 
 
 class Launcher(Protocol):
-    """Starts processes; each call may take seconds and is made outside the window's thread."""
+    """Starts processes; a call may take seconds and is made outside the thread of the window."""
 
     def engine(self, port: PortSettings) -> Engine:
         """Start an engine that connects to `port`."""
@@ -70,7 +70,7 @@ class Launcher(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SimulationStarted:
-    """A simulated stand runs and is being connected to."""
+    """A simulated stand has started and is being connected."""
 
     series: str
     true_friction: float
@@ -83,17 +83,17 @@ class _Opened:
 
 
 class Connection:
-    """One connection at a time. Nothing but `close` waits; `poll` says what has happened.
+    """One connection at a time. No method but `close` waits; `poll` returns what has happened.
 
     Parameters
     ----------
     launcher : Launcher
     report_error : callable
-        Takes, from any thread, what went wrong while engine and stand were ended.
+        Takes errors of ending engine and stand; called from another thread.
     """
 
     CLOSE_S = 240.0
-    """An engine itself gives up storing a run after three minutes."""
+    """Longer than an engine takes to give up storing a run: three minutes."""
 
     def __init__(self, launcher: Launcher, report_error: Callable[[ErrorReport], None]) -> None:
         self._launcher = launcher
@@ -105,16 +105,16 @@ class Connection:
 
     @property
     def is_active(self) -> bool:
-        """Tell whether something is connected or being connected."""
+        """Tell whether a device is connected or being connected."""
         return self._opening is not None or self._opened is not None
 
     def open_port(self, port: PortSettings) -> None:
-        """Connect to a port in the background, instead of what is connected now."""
+        """Replace the connection by one to a port, in the background."""
         self._open(lambda: _Opened(self._launcher.engine(port)))
 
     @property
     def simulation(self) -> Simulation | None:
-        """The simulated stand that is connected; None where none is."""
+        """Simulated stand that is connected; None without one."""
         return None if self._opened is None else self._opened.simulation
 
     def open_simulated(self, options: SimulatedStandOptions) -> None:
@@ -122,7 +122,7 @@ class Connection:
         self._open(lambda: self._simulate(options))
 
     def poll(self) -> list[Event | SimulationStarted]:
-        """What has happened since the last call."""
+        """Events since the last call."""
         started = self._take_opened()
         if self._opened is None:
             return started
@@ -137,7 +137,7 @@ class Connection:
             self._opened.engine.send(command)
 
     def new_rows(self) -> RingRows | None:
-        """Samples since the last call; None without any. Whoever listens gets them too."""
+        """Samples since the last call, also given to all listeners; None without any."""
         rows = None if self._opened is None else self._opened.engine.new_rows()
         if rows is not None:
             for listener in self._listeners:
@@ -145,15 +145,15 @@ class Connection:
         return rows
 
     def add_row_listener(self, listener: Callable[[RingRows], None]) -> None:
-        """Let another one see the samples that `new_rows` gives."""
+        """Call `listener` with the samples of each `new_rows`."""
         self._listeners.append(listener)
 
     def disconnect(self) -> None:
-        """Let go of what is connected, in the background; a run in progress is finished and kept."""
+        """End the connection in the background; a run in progress is finished and kept."""
         self._disconnect()
 
     def close(self) -> None:
-        """Let go of everything and wait until it has ended; after `CLOSE_S`, report that it has not."""
+        """End the connection and wait until it has ended, at most `CLOSE_S`."""
         self._disconnect()
         if not self._background.close(self.CLOSE_S):
             words = gettext(
@@ -176,7 +176,7 @@ class Connection:
             raise
 
     def _take_opened(self) -> list[Event | SimulationStarted]:
-        """Take over what was opened in the background."""
+        """Take a connection that was opened in the background."""
         if self._opening is None or not self._opening.done():
             return []
         opening, self._opening = self._opening, None
@@ -188,7 +188,7 @@ class Connection:
         return [] if simulation is None else [SimulationStarted(simulation.series, simulation.true_friction)]
 
     def _disconnect(self) -> None:
-        """End what is open, and what is still being opened as soon as it is."""
+        """End the open connection, and one that is being opened as soon as it is open."""
         opening, opened = self._opening, self._opened
         self._opening = self._opened = None
         if opening is not None:
@@ -197,12 +197,12 @@ class Connection:
             self._background.submit(lambda: self._end(opened))
 
     def _end_opening(self, opening: Future[_Opened]) -> None:
-        """In the background, after it was opened: what could not be is of no interest any more."""
+        """In the background: end a connection that was opened too late; a failed one is ignored."""
         if opening.exception() is None:
             self._end(opening.result())
 
     def _end(self, opened: _Opened) -> None:
-        """In the background: end engine and stand; neither keeps the other from being ended."""
+        """In the background: end engine and stand, each whether or not the other fails."""
         with self._errors_reported():
             opened.engine.close()
         if opened.simulation is not None:

@@ -1,4 +1,4 @@
-"""How the window was left: restored when it opens, as far as it still fits, and told when it closes."""
+"""Geometry of the window: saved when it closes, restored when it opens as far as it still fits."""
 
 from collections.abc import Iterator
 
@@ -11,9 +11,9 @@ from config.schema import WindowLayout
 _NAME = "remembered"
 _USUAL = QSize(1280, 800)
 _LEAST = QSize(940, 500)
-"""Below this words are cut."""
+"""Texts are cut in a smaller window."""
 _GRIP = QSize(160, 40)
-"""So much of the title bar must be on a screen for the mouse to take hold of."""
+"""Part of the title bar that must be on a screen, so that the mouse can move the window."""
 
 
 def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:

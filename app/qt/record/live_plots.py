@@ -1,4 +1,4 @@
-"""The two live traces with what is marked on them."""
+"""Plots of the live traces with their marks."""
 
 import math
 from typing import Any
@@ -22,11 +22,11 @@ TITLES = (
 )
 
 _DENSE_STROKES = 100.0
-"""Strokes over the whole height from which on a line looks like a band."""
+"""A line that crosses the plot this often is drawn as a filled band: ten times faster, and looks alike."""
 
 
 class LivePlots(QWidget):
-    """Draws `Traces`; what has not changed since the last ones is not touched."""
+    """Shows `Traces`; parts that have not changed are not touched."""
 
     resized = Signal(int)
 
@@ -50,7 +50,7 @@ class LivePlots(QWidget):
         self._restyle()
 
     def show_traces(self, traces: Traces) -> None:
-        """Draw new traces."""
+        """Show traces."""
         if traces is self._traces:
             return
         old, self._traces = self._traces, traces
@@ -104,7 +104,7 @@ class LivePlots(QWidget):
 
 
 class _PlotMarks:
-    """Spans and lines of one plot."""
+    """Marks of one plot: spans and lines."""
 
     def __init__(self, plot: Plot, *, is_first: bool) -> None:
         self._is_first = is_first
@@ -150,7 +150,7 @@ def _draw(curve: Any, line: Polyline, limit_mm: float) -> None:
 
 
 def _draw_band(curve: Any, line: Polyline) -> None:
-    """Fill from the lowest to the highest of each span, a tenth of what many swings a pixel cost as lines."""
+    """Fill between the lowest and the highest value of each span."""
     low, high = line.value[::2], line.value[1::2]
     curve.setData(
         np.concatenate((line.time_s[::2], line.time_s[::-2])),

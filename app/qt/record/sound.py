@@ -1,4 +1,4 @@
-"""A short tone for each state of a pullback, through the system's own player: no library is needed for it."""
+"""Sound cues for states of a pullback test, played by a program of the system."""
 
 import io
 import math
@@ -26,18 +26,18 @@ _TUNES: dict[Cue, tuple[tuple[float, float], ...]] = {
     Cue.RESULT: ((523.0, 0.12), (659.0, 0.12), (784.0, 0.2)),
     Cue.TROUBLE: ((220.0, 0.25), (196.0, 0.35)),
 }
-"""Frequency (Hz) and length (s) of each tone: rising towards the release, low where something is wrong."""
+"""Frequency (Hz) and length (s) of each tone: rising towards the release, low for trouble."""
 
 
 class CuePlayer:
-    """Plays cues; where there is no player, the system's bell stands for all of them."""
+    """Plays cues; without a player the bell of the system is used."""
 
     def __init__(self) -> None:
         self._folder = platformdirs.user_cache_path("slipstand", appauthor=False) / "sounds"
         self._written: set[Cue] = set()
 
     def play(self, cue: Cue) -> None:
-        """Play a cue, and go on at once."""
+        """Start playing a cue."""
         try:
             is_played = _play(self._file(cue))
         except OSError:
@@ -46,7 +46,7 @@ class CuePlayer:
             QApplication.beep()
 
     def _file(self, cue: Cue) -> Path:
-        """File of a cue, written anew by each start of the program: it may hold another tune."""
+        """File of a cue, written once by each start of the program, since cues may change."""
         path = self._folder / f"{cue.value}.wav"
         if cue not in self._written:
             self._folder.mkdir(parents=True, exist_ok=True)
