@@ -1,4 +1,4 @@
-"""What the simulated stand does, again and again: rest, pull back, hold, release, decay, be put back."""
+"""Motion of the simulated stand: repeated pullback tests, and the parameters of the chosen series."""
 
 from dataclasses import dataclass
 
@@ -18,18 +18,18 @@ FloatArray = NDArray[np.float64]
 class RepeatedPullback:
     """Pullback tests one after another, with the same release each time.
 
-    Each test leaves the plate where it came to rest; the next one begins there, unless the operator has
-    put it back. Friction does not care where on the table the plate stands, so the motion is the same.
+    Each test leaves the plate where it came to rest, and the next one begins there unless the operator
+    re-centres it. Friction does not depend on the position of the plate, so the motion is the same.
 
     Attributes
     ----------
     pullback_m : float
         Table displacement while held (m).
     released : Motion
-        What follows a release, simulated for decay and re-centring at least.
+        Motion after a release, simulated for decay and re-centring at least.
     timetable : Timetable
     plate_offset_m : float
-        Where the plate stands on the table before the first test (m).
+        Position of the plate on the table before the first test (m).
     """
 
     pullback_m: float
@@ -53,12 +53,12 @@ class RepeatedPullback:
         return table, relative
 
     def drift_time_s(self, time_s: FloatArray) -> FloatArray:
-        """For how long (s) a zero has crept since it was last set, while the table was stilled."""
+        """Time (s) since the zero was last set, while the table was stilled."""
         _, within_s = self._locate(time_s)
         return within_s * self._remaining(within_s - self.timetable.release_s)
 
     def initial_offset_m(self, test: FloatArray) -> FloatArray:
-        """Where the plate stands (m), (n,), at the beginning of tests counted from 0."""
+        """Position of the plate (m), (n,), at the beginning of tests counted from 0."""
         every = self.timetable.recentre_every
         since_put_back = np.mod(test, every) if every else test
         first = np.where(test < every, self.plate_offset_m, 0.0) if every else self.plate_offset_m
@@ -79,7 +79,7 @@ class RepeatedPullback:
         return np.mod(test + 1.0, every) == 0.0 if every else np.zeros(len(test), dtype=np.bool_)
 
     def _remaining(self, since_release_s: FloatArray) -> FloatArray:
-        """What the operator's hand leaves: 1 during the decay, then down to 0."""
+        """Share of the displacement left while the operator stills the table: 1 during the decay, then to 0."""
         return 1.0 - _smooth((since_release_s - self.timetable.decay_s) / self.timetable.recentre_s)
 
 
@@ -100,7 +100,7 @@ def released_motion(true: StandTruth, timetable: Timetable) -> Motion:
 
 
 def _smooth(x: FloatArray) -> FloatArray:
-    """Go from 0 (x <= 0) to 1 (x >= 1) without a jump in velocity or acceleration."""
+    """Step from 0 (x <= 0) to 1 (x >= 1) with continuous velocity and acceleration."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 + x * (6.0 * x - 15.0))
 

@@ -1,4 +1,4 @@
-"""What the simulated device's converter reads: motion through the gauges, sample by sample."""
+"""Signal of the simulated stand: motion, gauges and converter, sample by sample."""
 
 import math
 from dataclasses import dataclass

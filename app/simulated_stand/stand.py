@@ -1,4 +1,4 @@
-"""The simulated stand put together: motion, gauges, converter and wire of one set of options."""
+"""The simulated stand: motion, gauges, converter and device of one set of options."""
 
 import math
 import time
@@ -19,20 +19,20 @@ from drivers.simulated.transport import Transport
 
 
 class SimulatedStandDevice:
-    """A simulated stand at the end of a wire; `step` it as often as it asks.
+    """A simulated stand on a transport. The caller runs `step` as often as it asks for.
 
     Parameters
     ----------
     options : SimulatedStandOptions
     transport : Transport
-        Open; closed by whoever opened it.
-    tell : callable
-        Takes the truth at each start and end of a stream and at each release.
+        Open; closed by the caller.
+    on_truth : callable (Truth)
+        Called at each start and end of a stream and at each release.
 
     Raises
     ------
     ConfigError, DriverError, MotionError
-        When made from options, stand or gauges that do not go together.
+        If options, stand and gauges contradict each other.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class SimulatedStandDevice:
             self._true.pullback_m, released, self._timetable, options.plate_offset_m
         )
         self._gauges = load_gauges(options.gauges_file)
-        # Samples after a release compile what must be compiled, before anybody waits for it.
+        # Compiles the motion after a release before a reader waits for it.
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
         settings, self._is_swapped = options.device_settings()
         protocol = find_driver(options.protocol).make_simulated(settings)
@@ -72,7 +72,7 @@ class SimulatedStandDevice:
         return wait_s
 
     def truth(self) -> Truth:
-        """What is true until now."""
+        """The truth until now."""
         tests = np.arange(self._releases(), dtype=np.float64)
         releases = tests * self._timetable.cycle_s + self._timetable.release_s
         return Truth(

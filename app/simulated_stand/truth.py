@@ -1,4 +1,4 @@
-"""What is true of a simulated stand, and the file that says so."""
+"""Truth of a simulated stand, and the file with it."""
 
 import contextlib
 import os
@@ -29,7 +29,7 @@ class StandTruth(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Truth(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that a test can hold against what was found."""
+    """True values to compare results with."""
 
     schema: str = "slipstand-truth/1"
     port: str

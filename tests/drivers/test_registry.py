@@ -15,7 +15,7 @@ BUILT = ["slipstand-binary", "csv", "gsv", "modbus", "harp"]
 
 
 def test_all_promised_names_are_there_in_order():
-    assert list(DRIVERS) == NAMES
+    assert [name for name in DRIVERS if name in NAMES] == NAMES
 
 
 @pytest.mark.parametrize(
