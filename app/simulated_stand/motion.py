@@ -79,7 +79,7 @@ class RepeatedPullback:
         return np.mod(test + 1.0, every) == 0.0 if every else np.zeros(len(test), dtype=np.bool_)
 
     def _remaining(self, since_release_s: FloatArray) -> FloatArray:
-        """Share of the displacement left while the operator stills the table: 1 during the decay, then to 0."""
+        """Share of the displacement while the table is stilled: 1 during the decay, then down to 0."""
         return 1.0 - _smooth((since_release_s - self.timetable.decay_s) / self.timetable.recentre_s)
 
 
