@@ -126,8 +126,8 @@ def as_message(text: Message | str) -> Message:
 
 
 def message_of(error: BaseException) -> Message:
-    """Message of an error; of errors that carry none, their text on one line."""
-    if isinstance(error, MessageError):
+    """Message of an error; of errors that carry none, or one of several lines, their text on one line."""
+    if isinstance(error, MessageError) and "\n" not in str(error):
         return error.message
     return message("{text}", text=" ".join(str(error).split()) or type(error).__name__)
 

@@ -86,7 +86,7 @@ def test_an_error_of_opening_is_an_event() -> None:
     failing = Connection(launcher, ErrorReporter().report)
     failing.open_port(PORT)
     (event,) = poll_until(failing, Failed)
-    assert event == Failed("COM7 is busy. Close the other program")
+    assert str(event.message) == "COM7 is busy. Close the other program"
     assert not failing.is_active
     failing.close()
 
