@@ -34,6 +34,7 @@ from app.acquisition.messages import (
 )
 from app.runs.reader import load_raw_bytes, open_run
 from drivers.samples import SampleStatus
+from messages.message import message
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -112,7 +113,11 @@ def test_stop_keeps_what_was_recorded(tmp_path, shared):
         engine.send(Arm(run_in(tmp_path, duration_s=None)))
         until(engine, RunStarted)
         engine.send(Arm(run_in(tmp_path)))
-        until(engine, StateChanged, note="A run is being recorded already: stop it before the next one")
+        until(
+            engine,
+            StateChanged,
+            note=message("A run is being recorded already: stop it before the next one"),
+        )
         engine.send(Stop())
         ended = until(engine, RunEnded)
         assert ended.ended is EndReason.STOPPED
