@@ -241,4 +241,4 @@ def _results_text(run: AnalysedRun) -> str:
     if quantity is None:
         return ""
     shown = make_row(FRICTION, quantity)
-    return f"{FRICTION.symbol} = {shown.value} {shown.uncertainty_text}".strip() + "."
+    return f"{shown.symbol} = {shown.value} {shown.uncertainty_text}".strip() + "."
