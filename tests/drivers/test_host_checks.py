@@ -126,6 +126,6 @@ def test_names_of_chips(vendor_id, product_id, name):
 def test_the_rule_covers_every_known_maker():
     from drivers import host_checks
 
-    rule = (Path(__file__).parents[3] / "config/udev/60-slipstand.rules").read_text("utf-8")
+    rule = (Path(__file__).parents[2] / "config/udev/60-slipstand.rules").read_text("utf-8")
     (line,) = [line for line in rule.splitlines() if "ATTRS{idVendor}" in line]
     assert set(line.split('"')[3].split("|")) == {f"{maker:04x}" for maker in host_checks._MAKERS}
