@@ -144,7 +144,7 @@ def _await(engine: EngineClient, kind: type[Event]) -> Event:
             case Reconnecting(message):
                 raise ValueError(f"a device is said to be lost: {message}")
             case StateChanged(note=words) | RunEnded(message=words):
-                _check_words(words)
+                _check_words(str(words))
         if isinstance(event, kind):
             return event
     raise TimeoutError(f"no {kind.__name__} within {_PATIENCE_S:g} s")
