@@ -96,9 +96,9 @@ class Wire:
 
 @pytest.fixture(autouse=True)
 def short_limits(monkeypatch):
-    monkeypatch.setattr(SlipstandBinarySource, "limit_s", 0.3)
-    monkeypatch.setattr("drivers.devices.slipstand_binary.source._ANSWER_S", 0.05)
-    monkeypatch.setattr("drivers.devices.slipstand_binary.source._QUIET_S", 0.02)
+    monkeypatch.setattr(SlipstandBinarySource, "timeout_s", 0.3)
+    monkeypatch.setattr(SlipstandBinarySource, "answer_timeout_s", 0.05)
+    monkeypatch.setattr("drivers.stream._DRAIN_S", 0.02)
     monkeypatch.setattr("drivers.devices.slipstand_binary.source._LISTEN_S", 0.1)
     monkeypatch.setattr("app.acquisition.stream.live_stream.PATIENCE_S", 1.0)
     monkeypatch.setattr("app.acquisition.stream.monitors.STALLED_S", 0.3)

@@ -69,8 +69,8 @@ def test_one_of_two_devices_is_unplugged_and_comes_back() -> None:
     gone = np.flatnonzero(status == SampleStatus.RELATIVE_MISSING)
     assert 60 < len(gone) < 1000
     assert not (status & SampleStatus.TABLE_MISSING).any()
-    assert any("the device of gauge 2 is lost and is looked for" in one for one in news)
-    assert any("the device of gauge 2 was away and is back" in one for one in news)
+    assert any("the device of gauge 2 is lost and is looked for" in str(one) for one in news)
+    assert any("the device of gauge 2 was away and is back" in str(one) for one in news)
     assert not stream.is_disconnected
 
 
