@@ -2,6 +2,7 @@
 
 import gc
 import sys
+import time
 from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +12,16 @@ import pytest
 
 from app.acquisition.engine import Engine
 from app.acquisition.live_client import LiveIdentifier
-from app.acquisition.messages import Arm, Health, PortSettings, Quit, RunEnded, RunSettings
+from app.acquisition.messages import (
+    Arm,
+    Health,
+    PortSettings,
+    PullbackState,
+    Quit,
+    RunEnded,
+    RunSettings,
+    StateChanged,
+)
 from app.acquisition.ring import create_ring
 from app.acquisition.stream.live_stream import LiveStream
 from app.acquisition.stream.reads import ReadQueue
@@ -28,6 +38,8 @@ READ_NS = round(READ_SAMPLES / RATE_HZ * 1e9)
 SETTLED_READS, ALL_READS = 2_000, 8_000
 """The history, and the stretches of the fitted clock, are full by then; 13 minutes in all."""
 READS_A_STEP = 16
+QUIET_READS, COMMIT_S = 64, 0.3
+"""Rows are held until the journal is on the disk: before each measurement, reads come no faster than that."""
 BLOCKS_MAX = 600
 """Python's own blocks that may come and go. One kept of each read would be 6000, of each second 600."""
 
@@ -56,6 +68,7 @@ class Owner:
         self._arm = Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=7200.0), 1)
         self._quit = Quit()
         self._reads = 0
+        self._is_recording = False
         self.blocks = {}
         self.events = []
 
@@ -71,12 +84,18 @@ class Owner:
             return quit_
         if not self._intake.is_empty:  # on a busy computer: no faster than the engine takes them
             return None
+        if self._reads and not self._is_recording:  # the journal is being created
+            return None
+        if any(mark - QUIET_READS <= self._reads < mark for mark in (SETTLED_READS, ALL_READS)):
+            time.sleep(COMMIT_S)
         for _ in range(READS_A_STEP):
             self._intake.put(self._began_ns + self._reads * READ_NS, frames(self._reads))
             self._reads += 1
         return None
 
     def send(self, event) -> None:
+        if isinstance(event, StateChanged) and event.state is PullbackState.RECORDING:
+            self._is_recording = True
         if not isinstance(event, Health):
             self.events.append(event)
 
