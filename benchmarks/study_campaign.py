@@ -38,6 +38,7 @@ from app.simulated_stand.synthetic_campaign import (
 )
 from benchmarks.studies import options, percent, spread_out, table
 from config.files import load_gauges, load_stand, published_table
+from drivers.clock import TimeBase
 from drivers.samples import Losses
 
 SERIES, REPEATS = 3, 3
@@ -66,8 +67,8 @@ def result(test: SyntheticTest) -> RunResult:
     """One run, as it would come out of its file."""
     block, _ = sample_test(test, load_gauges())
     metadata = test_metadata(test)
-    clock = (1.0, CLOCK_UNCERTAINTY)
-    record = build_record(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], clock=clock)
+    time_base = TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY)
+    record = build_record(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], time_base)
     path = Path(test.path)
     return run_result(path, metadata, analysis_document(path, test.series, Losses(), identify(record)))
 

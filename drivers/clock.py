@@ -5,10 +5,12 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from messages.message import Message, message
+from messages.i18n import N_
+from messages.message import EMPTY, Message, message
 
 MIN_STEPS = 5
 MIN_SPAN_S = 0.5
@@ -240,22 +242,62 @@ class Skew:
     mean_s: float
     standard_uncertainty_s: float
 
+
+UNTIMED_CLOCK_UNCERTAINTY = 1e-4
+"""Relative standard uncertainty of a device's clock that could not be compared with the host's: twice the
+50 ppm that common crystals are specified to."""
+_LATER = N_(
+    "gauge 2 was read {skew_ms:.2f} ms later than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
+    " the analysis allows for it"
+)
+_EARLIER = N_(
+    "gauge 2 was read {skew_ms:.2f} ms earlier than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
+    " the analysis allows for it"
+)
+
+
+class TimeBase(msgspec.Struct, frozen=True):
+    """How the times of a run's rows relate to true time; applied once, in analysis.
+
+    Attributes
+    ----------
+    scale : float
+        True seconds for one second of the rows' time.
+    scale_standard_uncertainty : float
+        0 where the times are exact, as in a simulated run.
+    skew_s : float or None
+        Gauge 2 was read so much later than gauge 1 on average (s); None where one device reads both.
+    skew_standard_uncertainty_s : float or None
+        See `Skew`.
+    """
+
+    scale: float = 1.0
+    scale_standard_uncertainty: float = 0.0
+    skew_s: float | None = None
+    skew_standard_uncertainty_s: float | None = None
+
+    @classmethod
+    def from_estimates(cls, clock: ClockEstimate | None, skew: Skew | None) -> "TimeBase":
+        """Time base of a device whose clock was timed, or could not be (None)."""
+        if clock is None:
+            return cls(scale_standard_uncertainty=UNTIMED_CLOCK_UNCERTAINTY).with_skew(skew)
+        return cls(clock.scale, clock.scale_standard_uncertainty).with_skew(skew)
+
+    def with_skew(self, skew: Skew | None) -> "TimeBase":
+        """The same clock with another skew."""
+        if skew is None:
+            return TimeBase(self.scale, self.scale_standard_uncertainty)
+        return TimeBase(self.scale, self.scale_standard_uncertainty, skew.mean_s, skew.standard_uncertainty_s)
+
     @property
-    def description(self) -> Message:
-        """Sentence that is stored with the run."""
-        skew_ms, uncertainty_ms = 1e3 * abs(self.mean_s), 1e3 * self.standard_uncertainty_s
-        if self.mean_s >= 0:
-            return message(
-                "gauge 2 was read {skew_ms:.2f} ms later than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
-                " the analysis allows for it",
-                skew_ms=skew_ms,
-                uncertainty_ms=uncertainty_ms,
-            )
+    def skew_message(self) -> Message:
+        """Sentence that is stored with the run; empty without a skew."""
+        if self.skew_s is None:
+            return EMPTY
         return message(
-            "gauge 2 was read {skew_ms:.2f} ms earlier than gauge 1, \u00b1{uncertainty_ms:.2f} ms;"
-            " the analysis allows for it",
-            skew_ms=skew_ms,
-            uncertainty_ms=uncertainty_ms,
+            _LATER if self.skew_s >= 0 else _EARLIER,
+            skew_ms=1e3 * abs(self.skew_s),
+            uncertainty_ms=1e3 * (self.skew_standard_uncertainty_s or 0.0),
         )
 
 

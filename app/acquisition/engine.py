@@ -164,8 +164,7 @@ class Engine:
         self._writer = WriterClient.start()
         self._live = LiveIdentifier(
             str(ring.path),
-            stream.recent_clock,
-            skew=lambda first: stream.skew(first, self._history.next_index),
+            lambda first: stream.time_base(first, self._history.next_index, recent=True),
         )
         self._recording: Recording | None = None
         self._repetition = RunSequence()
@@ -325,9 +324,8 @@ class Engine:
             self._stream.read_queue,
             self._history,
             self._writer,
-            self._stream.clock,
+            self._stream.time_base,
             self._events.send,
-            self._stream.skew,
         )
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.prepare()

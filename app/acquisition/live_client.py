@@ -14,10 +14,9 @@ from app.acquisition.messages import (
     LiveResult,
     decode_live_answer,
 )
-from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.child_process import ChildProcess, encode_line, spawn
 from app.runs.metadata import RunMetadata
-from drivers.clock import ClockEstimate, Skew
+from drivers.clock import TimeBase
 from messages.message import message
 
 _TIMED_EVERY_S = 1.0
@@ -64,9 +63,9 @@ class LiveClient:
         self._latest, self._first_row = None, command.first_row
         self._send(command)
 
-    def update_clock(self, clock: ClockUpdate) -> None:
-        """Pass on the latest estimate of the device's clock."""
-        self._send(clock)
+    def update_clock(self, time_base: TimeBase) -> None:
+        """Pass on the latest estimate of the time base."""
+        self._send(ClockUpdate(time_base))
 
     def end_run(self) -> None:
         """Stop identifying: the run has ended."""
@@ -98,24 +97,20 @@ class LiveIdentifier:
     ----------
     ring_path : str
         Of the live ring.
-    clock : callable
-        Tells how the device's clock goes.
+    time_base : callable
+        Gives the time base of the rows from a given one on.
     start : callable
         Starts the process.
-    skew : callable
-        Tells by how much later gauge 2 is read than gauge 1 from a row on, if each has a device of its own.
     """
 
     def __init__(
         self,
         ring_path: str,
-        clock: Callable[[], ClockEstimate | None],
+        time_base: Callable[[int], TimeBase],
         start: Callable[[], LiveClient] = LiveClient.start,
-        skew: Callable[[int], Skew | None] = lambda _: None,
     ) -> None:
         self._ring_path = ring_path
-        self._clock = clock
-        self._skew = skew
+        self._time_base = time_base
         self._start = start
         self._client: LiveClient | None = None
         self._first_row: int | None = None
@@ -138,10 +133,10 @@ class LiveIdentifier:
             return LiveResult(now_s, message=DIED_NOTE)
         if first_row is not None and self._first_row is None:
             self._first_row = first_row
-            self._client.follow(FollowRun(self._ring_path, first_row, metadata, self._timed(first_row)))
+            self._client.follow(FollowRun(self._ring_path, first_row, metadata, self._time_base(first_row)))
             self._timed_s = now_s
         elif self._first_row is not None and now_s - self._timed_s > _TIMED_EVERY_S:
-            self._client.update_clock(self._timed(self._first_row))
+            self._client.update_clock(self._time_base(self._first_row))
             self._timed_s = now_s
         return self._client.take_result()
 
@@ -156,10 +151,3 @@ class LiveIdentifier:
         if self._client is not None:
             self._client.stop()
         self._client, self._first_row = None, None
-
-    def _timed(self, first_row: int) -> ClockUpdate:
-        clock, skew = self._clock(), self._skew(first_row)
-        timed = (1.0, CLOCK_UNCERTAINTY) if clock is None else (clock.scale, clock.scale_standard_uncertainty)
-        if skew is None:
-            return ClockUpdate(*timed)
-        return ClockUpdate(*timed, skew.mean_s, skew.standard_uncertainty_s)

@@ -14,6 +14,7 @@ from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCom
 from app.acquisition.ring import Floats, RingReader, RingRows, open_ring
 from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
+from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 PERIOD_S = 0.04
@@ -43,7 +44,7 @@ def _follow(
         while (command := commands.take()) is not None:
             if not isinstance(command, ClockUpdate):
                 return command
-            run.update_clock(command)
+            run.update_clock(command.time_base)
         began, computed = time.monotonic(), time.process_time()
         answer = run.answer()
         if answer is not None:
@@ -71,7 +72,7 @@ class RunFollower:
     def __init__(self, ring: RingReader, follow: FollowRun) -> None:
         self._ring = ring
         self._follow = follow
-        self._clock = follow.clock
+        self._time_base = follow.time_base
         self._next_row = follow.first_row
         self._last_row = math.inf
         self._rows = BlockAverager(block_size(ring.rate_hz))
@@ -91,9 +92,9 @@ class RunFollower:
         state = self._identification.update(self._record(time_s - time_s[0], table_m, relative_m))
         return LiveAnswer(self._follow.first_row, result_of(state, float(time_s[0])))
 
-    def update_clock(self, clock: ClockUpdate) -> None:
-        """Take what is known of the clock by now."""
-        self._clock = clock
+    def update_clock(self, time_base: TimeBase) -> None:
+        """Use a newer estimate of the time base."""
+        self._time_base = time_base
 
     def _take(self, rows: RingRows) -> None:
         if rows.lost:
@@ -105,9 +106,7 @@ class RunFollower:
         )
 
     def _record(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> Record:
-        clock = self._clock.clock_scale, self._clock.clock_scale_uncertainty
-        skew = self._clock.skew_s, self._clock.skew_standard_uncertainty_s
-        made = build_record(self._follow.metadata, time_s, table_m, relative_m, clock=clock, skew=skew)
+        made = build_record(self._follow.metadata, time_s, table_m, relative_m, self._time_base)
         return made.replace(gauge_2_measures_plate=False)  # the ring holds plate against table in any case
 
 

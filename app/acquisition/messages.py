@@ -8,6 +8,7 @@ import msgspec
 
 from app.child_process import json_decoder
 from app.runs.metadata import Conditions, RunMetadata
+from drivers.clock import TimeBase
 from messages.message import EMPTY, Message
 
 _GUESS = 0.2
@@ -211,9 +212,7 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     """On the run's time axis."""
     message: Message = EMPTY
     """What went wrong in a sentence, where something did."""
-    skew_s: float | None = None
-    """By how much later gauge 2 was read than gauge 1 on average, where two devices were read as one."""
-    skew_standard_uncertainty_s: float | None = None
+    time_base: TimeBase = TimeBase()
     remaining: int = 0
     """Runs that follow without being asked for."""
 
@@ -292,12 +291,9 @@ decode_event: Callable[[bytes], Event] = json_decoder(Event)
 
 
 class ClockUpdate(msgspec.Struct, frozen=True, tag=True):
-    """How the device's clock is found to go by now, and how much later gauge 2 is read than gauge 1."""
+    """The time base as it is known by now."""
 
-    clock_scale: float
-    clock_scale_uncertainty: float
-    skew_s: float = 0.0
-    skew_standard_uncertainty_s: float = 0.0
+    time_base: TimeBase
 
 
 class FollowRun(msgspec.Struct, frozen=True, tag=True):
@@ -307,7 +303,7 @@ class FollowRun(msgspec.Struct, frozen=True, tag=True):
     first_row: int
     """Also the run's number in the answers."""
     metadata: RunMetadata
-    clock: ClockUpdate
+    time_base: TimeBase
 
 
 class EndRun(msgspec.Struct, frozen=True, tag=True):

@@ -27,12 +27,9 @@ from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer_client import OpenRun
-from drivers.clock import ClockEstimate, Skew
+from drivers.clock import TimeBase
 from drivers.samples import Losses
-from messages.message import EMPTY, Message, as_message, joined, message, message_of
-
-CLOCK_UNCERTAINTY = 1e-4
-"""Relative standard uncertainty of a device's clock that could not be compared with the host's."""
+from messages.message import EMPTY, Message, joined, message, message_of
 
 _NOTES_MAX = 100
 """Of a run: a cable that is loose for hours says something else each time."""
@@ -52,21 +49,17 @@ class RecordingContext:
         Holds each read before the recording takes it.
     writer : Writer
         Idle.
-    clock : callable
-        Tells how the device's clock goes.
+    time_base : callable
+        Gives the time base of the samples from one index to another.
     emit : callable
         Takes what is to be told.
-    skew : callable
-        Tells by how much later gauge 2 was read than gauge 1 from one sample to another, where each has a
-        device of its own.
     """
 
     read_queue: ReadQueue
     history: ReadHistory
     writer: Writer
-    clock: Callable[[], ClockEstimate | None]
+    time_base: Callable[[int, int], TimeBase]
     emit: Callable[[Event], None]
-    skew: Callable[[int, int], Skew | None] = lambda _first, _end: None
 
 
 class Recording:
@@ -104,14 +97,14 @@ class Recording:
         self._armed_index = context.history.next_index
         plan = _plan(metadata, rate_hz, last_slip)
         self._trigger = create_trigger(settings, plan, self._armed_index, context.history)
-        self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, context.clock)
+        self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, context.time_base)
         self._feed = JournalTap(journal)
         self._gathered: list[DecodedRead] = []
         self._followed_index = self._armed_index
         self._file: RunFile | None = None
         self._path_is_told = False
         self._ended: EndReason | None = None
-        self._skew: Skew | None = None
+        self._time_base = TimeBase()
         self._notes: list[Message] = []
         self._left_out = 0
         self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
@@ -330,10 +323,10 @@ class Recording:
         self._file.append_earlier(chunks, end_index)
 
     def _ending(self, file: RunFile) -> EndMetadata:
-        facts, clock = self._trigger.measurement, self._around.clock()
-        self._skew = skew = self._around.skew(file.start_index, file.next_index)
-        self._say(self._clock_note(clock))
-        self._say(EMPTY if skew is None else as_message(skew.description))
+        facts = self._trigger.measurement
+        self._time_base = self._around.time_base(file.start_index, file.next_index)
+        self._say(self._clock_note())
+        self._say(self._time_base.skew_message)
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
@@ -348,12 +341,7 @@ class Recording:
                 rest_s=file.time_s(facts.rest_index),
             ),
             losses=file.statistics.losses(),
-            clock_scale=1.0 if clock is None else clock.scale,
-            clock_scale_uncertainty=(
-                CLOCK_UNCERTAINTY if clock is None else clock.scale_standard_uncertainty
-            ),
-            skew_s=None if skew is None else skew.mean_s,
-            skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
+            time_base=self._time_base,
             dwell_s=dwell_s,
             zero_m=facts.zero_m,
             relative_zero_m=facts.relative_zero_m,
@@ -361,15 +349,14 @@ class Recording:
             message=str(self._message()),
         )
 
-    def _clock_note(self, clock: ClockEstimate | None) -> Message:
-        """What there is to say of a clock that is far off."""
+    def _clock_note(self) -> Message:
+        """Sentence about a clock that is far off; empty where one was given during the run."""
         is_said = any(note.template == RATE_TEMPLATE for note in self._notes)
-        if clock is None or is_said or not is_rate_wrong(clock):
+        if is_said or not is_rate_wrong(self._time_base):
             return EMPTY
-        return rate_note(clock, self._rate_hz)
+        return rate_note(self._time_base.scale, self._rate_hz)
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
-        skew = self._skew
         return RunEnded(
             path=path,
             ended=self._ended or EndReason.STOPPED,
@@ -383,8 +370,7 @@ class Recording:
             if self._file is None
             else self._file.time_s(self._trigger.measurement.release_index),
             message=self._message(),
-            skew_s=None if skew is None else skew.mean_s,
-            skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
+            time_base=self._time_base,
         )
 
     def _say(self, note: Message, *, first: bool = False) -> None:

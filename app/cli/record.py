@@ -126,9 +126,11 @@ def _report(done: list[RunEnded], count: int, as_json: bool) -> None:
 
 def run_document(ended: RunEnded) -> dict[str, Any]:
     """JSON object of one recorded run (INTERFACE, `record --json`)."""
+    time_base = ended.time_base
     document: dict[str, Any] = msgspec.to_builtins(ended) | {"message": str(ended.message)}
-    del document["type"], document["remaining"]
-    return {"run": document.pop("path")} | document
+    del document["type"], document["remaining"], document["time_base"]
+    skew = {"skew_s": time_base.skew_s, "skew_standard_uncertainty_s": time_base.skew_standard_uncertainty_s}
+    return {"run": document.pop("path")} | document | skew
 
 
 _DONE = ("rest", "enough", "duration", "stopped")

@@ -11,6 +11,7 @@ from analysis.record import GaugeUncertainty, Record, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.metadata import RunMetadata
 from config.schema import Gauge
+from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_NO_SKEW = (0.0, 0.0)
 CLOCK_TOLERANCE = 1e-3
 """Relative standard uncertainty of a device's rate before anybody has timed it."""
 
@@ -51,16 +51,12 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
         )
     no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_BY_GAUGE)
     relative = run.relative_reading
-    ending = run.end
     record = build_record(
         run.metadata,
         run.time_s,
         np.where(no_table, np.nan, run.table_reading),
         None if relative is None else np.where(no_relative, np.nan, relative),
-        clock=(1.0, 0.0) if ending is None else (ending.clock_scale, ending.clock_scale_uncertainty),
-        skew=_NO_SKEW
-        if ending is None
-        else (ending.skew_s or 0.0, ending.skew_standard_uncertainty_s or 0.0),
+        TimeBase() if run.end is None else run.end.time_base,
     )
     return record.replace(
         table_overload=(run.status & SampleStatus.OVERLOAD_TABLE) != 0,
@@ -73,16 +69,10 @@ def build_record(
     time_s: Floats,
     table_displacement_m: Floats,
     relative_displacement_m: Floats | None,
-    *,
-    clock: tuple[float, float],
-    skew: tuple[float, float] = _NO_SKEW,
+    time_base: TimeBase,
 ) -> Record:
-    """Readings (n,) with what the metadata of their run know of stand and gauges.
-
-    `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty;
-    `skew` by how much later (s) gauge 2 was read than gauge 1, and its standard uncertainty.
-    """
-    clock_scale, clock_scale_uncertainty = combine_clock_scale(*clock)
+    """Readings (n,) with what the metadata of their run know of stand and gauges."""
+    clock_scale, clock_scale_uncertainty = combine_clock_scale(time_base)
     return Record(
         time_s=time_s,
         table_displacement_m=table_displacement_m,
@@ -92,16 +82,17 @@ def build_record(
         clock_scale=clock_scale,
         clock_scale_uncertainty=clock_scale_uncertainty,
         table_gauge=gauge_uncertainty(metadata.gauges.table),
-        relative_gauge=_read_later(gauge_uncertainty(metadata.gauges.relative), *skew),
+        relative_gauge=_read_later(gauge_uncertainty(metadata.gauges.relative), time_base),
         gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",
     )
 
 
-def combine_clock_scale(scale: float, timed: float) -> tuple[float, float]:
+def combine_clock_scale(time_base: TimeBase) -> tuple[float, float]:
     """Scale of the device's clock and its uncertainty: as timed against the host, and as made.
 
     A short run on a busy host times the clock worse than its maker did (docs/decisions/0006).
     """
+    scale, timed = time_base.scale, time_base.scale_standard_uncertainty
     if timed == 0.0:
         return scale, 0.0
     share = CLOCK_TOLERANCE**2 / (CLOCK_TOLERANCE**2 + timed**2)
@@ -131,10 +122,12 @@ def _masses(metadata: RunMetadata) -> StandMasses:
     )
 
 
-def _read_later(gauge: GaugeUncertainty, skew_s: float, standard_uncertainty_s: float) -> GaugeUncertainty:
-    """A gauge that was read so much later than its row says: the opposite of a delay."""
+def _read_later(gauge: GaugeUncertainty, time_base: TimeBase) -> GaugeUncertainty:
+    """A gauge that was read later than its row says: the opposite of a delay."""
     return dataclasses.replace(
         gauge,
-        delay_s=gauge.delay_s - skew_s,
-        delay_s_uncertainty=math.hypot(gauge.delay_s_uncertainty, standard_uncertainty_s),
+        delay_s=gauge.delay_s - (time_base.skew_s or 0.0),
+        delay_s_uncertainty=math.hypot(
+            gauge.delay_s_uncertainty, time_base.skew_standard_uncertainty_s or 0.0
+        ),
     )

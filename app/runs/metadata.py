@@ -9,6 +9,7 @@ import msgspec
 
 from app.runs.errors import MetadataError
 from config.schema import ConfigError, GaugeCheck, Gauges, Stand
+from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, Losses
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
@@ -263,13 +264,7 @@ class EndMetadata(_FrozenStruct, frozen=True):
     events: Events = Events()
     losses: Losses = msgspec.field(default_factory=Losses)
     """Of this run, not of the whole stream."""
-    clock_scale: float = 1.0
-    """True seconds for one second of `time_s`; applied once, in analysis."""
-    clock_scale_uncertainty: float = 0.0
-    skew_s: float | None = None
-    """By how much later gauge 2 was read than gauge 1 on average, where two devices were read as one; applied
-    once, in analysis, beside the delays of the calibration."""
-    skew_standard_uncertainty_s: float | None = None
+    time_base: TimeBase = TimeBase()
     dwell_s: float | None = None
     """Hold at pullback before release."""
     zero_m: float | None = None

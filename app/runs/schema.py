@@ -329,15 +329,18 @@ END_FIELDS: Final = (
             ("unexplained_drops", "drops that the device reported without a gap in its sequence"),
         )
     ),
-    Field(CLOCK_SCALE, "true seconds for one second of `time`", "clock_scale", unit="1", default=1.0),
+    Field(CLOCK_SCALE, "true seconds for one second of `time`", "time_base.scale", unit="1", default=1.0),
     Field(
-        CLOCK_SCALE_UNCERTAINTY, "standard uncertainty of the clock scale", "clock_scale_uncertainty",
-        unit="1", default=0.0,
+        CLOCK_SCALE_UNCERTAINTY, "standard uncertainty of the clock scale",
+        "time_base.scale_standard_uncertainty", unit="1", default=0.0,
     ),
-    Field(f"{ACQUISITION}/skew", "time from the reading of gauge 1 to that of gauge 2", "skew_s", unit="s"),
+    Field(
+        f"{ACQUISITION}/skew", "time from the reading of gauge 1 to that of gauge 2", "time_base.skew_s",
+        unit="s",
+    ),
     Field(
         f"{ACQUISITION}/skew_standard_uncertainty", "standard uncertainty of the skew",
-        "skew_standard_uncertainty_s", unit="s",
+        "time_base.skew_standard_uncertainty_s", unit="s",
     ),
     Field(f"{RUN}/dwell_before_release", "hold at the pullback", "dwell_s", unit="s"),
     Field(f"{RUN}/zero_before_pull", "table at rest before the pull", "zero_m", unit="m"),

@@ -22,6 +22,7 @@ from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauge, Gauges, Stand
+from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
 
@@ -378,5 +379,5 @@ def _ending(test: SyntheticTest, block: RunBlock, release_s: float) -> EndMetada
         end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
         events=Events(pulled_back_s=0.0, release_s=release_s),
         losses=count_flags(block.status),
-        clock_scale_uncertainty=CLOCK_UNCERTAINTY,
+        time_base=TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY),
     )

@@ -20,7 +20,7 @@ from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
-from drivers.clock import ClockEstimate
+from drivers.clock import TimeBase
 from drivers.devices.csv_lines.codec import encode_lines
 from drivers.devices.csv_lines.columns import LineFormat
 from drivers.devices.slipstand_binary.codec import encode_frames
@@ -31,7 +31,7 @@ RATE_HZ = 500.0
 TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_s=0.5)
 RELEASED = round(TIMETABLE.release_s * RATE_HZ)
 IDENTIFIER = "6b1f0f6e-0000-4000-8000-000000000001"
-CLOCK = ClockEstimate(RATE_HZ, 1.00003, 2e-5, 10.0)
+TIME_BASE = TimeBase(1.00003, 2e-5)
 _PER_FRAME = 4
 
 
@@ -97,7 +97,9 @@ class Desk:
         )
         header = JournalHeader(self.port, run, metadata, IDENTIFIER, "test")
         self._journal = create_journal(self.journal, header)
-        around = RecordingContext(self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None)
+        around = RecordingContext(
+            self.intake, self.history, self._writer, lambda *_: TIME_BASE, lambda _: None
+        )
         self.recording = Recording(run, metadata, RATE_HZ, self._journal, around)
 
     def take(self, read: tuple[int, bytes]) -> None:

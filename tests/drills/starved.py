@@ -178,8 +178,8 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: StarvedRe
     truth = ask(stand)
     sent.check(truth, counts, run.status)
     assert run.end is not None
-    off = abs(run.end.clock_scale - RATE_HZ / truth.wire.true_rate_hz)
-    report.clock_off.append(off / run.end.clock_scale_uncertainty)
+    off = abs(run.end.time_base.scale - RATE_HZ / truth.wire.true_rate_hz)
+    report.clock_off.append(off / run.end.time_base.scale_standard_uncertainty)
 
 
 def main() -> int:

@@ -10,14 +10,13 @@ import numpy as np
 from app.acquisition.journal.records import JournalSummary, Known, Mark, Opened
 from app.acquisition.journal.replay import Replay, ReplayedReads
 from app.acquisition.messages import EndReason
-from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.acquisition.run_file import SampleStatistics, run_block
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.runs.blocks import BlockLayout, StoredRun
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events
 from app.runs.writer import RunWriter, create_run
-from drivers.clock import Skew
+from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
 
 INTERRUPTED_NOTE = "Slipstand was ended while it recorded; this run was rebuilt from its journal"
@@ -176,8 +175,9 @@ def _ending(
     story: JournalSummary, opened: Opened, next_index: int, account: SampleStatistics, replay: Replay
 ) -> EndMetadata:
     """What is known of a run that its engine did not live to end."""
-    skew = replay.skew(opened.start_index, next_index)
-    mark = story.checkpoint or Mark(next_index, opened.start_index, Known())
+    untimed = TimeBase.from_estimates(None, None)
+    mark = story.checkpoint or Mark(next_index, opened.start_index, Known(), untimed)
+    time_base = mark.time_base.with_skew(replay.skew(opened.start_index, next_index))
     lasted = datetime.timedelta(seconds=(next_index - opened.start_index) / story.rate_hz)
     dwell = _between(mark.known.held_index, mark.known.release_index)
     return EndMetadata(
@@ -185,21 +185,18 @@ def _ending(
         end_time=opened.start_time + lasted,
         events=_events(mark, opened.start_index, story.rate_hz),
         losses=account.losses(),
-        clock_scale=mark.clock_scale,
-        clock_scale_uncertainty=mark.clock_scale_uncertainty or CLOCK_UNCERTAINTY,
-        skew_s=None if skew is None else skew.mean_s,
-        skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
+        time_base=time_base,
         dwell_s=None if dwell is None else dwell / story.rate_hz,
         zero_m=mark.known.zero_m,
         relative_zero_m=mark.known.relative_zero_m,
         held_m=mark.known.held_m,
-        message=". ".join(_notes(replay, skew)),
+        message=". ".join(_notes(replay, time_base)),
     )
 
 
-def _notes(replay: Replay, skew: Skew | None) -> list[str]:
-    differs = [DIFFERS_NOTE.capitalize()] if replay.differs else []
-    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [str(skew.description)])]
+def _notes(replay: Replay, time_base: TimeBase) -> list[str]:
+    differs = DIFFERS_NOTE.capitalize() if replay.differs else ""
+    return [note for note in (INTERRUPTED_NOTE, differs, str(time_base.skew_message)) if note]
 
 
 def _events(mark: Mark, start_index: int, rate_hz: float) -> Events:

@@ -11,6 +11,7 @@ from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from app.runs.metadata import EndMetadata, RunMetadata
+from drivers.clock import TimeBase
 
 
 class JournalHeader(msgspec.Struct, frozen=True, tag=True):
@@ -45,8 +46,7 @@ class Mark(msgspec.Struct, frozen=True, tag=True):
     """Of the sample that comes next, counted from the first one of the stream."""
     armed_index: int
     known: Known
-    clock_scale: float = 1.0
-    clock_scale_uncertainty: float = 0.0
+    time_base: TimeBase
     reads: int | None = None
     """Decoded by then; None for all that stand before this record. More may: a read is decoded later."""
 

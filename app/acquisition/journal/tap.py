@@ -11,7 +11,7 @@ from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.records import Known, Mark
 from app.acquisition.pullback.plan import PullbackMeasurement
 from app.acquisition.stream.reads import DecodedRead, RawRead
-from drivers.clock import ClockEstimate
+from drivers.clock import TimeBase
 
 _EVERY_S = 1.0
 
@@ -89,17 +89,17 @@ class CheckpointWriter:
         Sample from which on a release is waited for.
     rate_hz : float
         Nominal samples a second.
-    clock : callable
-        Tells how the device's clock goes.
+    time_base : callable
+        Gives the time base of the samples from one index to another.
     """
 
     def __init__(
-        self, journal: Journal, armed_index: int, rate_hz: float, clock: Callable[[], ClockEstimate | None]
+        self, journal: Journal, armed_index: int, rate_hz: float, time_base: Callable[[int, int], TimeBase]
     ) -> None:
         self._journal = journal
         self._armed_index = armed_index
         self._every = round(_EVERY_S * rate_hz)
-        self._clock = clock
+        self._time_base = time_base
         self._known: Known | None = None
         self._due = 0
 
@@ -112,10 +112,7 @@ class CheckpointWriter:
         if known == self._known and next_index < self._due:
             return
         self._known, self._due = known, next_index + self._every
-        clock = self._clock()
-        mark = Mark(next_index, self._armed_index, known, reads=reads)
-        if clock is not None:
-            scale = (clock.scale, clock.scale_standard_uncertainty)
-            mark = Mark(next_index, self._armed_index, known, *scale, reads=reads)
+        time_base = self._time_base(self._armed_index, next_index)
+        mark = Mark(next_index, self._armed_index, known, time_base, reads)
         with contextlib.suppress(JournalError):
             self._journal.append_metadata(mark)

@@ -2,7 +2,7 @@
 
 import math
 
-from drivers.clock import ClockEstimate, ClockFit
+from drivers.clock import ClockEstimate, ClockFit, TimeBase
 from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
 from drivers.source import SampleSource
@@ -118,10 +118,12 @@ class RateMonitor:
         self._begin_window(arrival_ns)
         was_wrong = self._is_wrong
         self._is_wrong = lately is not None and before is not None and _agree_on_wrong(lately, before)
-        return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else EMPTY
+        return (
+            rate_note(lately.scale, self._rate_hz) if lately and self._is_wrong and not was_wrong else EMPTY
+        )
 
 
-def is_rate_wrong(estimate: ClockEstimate) -> bool:
+def is_rate_wrong(estimate: ClockEstimate | TimeBase) -> bool:
     """Tell whether a rate is so far from the nominal one that it must be said."""
     return abs(estimate.scale - 1.0) >= max(_SAID, _SURE * estimate.scale_standard_uncertainty)
 
@@ -135,9 +137,9 @@ def _agree_on_wrong(one: ClockEstimate, other: ClockEstimate) -> bool:
     )
 
 
-def rate_note(estimate: ClockEstimate, rate_hz: float) -> Message:
-    """Report a wrong rate."""
-    return message(RATE_TEMPLATE, rate_hz=estimate.rate_hz, nominal_hz=rate_hz)
+def rate_note(scale: float, nominal_hz: float) -> Message:
+    """Report a wrong rate; `scale` as in `TimeBase`."""
+    return message(RATE_TEMPLATE, rate_hz=nominal_hz / scale, nominal_hz=nominal_hz)
 
 
 STALLED_S = 3.0

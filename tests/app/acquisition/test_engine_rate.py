@@ -74,5 +74,7 @@ def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quick
     assert owner.ended is not None
     assert ("instead of 100" in str(owner.ended.message)) == (quicker != 1.0), owner.ended.message
     ending = open_run(owner.ended.path).end
-    assert 0.0 < ending.clock_scale_uncertainty < 1e-3
-    assert ending.clock_scale == pytest.approx(1 / quicker, abs=5 * ending.clock_scale_uncertainty)
+    assert 0.0 < ending.time_base.scale_standard_uncertainty < 1e-3
+    assert ending.time_base.scale == pytest.approx(
+        1 / quicker, abs=5 * ending.time_base.scale_standard_uncertainty
+    )

@@ -13,16 +13,17 @@ from engine_kit import gone
 from analysis.synthetic import Truth, simulate_readings
 from app.acquisition.live_client import DIED_NOTE, LiveClient, LiveIdentifier
 from app.acquisition.live_follower import RunFollower
-from app.acquisition.messages import ClockUpdate, FollowRun, LiveResult
+from app.acquisition.messages import FollowRun, LiveResult
 from app.acquisition.ring import create_ring, open_ring
 from app.runs.metadata import create_metadata
 from config.files import load_gauges, load_stand
+from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
 
 PATIENCE_S = 300.0
 """Compiling anew on a busy machine takes more than a minute."""
 BEFORE = 700
-TIMED = ClockUpdate(1.0, 1e-4)
+TIMED = TimeBase(1.0, 1e-4)
 TRUTH = Truth(rate_hz=1000.0, duration_s=6.0, offsets_m=(0.0, 0.0))
 
 
@@ -114,7 +115,7 @@ def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadat
 def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
     client.follow(FollowRun(str(ring.path), fill(ring), metadata, TIMED))
     before = result_of(client)
-    client.update_clock(ClockUpdate(1.001, 1e-5))
+    client.update_clock(TimeBase(1.001, 1e-5))
     more = 100
     times_s = 7.7 + np.arange(more) / 1000.0
     ring.append(times_s, np.full(more, np.nan), np.full(more, np.nan), np.ones(more, np.uint8))
@@ -143,7 +144,7 @@ def test_a_process_that_dies_is_told_of_once_and_replaced_at_the_next_arming(tmp
         started.append(LiveClient.start())
         return started[-1]
 
-    watch = LiveIdentifier(str(tmp_path / "no.ring"), lambda: None, start)
+    watch = LiveIdentifier(str(tmp_path / "no.ring"), lambda _: TIMED, start)
     watch.prepare()
     os.kill(started[0].pid, signal.SIGKILL)
     assert gone(started[0].pid)
@@ -167,7 +168,7 @@ def test_without_room_for_a_process_the_run_goes_on(metadata):
     def start():
         raise OSError(11, "Resource temporarily unavailable")
 
-    watch = LiveIdentifier("no.ring", lambda: None, start)
+    watch = LiveIdentifier("no.ring", lambda _: TIMED, start)
 
     watch.prepare()
 

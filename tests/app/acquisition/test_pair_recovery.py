@@ -5,10 +5,10 @@ import datetime
 import numpy as np
 import pytest
 from recovery_kit import (
-    CLOCK,
     COUNTS,
     IDENTIFIER,
     RATE_HZ,
+    TIME_BASE,
     Desk,
     assert_same,
     datasets,
@@ -56,10 +56,11 @@ class PairDesk(Desk):
             device=self._source.identity,
         )
         self._journal = create_journal(self.journal, JournalHeader(PORT, run, metadata, IDENTIFIER, "test"))
-        around = RecordingContext(
-            self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None, self._source.skew
-        )
+        around = RecordingContext(self.intake, self.history, self._writer, self._time_base, lambda _: None)
         self.recording = Recording(run, metadata, RATE_HZ, self._journal, around)
+
+    def _time_base(self, first_index, end_index):
+        return TIME_BASE.with_skew(self._source.skew(first_index, end_index))
 
 
 def reads(lost=()):
@@ -103,8 +104,9 @@ def test_the_skew_is_in_the_run_and_in_words(tmp_path, writer):
     recorded(desk, reads())
     ended = desk.ended()
     run = open_run(ended.path)
-    assert ended.skew_s == run.end.skew_s == pytest.approx(LATER_S, abs=2e-4)
-    assert 4e-4 < ended.skew_standard_uncertainty_s == run.end.skew_standard_uncertainty_s < 6e-4
+    assert ended.time_base == run.end.time_base
+    assert ended.time_base.skew_s == pytest.approx(LATER_S, abs=2e-4)
+    assert 4e-4 < ended.time_base.skew_standard_uncertainty_s < 6e-4
     assert "gauge 2 was read 0.7" in str(run.end.message)
     counts = load_counts(run)
     first = next(
@@ -119,6 +121,6 @@ def test_a_run_of_two_devices_whose_engine_died_has_its_skew(tmp_path, writer):
     desk.kill()
     (recovered,) = recover_folder(tmp_path)
     ending = open_run(recovered.run).end
-    assert ending.skew_s == pytest.approx(LATER_S, abs=2e-4)
+    assert ending.time_base.skew_s == pytest.approx(LATER_S, abs=2e-4)
     assert ending.message.startswith("Slipstand was ended while it recorded")
     assert "gauge 2 was read 0.7" in str(ending.message)

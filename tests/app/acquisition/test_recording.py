@@ -32,12 +32,13 @@ from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
-from drivers.clock import ClockEstimate
+from drivers.clock import TimeBase
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from messages.message import message
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
+TIMED = TimeBase(1.0, 1e-5)
 RATE_HZ = 500.0
 TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_s=0.5)
 RELEASED = round(TIMETABLE.release_s * RATE_HZ)
@@ -99,7 +100,9 @@ def answer(value, error=None):
 class Bench:
     """A recording and what surrounds it; `play` gives it the samples of the simulated stand."""
 
-    def __init__(self, folder, run=None, *, writer=None, heard=0, history_s=10.0, clock=None, status=None):
+    def __init__(
+        self, folder, run=None, *, writer=None, heard=0, history_s=10.0, time_base=TIMED, status=None
+    ):
         self.writer = writer or RememberingWriter()
         self.intake = ReadQueue()
         self.history = ReadHistory(round(history_s * RATE_HZ))
@@ -113,7 +116,9 @@ class Bench:
         metadata = create_metadata(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
         header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
-        around = RecordingContext(self.intake, self.history, self.writer, lambda: clock, self.events.append)
+        around = RecordingContext(
+            self.intake, self.history, self.writer, lambda *_: time_base, self.events.append
+        )
         self.recording = Recording(run, metadata, RATE_HZ, self.journal, around)
 
     def play(self, until: int, size: int = 5) -> None:
@@ -389,13 +394,11 @@ def test_a_failing_writer_ends_the_run_with_its_reason_and_keeps_the_journal(tmp
 
 @pytest.mark.parametrize(("scale", "is_said"), [(1.00002, False), (0.995, False), (0.95, True)])
 def test_a_clock_that_is_far_off_is_said_and_stored(tmp_path, scale, is_said):
-    clock = ClockEstimate(RATE_HZ / scale, scale, 1e-4, 3.0)
-    bench = Bench(tmp_path, clock=clock)
+    bench = Bench(tmp_path, time_base=TimeBase(scale, 1e-4))
     bench.play(len(COUNTS))
     ended = bench.ended()
     assert ("instead of 500" in str(ended.message)) is is_said
-    assert bench.writer.ending.clock_scale == scale
-    assert bench.writer.ending.clock_scale_uncertainty == 1e-4
+    assert bench.writer.ending.time_base == TimeBase(scale, 1e-4)
 
 
 @pytest.mark.parametrize(("duration_s", "is_ending"), [(None, True), (3.0, False)])

@@ -12,12 +12,13 @@ from app.acquisition.errors import JournalError
 from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
 from app.acquisition.live_client import LiveClient
-from app.acquisition.messages import ClockUpdate, Failed, Health
+from app.acquisition.messages import Failed, Health
 from app.acquisition.stream.connection import Reconnection
 from app.acquisition.stream.monitors import StallDetector
 from app.child_process import encode_line
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
+from drivers.clock import TimeBase
 from drivers.devices.slipstand_binary.source import make_source
 from drivers.errors import PortUnavailableError
 from tests.drills.processes import gone
@@ -59,7 +60,7 @@ def test_a_live_identification_that_hears_nothing_holds_nobody_up(monkeypatch):
     monkeypatch.setattr(LiveClient, "_STOP_S", 0.1)
     client = LiveClient(python(DEAF))
     for _ in range(200_000):  # some megabytes: no pipe holds them
-        client.update_clock(ClockUpdate(1.0, 1e-4))
+        client.update_clock(TimeBase(1.0, 1e-4))
         if client.has_ended:
             break
     assert gone(client.pid), "it is given up"

@@ -22,6 +22,7 @@ from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.options import Timetable
 from config.files import load_gauges, load_stand
+from drivers.clock import TimeBase
 from drivers.samples import Losses, SampleBlock
 
 RATE_HZ = 500.0
@@ -126,7 +127,7 @@ def test_the_fitted_zero_is_held_against_that_before_the_pull(pair: tuple[Told, 
     analysis = pair[1].analysis
     ending = analysis.run.end
     assert ending is not None
-    moved = ending.replace(zero_m=ending.zero_m - 0.3e-3, clock_scale=1.5)
+    moved = ending.replace(zero_m=ending.zero_m - 0.3e-3, time_base=TimeBase(1.5))
     (caution,) = zero_warnings(moved, analysis.record, analysis.identification)
     assert caution.code == "zero-moved"
     assert "place +30" in str(caution.message)

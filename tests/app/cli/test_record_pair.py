@@ -46,7 +46,7 @@ def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Pat
     assert recorded["samples"] == pytest.approx(500, abs=1)
     # both are asked at the same moments of the host's clock
     assert abs(recorded["skew_s"]) < recorded["skew_standard_uncertainty_s"] < 3e-3
-    assert run.end.skew_s == recorded["skew_s"]
+    assert run.end.time_base.skew_s == recorded["skew_s"]
     assert "gauge 2 was read" in recorded["message"]
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     friction = found["results"]["friction_dynamic"]

@@ -8,6 +8,7 @@ import numpy as np
 from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer import write_run
+from drivers.clock import TimeBase
 from drivers.samples import Losses
 
 END = datetime.datetime(2026, 11, 21, 13, 32, 30, tzinfo=datetime.UTC)
@@ -16,8 +17,7 @@ ENDING = EndMetadata(
     end_time=END,
     events=Events(pulled_back_s=1.0, release_s=2.25, slip_end_s=4.5),
     losses=Losses(samples=9, missing=2, missing_estimated=1, damaged=3, overloaded=4, discarded_bytes=5),
-    clock_scale=1.00002,
-    clock_scale_uncertainty=3e-6,
+    time_base=TimeBase(1.00002, 3e-6),
     dwell_s=1.125,
     zero_m=1.5e-4,
     relative_zero_m=-2.5e-4,

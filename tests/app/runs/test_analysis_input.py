@@ -9,6 +9,7 @@ from app.runs.errors import UnsuitableRunError
 from app.runs.reader import open_run
 from app.runs.writer import write_run
 from config.schema import Gauge, Gauges
+from drivers.clock import TimeBase
 
 
 def _stored(path, metadata, rows, ending=ENDING):
@@ -70,15 +71,15 @@ def test_a_run_without_samples(tmp_path, metadata):
 
 
 def test_a_clock_timed_worse_than_it_was_made_is_taken_nearly_as_made() -> None:
-    scale, uncertainty = combine_clock_scale(0.9954, 0.0021)
+    scale, uncertainty = combine_clock_scale(TimeBase(0.9954, 0.0021))
     assert scale == pytest.approx(1.0 - 0.0046 * 1e-6 / (1e-6 + 0.0021**2))
     assert uncertainty == pytest.approx((1.0 / (1e6 + 0.0021**-2)) ** 0.5)
 
 
 def test_a_rate_that_is_really_wrong_is_taken_as_timed() -> None:
-    scale, _ = combine_clock_scale(0.98, 5e-5)
+    scale, _ = combine_clock_scale(TimeBase(0.98, 5e-5))
     assert scale == pytest.approx(0.98, abs=1e-4)
 
 
 def test_a_clock_that_nobody_timed_is_kept() -> None:
-    assert combine_clock_scale(1.0, 0.0) == (1.0, 0.0)
+    assert combine_clock_scale(TimeBase()) == (1.0, 0.0)

@@ -210,7 +210,7 @@ def test_layout_is_that_of_the_interface(tmp_path, metadata):
         assert entry["stand/plate_mass"][()] == 27.4
         assert entry["stand/contact"].asstr()[()] == "fluoroplastic on fluoroplastic"
         assert entry["events/release_s"][()] == 2.25
-        assert entry["acquisition/clock_scale"][()] == ENDING.clock_scale
+        assert entry["acquisition/clock_scale"][()] == ENDING.time_base.scale
         assert entry["instrument/gauge_table/data"].dtype == np.int32
         assert entry["truth"].attrs["friction_dynamic"] == 0.1
 

@@ -12,6 +12,7 @@ from analysis.synthetic import Truth, simulate_record
 from app.runs.analysis_input import build_record, to_record
 from app.runs.reader import open_run
 from app.runs.writer import write_run
+from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
 
 FRICTION = 0.1
@@ -25,8 +26,7 @@ def found(metadata, skew):
         EARLIER.time_s,
         EARLIER.table_displacement_m,
         EARLIER.relative_displacement_m,
-        clock=(1.0, 1e-6),
-        skew=skew,
+        TimeBase(1.0, 1e-6, *skew),
     )
     gauges = {
         name: dataclasses.replace(getattr(carried, name), gain_relative=None, range_m=None)
@@ -61,12 +61,12 @@ def test_a_millisecond_shifts_the_friction_by_half_a_percent_and_carried_it_is_h
 
 
 def test_the_skew_of_a_run_adds_to_the_delays_of_its_gauges(tmp_path, metadata):
-    ending = ENDING.replace(skew_s=2e-4, skew_standard_uncertainty_s=3e-4)
+    ending = ENDING.replace(time_base=TimeBase(1.0, 1e-6, 2e-4, 3e-4))
     gauge = metadata.gauges.relative.replace(delay_s=1e-3, delay_standard_uncertainty_s=4e-4)
     metadata = metadata.replace(gauges=metadata.gauges.replace(relative=gauge))
     write_run(tmp_path / "run.h5", metadata, block(0, 100), ending)
     run = open_run(tmp_path / "run.h5")
-    assert (run.end.skew_s, run.end.skew_standard_uncertainty_s) == (2e-4, 3e-4)
+    assert run.end.time_base == ending.time_base
     read = to_record(run).relative_gauge
     assert read.delay_s == pytest.approx(8e-4)
     assert read.delay_s_uncertainty == pytest.approx(math.hypot(3e-4, 4e-4))

@@ -27,6 +27,7 @@ from app.runs.reader import open_run
 from app.runs.saved_analyses import inputs_hash, save_analysis
 from app.runs.writer import write_run
 from config.files import load_stand
+from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
 
 CHANNELS = ("time_s", "table_displacement_m", "relative_displacement_m")
@@ -45,7 +46,7 @@ def run(request, tmp_path, metadata):
     if request.param == "uneven":
         rows.time_s[:] = np.sort(rng.uniform(0.0, 1.0, len(rows)))
     path = tmp_path / "=run.h5"
-    write_run(path, metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0))
+    write_run(path, metadata, rows, ENDING.replace(time_base=TimeBase()))
     save_analysis(path, ANALYSIS, inputs_hash(to_record(open_run(path, trusted=True))))
     return open_run(path, trusted=True)
 

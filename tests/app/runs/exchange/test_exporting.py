@@ -11,6 +11,7 @@ from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.writer import write_run
 from config.files import load_stand
+from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
 
 
@@ -19,9 +20,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     rows.readings[:] += np.random.default_rng(1).normal(size=rows.readings.shape) * 1e-5
     rows.readings[7] = np.nan
     rows.status[7] = SampleStatus.MISSING
-    write_run(
-        tmp_path / "run.h5", metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0)
-    )
+    write_run(tmp_path / "run.h5", metadata, rows, ENDING.replace(time_base=TimeBase()))
     run = open_run(tmp_path / "run.h5", trusted=True)
 
     write_samples(sample_columns(run), tmp_path / "run.csv")

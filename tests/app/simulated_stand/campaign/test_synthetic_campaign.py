@@ -73,7 +73,7 @@ def test_a_run_says_what_is_stated_reads_by_what_is_true_and_knows_both(tmp_path
     assert run.metadata.gauges == load_gauges()
     assert run.metadata.table_mass_kg == load_stand().table_mass_kg
     assert run.metadata.truth["table_mass_kg"] == pytest.approx(131.6 + test.errors.table_mass_kg)
-    assert run.end.clock_scale_uncertainty == 2e-5
+    assert run.end.time_base.scale_standard_uncertainty == 2e-5
     counts = load_counts(run)
     assert counts.dtype == np.int32
     assert np.array_equal(load_gauges().table.displacement_m(counts[:, 0].astype(float)), run.table_reading)
