@@ -66,25 +66,17 @@ def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> 
 
 @dataclass(frozen=True, slots=True)
 class ClockEstimate:
-    """The device's clock compared with the host's.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Samples a second of the host's clock.
-    scale : float
-        True over nominal time: index / nominal rate is to be multiplied by it.
-    scale_standard_uncertainty : float
-        Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The error of the host's own clock, some
-        1e-5 where nothing disciplines it, is not included.
-    span_s : float
-        Time covered by the fit.
-    """
+    """The device's clock compared with the host's."""
 
     rate_hz: float
+    """Samples a second of the host's clock."""
     scale: float
+    """True over nominal time: index / nominal rate is to be multiplied by it."""
     scale_standard_uncertainty: float
+    """Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The error of the host's own clock, some
+    1e-5 where nothing disciplines it, is not included."""
     span_s: float
+    """Time covered by the fit."""
 
 
 class ClockFit:
@@ -157,26 +149,18 @@ class ClockFit:
 
 @dataclass(frozen=True, slots=True)
 class RobustLine:
-    """A straight line through points, outliers left out.
-
-    Attributes
-    ----------
-    centre, level : float
-        A point of the line.
-    slope, slope_uncertainty : float
-        The uncertainty is a standard uncertainty and allows for correlated residuals.
-    scatter : float
-        Root mean square of the residuals.
-    span : float
-        From the first to the last point.
-    """
+    """A straight line through points, outliers left out."""
 
     centre: float
+    """A point of the line."""
     level: float
     slope: float
+    """The uncertainty is a standard uncertainty and allows for correlated residuals."""
     slope_uncertainty: float
     scatter: float
+    """Root mean square of the residuals."""
     span: float
+    """From the first to the last point."""
 
     def at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the line, (n,)."""
@@ -228,19 +212,13 @@ _MAX_SKEW_WINDOWS = 4 * 3600 * 4
 
 @dataclass(frozen=True, slots=True)
 class Skew:
-    """Time between the readings of both gauges, over the rows of a run.
-
-    Attributes
-    ----------
-    mean_s : float
-        Gauge 2 was read so much later than gauge 1 on average (s).
-    standard_uncertainty_s : float
-        For each period of the stand (s): drift of the lag, scatter of arrivals of both devices, and delays
-        by ports that cannot be seen (1 ms each, evenly distributed).
-    """
+    """Time between the readings of both gauges, over the rows of a run."""
 
     mean_s: float
+    """Gauge 2 was read so much later than gauge 1 on average (s)."""
     standard_uncertainty_s: float
+    """For each period of the stand (s): drift of the lag, scatter of arrivals of both devices, and delays by
+    ports that cannot be seen (1 ms each, evenly distributed)."""
 
 
 UNTIMED_CLOCK_UNCERTAINTY = 1e-4
@@ -257,24 +235,16 @@ _EARLIER = N_(
 
 
 class TimeBase(msgspec.Struct, frozen=True):
-    """How the times of a run's rows relate to true time; applied once, in analysis.
-
-    Attributes
-    ----------
-    scale : float
-        True seconds for one second of the rows' time.
-    scale_standard_uncertainty : float
-        0 where the times are exact, as in a simulated run.
-    skew_s : float or None
-        Gauge 2 was read so much later than gauge 1 on average (s); None where one device reads both.
-    skew_standard_uncertainty_s : float or None
-        See `Skew`.
-    """
+    """How the times of a run's rows relate to true time; applied once, in analysis."""
 
     scale: float = 1.0
+    """True seconds for one second of the rows' time."""
     scale_standard_uncertainty: float = 0.0
+    """0 where the times are exact, as in a simulated run."""
     skew_s: float | None = None
+    """Gauge 2 was read so much later than gauge 1 on average (s); None where one device reads both."""
     skew_standard_uncertainty_s: float | None = None
+    """See `Skew`."""
 
     @classmethod
     def from_estimates(cls, clock: ClockEstimate | None, skew: Skew | None) -> "TimeBase":

@@ -35,41 +35,28 @@ class DeviceDriver:
     The folder holds `source.py` with `make_source(settings, rate_hz)` and, where they apply,
     `recognise(data, duration_s)`, `IDENTITY_QUERY`, `explain(received)` and
     `single_gauge_settings(gauge, settings)`; and `simulated.py` with `make_protocol(settings)`.
-
-    Attributes
-    ----------
-    name : str
-        As given to `--protocol`.
-    title : str
-        For people.
-    rank : int
-        Place in lists of devices; by how often the device is used.
-    default_baud : int
-        0 where none is usual.
-    channels : int
-        Gauges on one port.
-    verified : str
-        What it was tested against.
-    package : str
-        The folder as a package (`__name__`); "" for a name that is only reserved.
-    format_bauds : mapping of str to int
-        Usual baud rates of a device that is chosen by its setting `format`.
-    frames_title : str
-        What its bytes are called in messages; "" where they are lines of text.
-    single_gauge : SingleGauge or None
-        For a device that can be set to one gauge of two.
     """
 
     name: str
+    """As given to `--protocol`."""
     title: str
+    """For people."""
     rank: int
+    """Place in lists of devices; by how often the device is used."""
     default_baud: int = 0
+    """0 where none is usual."""
     channels: int = 2
+    """Gauges on one port."""
     verified: str = RESERVED
+    """What it was tested against."""
     package: str = ""
+    """The folder as a package (`__name__`); "" for a name that is only reserved."""
     format_bauds: Mapping[str, int] = field(default_factory=dict)
+    """Usual baud rates of a device that is chosen by its setting `format`."""
     frames_title: str = ""
+    """What its bytes are called in messages; "" where they are lines of text."""
     single_gauge: SingleGauge | None = None
+    """For a device that can be set to one gauge of two."""
 
     @property
     def available(self) -> bool:
@@ -110,10 +97,8 @@ class DeviceDriver:
     def single_gauge_settings(self, gauge: str, settings: Mapping[str, str]) -> tuple[dict[str, str], int]:
         """Settings of a device that has only this gauge, and the column of its readings.
 
-        Raises
-        ------
-        SettingsError
-            For a device that has both gauges on one port, or settings that contradict a single gauge.
+        Raises SettingsError for a device that has both gauges on one port, or settings that contradict a
+        single gauge.
         """
         if self.single_gauge is not None:
             own = self.single_gauge is SingleGauge.OWN_COLUMN

@@ -24,25 +24,20 @@ _MAX_PORT = 0xFF
 
 @dataclass(frozen=True, slots=True)
 class StampedRead:
-    """One read of one port.
-
-    Attributes
-    ----------
-    port : int
-        Number of the port, from 0.
-    arrival_ns : int
-        Host's monotonic time (ns, `drivers.host_time.host_ns`) after the read.
-    data : bytes
-        As received; b"" says that the connection of this port broke here.
-    """
+    """One read of one port."""
 
     port: int
+    """Number of the port, from 0."""
     arrival_ns: int
+    """Host's monotonic time (ns, `drivers.host_time.host_ns`) after the read."""
     data: bytes
+    """As received; b"" says that the connection of this port broke here."""
 
 
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
     """Envelope of a read; several of them where it is longer than 65,535 bytes.
+
+    Raises ValueError if the number of the port is out of range.
 
     Parameters
     ----------
@@ -52,11 +47,6 @@ def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
         Host's monotonic time (ns) after the read.
     data : bytes
         b"" for a broken connection.
-
-    Raises
-    ------
-    ValueError
-        If the number of the port is out of range.
     """
     if not 0 <= port <= _MAX_PORT:
         raise ValueError(f"port {port} has no place in an envelope: give 0 to {_MAX_PORT}")

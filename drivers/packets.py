@@ -61,36 +61,24 @@ _DAMAGED = int(SampleStatus.DAMAGED)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Packets:
-    """What one call of a decoder found.
-
-    Attributes
-    ----------
-    packets : (p,) PACKET
-        In order of arrival.
-    counts : (s, 2) int32 or float64
-        Samples of all packets, one after the other.
-    first_index : int
-        Row of the first lost or good sample of the first packet.
-    rows : int
-        Good and lost samples together.
-    last_time_s : float
-        Device time of the row before `first_index`.
-    period_s : float
-        Nominal time between the samples of a packet.
-    has_time : bool
-        Whether the device sends its time.
-    arrival_ns : int
-        Host's time of the read that completed the packets.
-    """
+    """What one call of a decoder found."""
 
     packets: NDArray[np.void]
+    """(p,) PACKET: in order of arrival."""
     counts: NDArray[np.int32] | NDArray[np.float64]
+    """(s, 2) int32 or float64: samples of all packets, one after the other."""
     first_index: int
+    """Row of the first lost or good sample of the first packet."""
     rows: int
+    """Good and lost samples together."""
     last_time_s: float
+    """Device time of the row before `first_index`."""
     period_s: float
+    """Nominal time between the samples of a packet."""
     has_time: bool
+    """Whether the device sends its time."""
     arrival_ns: int
+    """Host's time of the read that completed the packets."""
 
 
 class PacketDecoder(ABC):

@@ -159,6 +159,9 @@ def find_replugged(lost: PortInfo) -> str | None:
 def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
     """Open a port for this program alone.
 
+    Raises PortUnavailableError if it does not exist, is busy, or may not be opened. Raises SettingsError if
+    the port cannot be set so.
+
     Parameters
     ----------
     url : str
@@ -170,13 +173,6 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
         "N", "E" or "O".
     stop_bits : int
         1 or 2.
-
-    Raises
-    ------
-    PortUnavailableError
-        If it does not exist, is busy, or may not be opened.
-    SettingsError
-        If the port cannot be set so.
     """
     if parity not in PARITIES:
         raise SettingsError(
@@ -238,10 +234,7 @@ class Port:
     def read(self) -> bytes:
         """Wait at most 50 ms for the first byte and return all that is there.
 
-        Raises
-        ------
-        DeviceLostError
-            If the port is gone. What came before it is returned by the call before.
+        Raises DeviceLostError if the port is gone. What came before it is returned by the call before.
         """
         try:
             if self._terminal is not None:
@@ -261,12 +254,7 @@ class Port:
     def configure(self, line_settings: LineSettings) -> None:
         """Change baud rate and parity and discard unread bytes.
 
-        Raises
-        ------
-        SettingsError
-            If the port cannot be set so.
-        DeviceLostError
-            If the port is gone.
+        Raises SettingsError if the port cannot be set so. Raises DeviceLostError if the port is gone.
         """
         try:
             self._wire.baudrate, self._wire.parity = line_settings.baud, line_settings.parity

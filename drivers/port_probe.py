@@ -49,52 +49,33 @@ class ProbeOutcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PortReport:
-    """What was found on a port.
-
-    Attributes
-    ----------
-    port : PortInfo
-    chip : str
-        Known name of the USB chip or board; "" for others.
-    outcome : ProbeOutcome
-    message : Message
-        What is wrong and what to do, where nothing was recognised.
-    users : tuple of PortUser
-        Other programs that have it open.
-    recognition : Recognition or None
-    line_settings : LineSettings or None
-        At which it was recognised; None where they have no effect.
-    hints : tuple of PortHint
-        What hinders reading this port.
-    """
+    """What was found on a port."""
 
     port: PortInfo
     chip: str
+    """Known name of the USB chip or board; "" for others."""
     outcome: ProbeOutcome
     message: Message = EMPTY
+    """What is wrong and what to do, where nothing was recognised."""
     users: tuple[PortUser, ...] = ()
+    """Other programs that have it open."""
     recognition: Recognition | None = None
     line_settings: LineSettings | None = None
+    """At which it was recognised; None where they have no effect."""
     hints: tuple[PortHint, ...] = ()
+    """What hinders reading this port."""
 
 
 @dataclass(frozen=True, slots=True)
 class ListenResult:
-    """What was received, and at which line settings.
-
-    Attributes
-    ----------
-    recognition : Recognition or None
-        What the bytes are, if a device folder knows them.
-    line_settings : LineSettings or None
-        None where they have no effect.
-    received : bytes
-        What came at the settings that were recognised, else at those that looked most like text.
-    """
+    """What was received, and at which line settings."""
 
     recognition: Recognition | None
+    """What the bytes are, if a device folder knows them."""
     line_settings: LineSettings | None
+    """None where they have no effect."""
     received: bytes
+    """What came at the settings that were recognised, else at those that looked most like text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,22 +135,17 @@ def listen(
 ) -> ListenResult:
     """Listen until what comes is recognised; nothing is sent.
 
-    A device that is silent at the first settings is silent at all.
+    A device that is silent at the first settings is silent at all. Raises DeviceLostError if the port is
+    gone.
 
     Parameters
     ----------
     link : ConfigurableLink
         Open, set to the first of `candidates`.
-    on_progress : callable (Message)
     candidates : sequence of LineSettings
         To be tried in this order.
     clock : callable
         Seconds, as of `time.monotonic`.
-
-    Raises
-    ------
-    DeviceLostError
-        If the port is gone.
     """
     best = ListenResult(None, None, b"")
     for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
@@ -203,10 +179,7 @@ def query_identity(
 ) -> IdentifiedDevice | None:
     """Ask the question of one device after the other, by default of all, until one is answered.
 
-    Raises
-    ------
-    DeviceLostError
-        If the port is gone.
+    Raises DeviceLostError if the port is gone.
     """
     for protocol, query in queries or identity_queries():
         for settings in query.line_settings if link.has_baud else query.line_settings[:1]:

@@ -49,16 +49,12 @@ class BatchedReader:
     def read(self, link: Link, batch_delay_s: float) -> bytes:
         """What came, or comes within the next 50 ms; b"" if nothing.
 
+        Raises DeviceLostError if the port is gone. What came before it is returned by the call before.
+
         Parameters
         ----------
-        link : Link
         batch_delay_s : float
             How long bytes may collect (s); less where they would be too many for the port.
-
-        Raises
-        ------
-        DeviceLostError
-            If the port is gone. What came before it is returned by the call before.
         """
         parts: list[bytes] = []
         try:

@@ -25,35 +25,23 @@ _EXAMINED_BYTES = 1 << 16
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """A protocol that bytes belong to, and how to record from the device.
-
-    Attributes
-    ----------
-    protocol : str
-    share : float
-        Share of the bytes that is in good frames or lines, 0 to 1.
-    packets : int
-        Good frames or lines.
-    channels : int
-        Gauges that the device has.
-    settings : dict
-        The device's own, as `--set` takes them.
-    rate_hz : float or None
-        Samples a second by the device's own times, else by when the bytes came; None if neither tells.
-    needs_rate : bool
-        Whether `--rate` must be given, because the device does not tell its rate.
-    remark : Message
-        What to check before recording.
-    """
+    """A protocol that bytes belong to, and how to record from the device."""
 
     protocol: str
     share: float
+    """Share of the bytes that is in good frames or lines, 0 to 1."""
     packets: int
+    """Good frames or lines."""
     channels: int = 2
+    """Gauges that the device has."""
     settings: dict[str, str] = field(default_factory=dict)
+    """The device's own, as `--set` takes them."""
     rate_hz: float | None = None
+    """Samples a second by the device's own times, else by when the bytes came; None if neither tells."""
     needs_rate: bool = False
+    """Whether `--rate` must be given, because the device does not tell its rate."""
     remark: Message = EMPTY
+    """What to check before recording."""
 
     @property
     def rate_option(self) -> str:
@@ -67,22 +55,15 @@ class IdentityQuery:
 
     No query holds a character that another known device takes for a command: OpenScale takes x and !, the
     reference firmware S, P and R.
-
-    Attributes
-    ----------
-    order : int
-        Place among the queries of all devices: those with few line settings first.
-    data : bytes
-    line_settings : tuple of LineSettings
-        Usual ones of such devices.
-    parse : callable (bytes) -> Message or None
-        What the answer says of the device, maybe nothing; None while there is no answer.
     """
 
     order: int
+    """Place among the queries of all devices: those with few line settings first."""
     data: bytes
     line_settings: tuple[LineSettings, ...]
+    """Usual ones of such devices."""
     parse: Callable[[bytes], Message | None]
+    """What the answer says of the device, maybe nothing; None while there is no answer."""
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:

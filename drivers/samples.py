@@ -38,26 +38,20 @@ class SampleBlock:
 
     Blocks of one source join without a hole: the next block's `first_index` is this one's
     `first_index + len(self)`.
-
-    Attributes
-    ----------
-    first_index : int
-        Index of the first row, counted from the first good sample of the stream (0).
-    counts : (n, 2) int32 or float64
-        Readings of table gauge and relative gauge in the device's own unit; 0 where absent.
-    status : (n,) uint8
-        `SampleStatus` flags of each row.
-    arrival_ns : int
-        Host's monotonic time (ns) after the read that brought the last byte of the block.
-    device_time_s : (n,) float64, optional
-        The device's own time of each row, unwrapped, from 0 at index 0; None if it sends none.
     """
 
     first_index: int
+    """Index of the first row, counted from the first good sample of the stream (0)."""
     counts: NDArray[np.int32] | NDArray[np.float64]
+    """(n, 2) int32 or float64: readings of table gauge and relative gauge in the device's own unit; 0 where
+    absent."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `SampleStatus` flags of each row."""
     arrival_ns: int
+    """Host's monotonic time (ns) after the read that brought the last byte of the block."""
     device_time_s: NDArray[np.float64] | None = None
+    """(n,) float64: the device's own time of each row, unwrapped, from 0 at index 0; None if it sends
+    none."""
 
     def __len__(self) -> int:
         return len(self.status)

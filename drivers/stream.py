@@ -137,10 +137,7 @@ class StreamSource(ABC):
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Samples completed by `data`, see `SampleSource`.
 
-        Raises
-        ------
-        NoDataError
-            If a megabyte did not tell what a decoder needs to know.
+        Raises NoDataError if a megabyte did not tell what a decoder needs to know.
         """
         if not data and self._decoder is not None:
             self._decoder.expect_restart()
@@ -203,10 +200,7 @@ class StreamSource(ABC):
 def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) -> _Settings:
     """Device settings, given as text, as the driver's typed struct.
 
-    Raises
-    ------
-    SettingsError
-        If a key is unknown or a value cannot be read.
+    Raises SettingsError if a key is unknown or a value cannot be read.
     """
     allowed = [field.name for field in msgspec.structs.fields(kind)]
     unknown = next((key for key in given if key not in allowed), None)

@@ -74,10 +74,7 @@ class SimulatedStand:
     def start(cls, options: SimulatedStandOptions) -> Self:
         """Start the process and wait until its port can be opened.
 
-        Raises
-        ------
-        SimulatedStandError
-            If it cannot be set up as asked, or does not get ready.
+        Raises SimulatedStandError if it cannot be set up as asked, or does not get ready.
         """
         return cls(spawn("app.simulated_stand", msgspec.json.encode(options).decode()))
 
@@ -108,14 +105,9 @@ class SimulatedStand:
     def disturb(self, text: str) -> None:
         """Let something happen to the device now, or at a time: `unplug 1.5`, `stall`, `jump -5 at 3`.
 
-        It happens within some milliseconds; `truth` tells when it did.
-
-        Raises
-        ------
-        SettingsError
-            If `text` is not as `drivers.simulated.faults.parse_disturbance` wants it.
-        SimulatedStandError
-            If the stand has ended.
+        It happens within some milliseconds; `truth` tells when it did. Raises SettingsError if `text` is not
+        as `drivers.simulated.faults.parse_disturbance` wants it. Raises SimulatedStandError if the stand has
+        ended.
         """
         parse_disturbance(text)
         if not self._child.is_running:

@@ -20,22 +20,15 @@ class RepeatedPullback:
 
     Each test leaves the plate where it came to rest, and the next one begins there unless the operator
     re-centres it. Friction does not depend on the position of the plate, so the motion is the same.
-
-    Attributes
-    ----------
-    pullback_m : float
-        Table displacement while held (m).
-    released : Motion
-        Motion after a release, simulated for decay and re-centring at least.
-    timetable : Timetable
-    plate_offset_m : float
-        Position of the plate on the table before the first test (m).
     """
 
     pullback_m: float
+    """Table displacement while held (m)."""
     released: Motion
+    """Motion after a release, simulated for decay and re-centring at least."""
     timetable: Timetable
     plate_offset_m: float = 0.0
+    """Position of the plate on the table before the first test (m)."""
 
     def displacements(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Table against base and plate against table (m), each (n,), at times since the first test began."""
@@ -108,10 +101,7 @@ def _smooth(x: FloatArray) -> FloatArray:
 def stand_truth(options: SimulatedStandOptions, stand: Stand) -> StandTruth:
     """Parameters of the chosen series, with what the options change.
 
-    Raises
-    ------
-    ConfigError
-        If the series is not one of the stand or has no row in Table 1.
+    Raises ConfigError if the series is not one of the stand or has no row in Table 1.
     """
     series = stand.series(options.series)
     row = published_row(series.code)

@@ -20,28 +20,20 @@ class SimulatedStandError(DriverError):
 
 @dataclass(frozen=True, slots=True)
 class Timetable:
-    """Lengths (s) of the parts of one test, in their order, and how tests follow each other.
-
-    Attributes
-    ----------
-    rest_s, pull_s, hold_s, decay_s, recentre_s : float
-        In the last one the table is stilled, and the plate put back if it is its turn.
-    every_s : float, optional
-        From the beginning of a test to the next; what the parts leave of it is rest. None: at once.
-    count : int, optional
-        Tests before the stand rests for good; None goes on for ever.
-    recentre_every : int
-        The plate is put back to the middle after each so many tests; 0 is never.
-    """
+    """Lengths (s) of the parts of one test, in their order, and how tests follow each other."""
 
     rest_s: float
+    """In the last one the table is stilled, and the plate put back if it is its turn."""
     pull_s: float
     hold_s: float
     decay_s: float
     recentre_s: float
     every_s: float | None = None
+    """From the beginning of a test to the next; what the parts leave of it is rest. None: at once."""
     count: int | None = None
+    """Tests before the stand rests for good; None goes on for ever."""
     recentre_every: int = 1
+    """The plate is put back to the middle after each so many tests; 0 is never."""
 
     @property
     def release_s(self) -> float:

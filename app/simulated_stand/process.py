@@ -32,9 +32,11 @@ def serve(
 ) -> None:
     """Be a simulated stand in this process until `has_ended()`.
 
+    Raises ConfigError, DriverError, AnalysisError if it cannot be set up as asked; `on_ready` was not called
+    then.
+
     Parameters
     ----------
-    options : SimulatedStandOptions
     on_ready : callable
         Receives what a reader must know, once the port can be opened.
     has_ended : callable
@@ -43,11 +45,6 @@ def serve(
         Receives the truth at the start, at each change, and at the end, as the truth file does.
     next_disturbance : callable
         Returns the next disturbance, None if there is none; asked every few milliseconds.
-
-    Raises
-    ------
-    ConfigError, DriverError, AnalysisError
-        If it cannot be set up as asked; `on_ready` was not called then.
     """
 
     def tell_all(truth: Truth) -> None:

@@ -44,9 +44,6 @@ class StandSignal:
 
     Parameters
     ----------
-    motion : RepeatedPullback
-    gauges : Gauges
-    options : SimulatedStandOptions
     rate_hz : float
         Samples a second of the stand's own time.
     started_s : float
@@ -107,24 +104,16 @@ ADC_MAX_COUNT = 2**23 - 1
 
 @dataclass(frozen=True, slots=True)
 class GaugeFaults:
-    """What one gauge adds to the true displacement.
-
-    Attributes
-    ----------
-    noise_m : float
-        Standard deviation of white noise (m).
-    drift_m_per_s : float
-        Creep of the zero since the beginning of the test (m/s).
-    nonlinearity_m : float
-        Largest deviation from the calibration line, at half range (m).
-    clip_m : float, optional
-        Readings beyond are clipped, where that comes before the end of its range (m).
-    """
+    """What one gauge adds to the true displacement."""
 
     noise_m: float = 0.0
+    """Standard deviation of white noise (m)."""
     drift_m_per_s: float = 0.0
+    """Creep of the zero since the beginning of the test (m/s)."""
     nonlinearity_m: float = 0.0
+    """Largest deviation from the calibration line, at half range (m)."""
     clip_m: float | None = None
+    """Readings beyond are clipped, where that comes before the end of its range (m)."""
 
 
 class SimulatedGauge:
@@ -134,7 +123,6 @@ class SimulatedGauge:
     ----------
     gauge : Gauge
         Calibration that the counts follow.
-    faults : GaugeFaults
     random : Generator
         Source of the noise.
     """

@@ -35,37 +35,25 @@ _SURELY_SLIPS = 1.05
 
 
 class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """A synthetic campaign.
-
-    Attributes
-    ----------
-    series : tuple of str
-        Codes; empty is the 36 of Table 1.
-    repeats : int
-    seed : int
-        Of everything that is drawn.
-    rate_hz, duration_s, noise_m
-        Of each run; it ends `duration_s` after the release.
-    friction_scatter : float
-        Standard deviation of f_d from run to run, as a share of it.
-    friction_per_kg : float
-        By which share f_d changes for each kg of added mass.
-    friction_by_contact : bool
-        f_d depends on nothing but the contact: that of the contact's first row everywhere.
-    static_friction : str
-        "printed": as in Table 1, or f_d where the row would then never slip; "dynamic": f_d everywhere.
-    """
+    """A synthetic campaign."""
 
     series: tuple[str, ...] = ()
+    """Codes; empty is the 36 of Table 1."""
     repeats: int = 3
     seed: int = 1
+    """Of everything that is drawn."""
     rate_hz: float = 1000.0
+    """Of each run; it ends `duration_s` after the release."""
     duration_s: float = 10.0
     noise_m: float = 20e-6
     friction_scatter: float = 0.0
+    """Standard deviation of f_d from run to run, as a share of it."""
     friction_per_kg: float = 0.0
+    """By which share f_d changes for each kg of added mass."""
     friction_by_contact: bool = False
+    """f_d depends on nothing but the contact: that of the contact's first row everywhere."""
     static_friction: Literal["printed", "dynamic"] = "printed"
+    """"printed": as in Table 1, or f_d where the row would then never slip; "dynamic": f_d everywhere."""
 
     def __post_init__(self) -> None:
         limits = {
@@ -79,27 +67,18 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SystematicErrors(msgspec.Struct, frozen=True):
-    """What the campaign does not know of its stand: drawn once, from the stated uncertainties.
-
-    Attributes
-    ----------
-    gains : (float, float)
-        By which share displacements are read too large.
-    bends_m : (float, float)
-        Largest deviations from the calibration line.
-    lag_s : float
-        By how much gauge 2 is late.
-    clock : float
-        By which share true time runs faster than the device's.
-    table_mass_kg, plate_mass_kg, gravity_m_per_s2 : float
-        Of the true values from the stated ones.
-    """
+    """What the campaign does not know of its stand: drawn once, from the stated uncertainties."""
 
     gains: tuple[float, float]
+    """By which share displacements are read too large."""
     bends_m: tuple[float, float]
+    """Largest deviations from the calibration line."""
     lag_s: float
+    """By how much gauge 2 is late."""
     clock: float
+    """By which share true time runs faster than the device's."""
     table_mass_kg: float
+    """Of the true values from the stated ones."""
     plate_mass_kg: float
     gravity_m_per_s2: float
 
@@ -223,15 +202,7 @@ def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]
 
 
 class Comparison(msgspec.Struct, frozen=True):
-    """One quantity of one series.
-
-    Attributes
-    ----------
-    series, name : str
-    value, standard_uncertainty : float
-    interval_95 : (float, float)
-    truth : float
-    """
+    """One quantity of one series."""
 
     series: str
     name: str
@@ -284,12 +255,7 @@ _PLACES_M = (2e-4, 2e-3)
 
 
 def write_test(test: SyntheticTest) -> StoredRun:
-    """Record a synthetic test, faster than it would happen.
-
-    Raises
-    ------
-    RunError
-    """
+    """Record a synthetic test, faster than it would happen. Raises RunError."""
     block, release_s = sample_test(test, load_gauges())
     return write_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
 

@@ -25,17 +25,11 @@ _NS = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PairedChannel:
-    """One device of a pair.
-
-    Attributes
-    ----------
-    source : SampleSource
-    column : int
-        Column of its readings in a block.
-    """
+    """One device of a pair."""
 
     source: SampleSource
     column: int
+    """Column of its readings in a block."""
 
 
 class PairDecoder:

@@ -37,7 +37,6 @@ class PairLink:
     ----------
     ports : pair of OpenPort
         Open, of gauge 1 and gauge 2; closed here.
-    configs : pair of PortConfig
     sources : pair of SampleSource
         Called from the thread of their port.
     is_resumed : bool
@@ -79,14 +78,8 @@ class PairLink:
     def read(self) -> bytes:
         """Wait at most 50 ms for the first envelope and return all that wait.
 
-        Raises
-        ------
-        DeviceLostError
-            If one of the devices was not back within 10 s.
-        QueueFullError
-            If thousands of reads wait.
-        DriverError
-            If one of them could not be started.
+        Raises DeviceLostError if one of the devices was not back within 10 s. Raises QueueFullError if
+        thousands of reads wait. Raises DriverError if one of them could not be started.
         """
         failure = next(filter(None, (reader.failure for reader in self._readers)), None)
         if failure is not None and self._is_ending:
@@ -122,19 +115,12 @@ def open_pair(
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
-    """Open both ports and start both devices.
+    """Open both ports and start both devices. Raises DriverError if one of them cannot be opened.
 
     Parameters
     ----------
-    configs : pair of PortConfig
-    sources : pair of SampleSource
     lost : pair of PortInfo, optional
         What the ports were before the link was lost.
-
-    Raises
-    ------
-    DriverError
-        If one of them cannot be opened.
     """
     ports: list[OpenPort] = []
     try:

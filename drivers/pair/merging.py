@@ -30,20 +30,14 @@ _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChannelSamples:
-    """Consecutive readings of one device, lost ones included.
-
-    Attributes
-    ----------
-    host_ns : (n,) int64
-        Host's time of each reading (ns), never decreasing.
-    counts : (n,) int32 or float64
-    status : (n,) uint8
-        `SampleStatus`, flags as of gauge 1.
-    """
+    """Consecutive readings of one device, lost ones included."""
 
     host_ns: NDArray[np.int64]
+    """(n,) int64: host's time of each reading (ns), never decreasing."""
     counts: Counts
+    """(n,) int32 or float64."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `SampleStatus`, flags as of gauge 1."""
 
     def __len__(self) -> int:
         return len(self.status)
@@ -69,23 +63,16 @@ NO_SAMPLES = ChannelSamples(np.empty(0, np.int64), np.empty(0, np.int32), np.emp
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MergedRows:
-    """Rows of both gauges.
-
-    Attributes
-    ----------
-    counts : (n, 2) int32 or float64
-    status : (n,) uint8
-        `SampleStatus` flags.
-    lag_ns : (n,) int64
-        Time of gauge 2 minus time of gauge 1.
-    is_paired : (n,) bool
-        Whether both readings exist.
-    """
+    """Rows of both gauges."""
 
     counts: Counts
+    """(n, 2) int32 or float64."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `SampleStatus` flags."""
     lag_ns: NDArray[np.int64]
+    """(n,) int64: time of gauge 2 minus time of gauge 1."""
     is_paired: NDArray[np.bool_]
+    """(n,) bool: whether both readings exist."""
 
     def __len__(self) -> int:
         return len(self.status)

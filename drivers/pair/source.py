@@ -40,7 +40,6 @@ class PairSource:
 
     Parameters
     ----------
-    driver : DeviceDriver
     channel_sources : tuple of PairedChannel
         Devices of gauge 1 and gauge 2.
     """
@@ -109,12 +108,7 @@ class PairSource:
     def start(self, link: Link) -> bytes:
         """Wait until both devices have sent something; the link starts them.
 
-        Raises
-        ------
-        NoDataError
-            If one of them sends nothing.
-        DriverError
-            As its own source raises it.
+        Raises NoDataError if one of them sends nothing. Raises DriverError as its own source raises it.
         """
         received, unwrapper = b"", Unwrapper()
         silent = set(range(len(self.channel_sources)))
@@ -147,10 +141,7 @@ class PairSource:
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in envelopes
         """Rows completed by `data`, b"" where both connections broke. Exhaust it.
 
-        Raises
-        ------
-        ProtocolError
-            If the rates are not known: the source was not started, and they were not given.
+        Raises ProtocolError if the rates are not known: the source was not started, and they were not given.
         """
         if self._decoder is None:
             rates_hz = self._rates_hz
@@ -190,20 +181,16 @@ def make_pair(
 ) -> PairSource:
     """Source of two devices of one driver.
 
+    Raises SettingsError for a device that has both gauges on one port, or a setting or rate that cannot be.
+
     Parameters
     ----------
-    driver : DeviceDriver
     settings : mapping
         Of both devices; those with the prefix `relative.` are of gauge 2's alone, `relative.rate` its rate.
     rate_hz : float or None
         Samples a second to ask of both.
     recorded_settings : mapping, optional
         `identity.settings` of an earlier recording, to decode it again: they hold its rates.
-
-    Raises
-    ------
-    SettingsError
-        For a device that has both gauges on one port, or a setting or rate that cannot be.
     """
     recorded = recorded_settings or {}
     own = {

@@ -37,40 +37,27 @@ SignalFactory: TypeAlias = Callable[[float, float], Signal]
 
 @dataclass(frozen=True, slots=True)
 class DeviceSetup:
-    """Properties of a simulated device.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Sample rate at power-on (Hz), as the device reports it.
-    clock_ppm : float
-        How much the device's clock is fast (1e-6).
-    rate_error : float
-        Fraction by which it samples faster than it reports; its times are right.
-    first_sequence : int
-        Number of sample 0; it wraps at 2**32.
-    first_time_s : float
-        Device's clock at sample 0 (s).
-    faults : FaultRates
-        Damage to its frames.
-    disturbances : tuple of Disturbance
-        Planned for each session.
-    seed : int or None
-        Makes the damage repeatable.
-    began_ns : int or None
-        Host's monotonic time at which the stand's own time is 0, which makes several devices show one motion;
-        None: the stand's time begins with each session.
-    """
+    """Properties of a simulated device."""
 
     rate_hz: float
+    """Sample rate at power-on (Hz), as the device reports it."""
     clock_ppm: float = 0.0
+    """How much the device's clock is fast (1e-6)."""
     rate_error: float = 0.0
+    """Fraction by which it samples faster than it reports; its times are right."""
     first_sequence: int = 0
+    """Number of sample 0; it wraps at 2**32."""
     first_time_s: float = 0.0
+    """Device's clock at sample 0 (s)."""
     faults: FaultRates = field(default_factory=FaultRates)
+    """Damage to its frames."""
     disturbances: tuple[Disturbance, ...] = ()
+    """Planned for each session."""
     seed: int | None = None
+    """Makes the damage repeatable."""
     began_ns: int | None = None
+    """Host's monotonic time at which the stand's own time is 0, which makes several devices show one motion;
+    None: the stand's time begins with each session."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.first_sequence < _SEQUENCES:
@@ -103,11 +90,8 @@ class SimulatedDevice:
 
     Parameters
     ----------
-    transport : Transport
-    protocol : SimulatedProtocol
     signal_at : callable (rate_hz, started_s)
         See `SignalFactory`.
-    setup : DeviceSetup
     """
 
     _NO_STREAM_S = 0.02
@@ -307,8 +291,6 @@ class RegisterUpdater:
 
     Parameters
     ----------
-    registers : PolledProtocol
-    signal : Signal
     log : TransmissionLog
         Its samples are counted here, its answers as frames by the device.
     started_ns : int

@@ -134,25 +134,13 @@ class DisturbanceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """One disturbance.
-
-    Attributes
-    ----------
-    kind : DisturbanceKind
-    seconds : float or None
-        How long it lasts, None for ever; of a jump, by how much (s), of either sign.
-    at_s : float or None
-        Stand's own time (s), negative before its motion begins; None: at once.
-
-    Raises
-    ------
-    SettingsError
-        For a length that is not positive, or a jump without one.
-    """
+    """One disturbance. Raises SettingsError for a length that is not positive, or a jump without one."""
 
     kind: DisturbanceKind
     seconds: float | None = None
+    """How long it lasts, None for ever; of a jump, by how much (s), of either sign."""
     at_s: float | None = None
+    """Stand's own time (s), negative before its motion begins; None: at once."""
 
     def __post_init__(self) -> None:
         seconds = self.seconds
@@ -180,10 +168,7 @@ _PATTERN = re.compile(rf"({_KINDS})(?:\s+({_NUMBER}))?(?:\s+at\s+({_NUMBER}))?",
 def parse_disturbance(text: str) -> Disturbance:
     """Parse `KIND [SECONDS] [at SECONDS]`, for example `unplug 1.5`, `stall`, `jump -5 at 3`.
 
-    Raises
-    ------
-    SettingsError
-        For anything else.
+    Raises SettingsError for anything else.
     """
     match = _PATTERN.fullmatch(text.strip())
     if match is None:

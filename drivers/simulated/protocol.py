@@ -85,7 +85,6 @@ class SimulatedProtocol(ABC):
         ----------
         first_sequence : int
             Number of the very first sample; the protocol limits its width.
-        counts : (frames * n, 2) int32
         status : (frames * n,) uint8
             `SampleStatus` of each sample.
         times_s : (frames,) float64

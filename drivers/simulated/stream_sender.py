@@ -115,21 +115,14 @@ class WireOutput:
 
 @dataclass(frozen=True, slots=True)
 class DeviceClock:
-    """The device's own clock and counter.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Samples a second of this clock.
-    first_sequence : int
-        Counter of samples at sample 0.
-    first_time_s : float
-        Clock at sample 0 (s).
-    """
+    """The device's own clock and counter."""
 
     rate_hz: float
+    """Samples a second of this clock."""
     first_sequence: int = 0
+    """Counter of samples at sample 0."""
     first_time_s: float = 0.0
+    """Clock at sample 0 (s)."""
 
 
 class StreamSender:
@@ -137,9 +130,6 @@ class StreamSender:
 
     Parameters
     ----------
-    output : WireOutput
-    signal : Signal
-    clock : DeviceClock
     log : TransmissionLog
         Updated with every frame.
     started_ns : int

@@ -114,7 +114,6 @@ class LineDecoder(PacketDecoder):
 
     Parameters
     ----------
-    layout : LineFormat
     rate_hz : float
         Nominal rate, > 0; with a time column the rate of its times (`rate_from_lines`).
     clock_step_s : float

@@ -40,35 +40,23 @@ _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 class LineFormat:
     """Columns of a line and how they are written.
 
-    Attributes
-    ----------
-    columns : tuple of Column
-        From left to right: `table` and `relative` once each, or `value` once of a device with one
-        gauge; at most one time column, one `sequence` and one checksum, which is last; others in any number.
-    separator : str
-        One character; a blank means any number of blanks.
-    decimal : str
-        "." or ",".
-    comment : str
-        First characters of lines that are skipped.
-    time_bits, sequence_bits : int
-        Width of the counters of a time in us or ms and of a sequence, which wrap; 0: they do not wrap.
-    unit : str
-        The word in `unit` columns; "" for any word.
-
-    Raises
-    ------
-    SettingsError
-        If the attributes contradict each other.
+    Raises SettingsError if the attributes contradict each other.
     """
 
     columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
+    """From left to right: `table` and `relative` once each, or `value` once of a device with one gauge; at
+    most one time column, one `sequence` and one checksum, which is last; others in any number."""
     separator: str = ","
+    """One character; a blank means any number of blanks."""
     decimal: str = "."
+    """"." or ","."""
     comment: str = "#%;/"
+    """First characters of lines that are skipped."""
     time_bits: int = 32
+    """Width of the counters of a time in us or ms and of a sequence, which wrap; 0: they do not wrap."""
     sequence_bits: int = 32
     unit: str = ""
+    """The word in `unit` columns; "" for any word."""
 
     def __post_init__(self) -> None:
         _check_columns(self.columns)

@@ -111,14 +111,9 @@ class CsvLinesSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Wait for the first good line, and with a time column for as many as show the rate.
 
-        Opening the port resets many Arduinos, which are silent for two seconds after it.
-
-        Raises
-        ------
-        NoDataError
-            If no good line came in time, or after it too few to show the rate.
-        SettingsError
-            If the rate asked for is not that of the device's own times.
+        Opening the port resets many Arduinos, which are silent for two seconds after it. Raises NoDataError
+        if no good line came in time, or after it too few to show the rate. Raises SettingsError if the rate
+        asked for is not that of the device's own times.
         """
         self.prepare()
         link.read()  # what waited in the port is old, and some of it may be lost
@@ -143,11 +138,7 @@ class CsvLinesSource(StreamSource):
         """Decoder once the layout is known, and the rate is given or shown by the device's own times.
 
         Where both rates are there and disagree, the first lines may be damaged: more of them are awaited.
-
-        Raises
-        ------
-        SettingsError
-            If many lines still disagree, or neither rate can be known.
+        Raises SettingsError if many lines still disagree, or neither rate can be known.
         """
         layout = self._layout = self._layout or self.find_layout(data)
         if layout is None:

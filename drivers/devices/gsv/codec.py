@@ -46,23 +46,14 @@ _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
 class FrameLayout:
     """What all measurement frames of a stream have in common.
 
-    Attributes
-    ----------
-    channels : int
-        Values in a frame, 1 to 16.
-    kind : ValueKind
-    table, relative : int
-        Channels of the two gauges, from 1.
-
-    Raises
-    ------
-    ProtocolError
-        If a gauge's channel is not in the frame.
+    Raises ProtocolError if a gauge's channel is not in the frame.
     """
 
     channels: int
+    """Values in a frame, 1 to 16."""
     kind: ValueKind = ValueKind.FLOAT32
     table: int = 1
+    """Channels of the two gauges, from 1."""
     relative: int = 2
 
     def __post_init__(self) -> None:
@@ -124,7 +115,6 @@ def encode_frames(
 
     Parameters
     ----------
-    layout : FrameLayout
     counts : (n, 2)
         Table and relative; whole numbers are limited to the range of their kind.
     flags : int or (n,) uint8
@@ -165,7 +155,6 @@ class FrameDecoder(PacketDecoder):
 
     Parameters
     ----------
-    layout : FrameLayout
     rate_hz : float
         Nominal rate, > 0.
     max_gap_s : float

@@ -93,10 +93,7 @@ def encode_request(code: Code, parameters: bytes = b"") -> bytes:
 def write_rate(rate_hz: float) -> bytes:
     """Request that sets the samples a second; at most 48 kHz, the highest rate of any GSV.
 
-    Raises
-    ------
-    SettingsError
-        For a rate out of range.
+    Raises SettingsError for a rate out of range.
     """
     if not 0 < rate_hz <= 48_000:
         raise SettingsError(

@@ -64,7 +64,6 @@ class GsvSource(StreamSource):
 
     Parameters
     ----------
-    settings : GsvSettings
     rate_hz : float or None
         Samples a second to set; None accepts those of the device.
     """
@@ -84,12 +83,8 @@ class GsvSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Stop the device, which sends from power-on, set it up, and wait for the first frames.
 
-        Raises
-        ------
-        NoDataError
-            If the device does not answer, or no good frames came within 3 s.
-        ProtocolError
-            If the device does not take a setting, or has not the gauges' channels.
+        Raises NoDataError if the device does not answer, or no good frames came within 3 s. Raises
+        ProtocolError if the device does not take a setting, or has not the gauges' channels.
         """
         self.prepare()
         self._stop(link)
@@ -105,10 +100,7 @@ class GsvSource(StreamSource):
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
         """Decoder once the rate is known and `data` tell how frames are laid out.
 
-        Raises
-        ------
-        ProtocolError
-            If a gauge's channel is not in the frames.
+        Raises ProtocolError if a gauge's channel is not in the frames.
         """
         if self._rate_hz is None:
             return None

@@ -59,7 +59,6 @@ class HarpSource(StreamSource):
 
     Parameters
     ----------
-    settings : HarpSettings
     rate_hz : float
         Samples a second that are expected.
     """
@@ -77,12 +76,8 @@ class HarpSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Stop the device, identify it, start it, and wait for as many events as show the rate.
 
-        Raises
-        ------
-        NoDataError
-            If the device does not answer, or too few events came within 3 s.
-        ProtocolError
-            If it is another Harp device, does not start, or sends at another rate.
+        Raises NoDataError if the device does not answer, or too few events came within 3 s. Raises
+        ProtocolError if it is another Harp device, does not start, or sends at another rate.
         """
         self.prepare()
         self._identify(link)

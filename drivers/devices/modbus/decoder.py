@@ -39,10 +39,8 @@ class ResponseDecoder:
 
     Parameters
     ----------
-    poll : Poll
     columns : tuple of int
         Column of each of its channels: 0 is table, 1 relative.
-    rate_hz : float
     max_gap_s : float
         Longest gap that is believed.
     """

@@ -50,26 +50,17 @@ _EXCEPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request to a unit.
-
-    Attributes
-    ----------
-    unit : int
-        1 to 247.
-    function : Function
-    register : int
-        First register, counted from 0.
-    count : int
-        Registers read or written.
-    values : tuple of int
-        Values to write; none where registers are read.
-    """
+    """A request to a unit."""
 
     unit: int
+    """1 to 247."""
     function: Function
     register: int
+    """First register, counted from 0."""
     count: int = 1
+    """Registers read or written."""
     values: tuple[int, ...] = ()
+    """Values to write; none where registers are read."""
 
     def encode(self) -> bytes:
         """Bytes on the wire."""

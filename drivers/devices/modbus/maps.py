@@ -20,24 +20,16 @@ _PACKAGE = "drivers.devices.modbus"
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
-    """A transmitter, or two on one bus.
-
-    Attributes
-    ----------
-    name : str
-        As given to `--set map=`.
-    title : str
-        For people.
-    caution : str
-        Note for every run that is read by this map; "" for none.
-    channels : dict of str to Channel
-        Of the gauges `table` and `relative`, or of one of them.
-    """
+    """A transmitter, or two on one bus."""
 
     name: str
+    """As given to `--set map=`."""
     title: str
+    """For people."""
     caution: str
+    """Note for every run that is read by this map; "" for none."""
     channels: dict[str, Channel]
+    """Of the gauges `table` and `relative`, or of one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +59,8 @@ def is_map_key(key: str) -> bool:
 def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUGES) -> RegisterMap:
     """Read a shipped map or a file, changed by given values.
 
+    Raises SettingsError names file, key, value and remedy.
+
     Parameters
     ----------
     name : str
@@ -75,11 +69,6 @@ def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUG
         Values by key: `register` for both gauges, `table_register` for one.
     gauges : tuple of str
         Those to read: `table`, `relative` or both.
-
-    Raises
-    ------
-    SettingsError
-        Names file, key, value and remedy.
     """
     where, content = _content(name)
     _check_keys(where, content)

@@ -33,18 +33,12 @@ _MAX_DRAIN_READS = 8
 
 @dataclass(frozen=True, slots=True)
 class Transaction:
-    """A request on the wire, and what came after it.
-
-    Attributes
-    ----------
-    data : bytes
-        All that came; b"" after a time-out.
-    sent_ns, received_ns : int
-        Host's time before the request was written and after the last byte was read.
-    """
+    """A request on the wire, and what came after it."""
 
     data: bytes
+    """All that came; b"" after a time-out."""
     sent_ns: int
+    """Host's time before the request was written and after the last byte was read."""
     received_ns: int
 
     @property

@@ -48,49 +48,31 @@ class ZeroCommand:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The register with the state of a value.
-
-    Attributes
-    ----------
-    register : int
-    overload_bits, fault_bits : tuple of int
-        From 0, the least significant. One of the first marks an overload, one of the second an invalid value.
-    sign_bit : int or None
-        Marks a negative value, whose own sign is then ignored.
-    """
+    """The register with the state of a value."""
 
     register: int
     overload_bits: tuple[int, ...] = ()
+    """From 0, the least significant. One of the first marks an overload, one of the second an invalid
+    value."""
     fault_bits: tuple[int, ...] = ()
     sign_bit: int | None = None
+    """Marks a negative value, whose own sign is then ignored."""
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One gauge.
-
-    Attributes
-    ----------
-    unit : int
-        Address of the transmitter, 1 to 247.
-    function : Function
-        Function that reads it, 3 or 4.
-    register : int
-        First register, counted from 0.
-    kind : ValueType
-    order : ByteOrder
-    scale : float
-        Counts for one step of the value.
-    status : Status or None
-    zeroing : Zeroing or None
-    """
+    """One gauge."""
 
     unit: int
+    """Address of the transmitter, 1 to 247."""
     function: Function
+    """Function that reads it, 3 or 4."""
     register: int
+    """First register, counted from 0."""
     kind: ValueType = ValueType.INT32
     order: ByteOrder = ByteOrder.ABCD
     scale: float = 1.0
+    """Counts for one step of the value."""
     status: Status | None = None
     zero_command: ZeroCommand | None = None
 
@@ -176,21 +158,14 @@ class RegisterLocation:
 
 @dataclass(frozen=True, slots=True)
 class Poll:
-    """One sample of all channels.
-
-    Attributes
-    ----------
-    requests : tuple of Request
-        In the order in which they are sent; one where all registers are adjacent in one unit. The time of
-        the first is that of the sample.
-    channels : tuple of Channel
-    values, states : tuple of Place
-        Of each channel's value and status register (None where it has none).
-    """
+    """One sample of all channels."""
 
     requests: tuple[Request, ...]
+    """In the order in which they are sent; one where all registers are adjacent in one unit. The time of the
+    first is that of the sample."""
     channels: tuple[Channel, ...]
     values: tuple[RegisterLocation, ...]
+    """Of each channel's value and status register (None where it has none)."""
     states: tuple[RegisterLocation | None, ...]
 
     def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:

@@ -71,8 +71,6 @@ class ModbusSource(StreamSource):
 
     Parameters
     ----------
-    settings : ModbusSettings
-    register_map : RegisterMap
     rate_hz : float or None
         Polls a second; None polls as often as the device answers.
     """
@@ -142,12 +140,8 @@ class ModbusSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Wait for a response, zero the device if asked to, and choose or check the rate.
 
-        Raises
-        ------
-        NoDataError
-            If nothing intelligible comes within 3 s.
-        ProtocolError
-            If the device refuses, another one answers, or it is too slow for the rate.
+        Raises NoDataError if nothing intelligible comes within 3 s. Raises ProtocolError if the device
+        refuses, another one answers, or it is too slow for the rate.
         """
         self.prepare()
         self._await_responses(link)
@@ -339,10 +333,7 @@ def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str
 def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, RegisterMap]:
     """Settings of the driver, and the register map that they choose and change.
 
-    Raises
-    ------
-    SettingsError
-        For one that is unknown or cannot be.
+    Raises SettingsError for one that is unknown or cannot be.
     """
     own = {key: value for key, value in settings.items() if not is_map_key(key)}
     known = {field.name for field in msgspec.structs.fields(ModbusSettings)}

@@ -66,10 +66,7 @@ class FirmwareIdentity:
 def encode_rate(rate_hz: float) -> bytes:
     r"""Command that sets the sample rate: `R<hz>\n`, whole hertz.
 
-    Raises
-    ------
-    SettingsError
-        If `rate_hz` is no whole number from 1 to 1,000,000.
+    Raises SettingsError if `rate_hz` is no whole number from 1 to 1,000,000.
     """
     if not (1 <= rate_hz <= _MAX_RATE_HZ and rate_hz == int(rate_hz)):
         raise SettingsError(
@@ -88,10 +85,7 @@ def encode_identity(identity: FirmwareIdentity) -> bytes:
 def find_identity(received: bytes) -> FirmwareIdentity | None:
     """The identity line in `received`, wherever it is; None while it is not complete.
 
-    Raises
-    ------
-    ProtocolError
-        If the device has not two channels.
+    Raises ProtocolError if the device has not two channels.
     """
     match = _IDENTITY.search(received)
     if match is None:
@@ -129,6 +123,8 @@ def encode_frames(
 ) -> NDArray[np.uint8]:
     """Many frames of equal length, as a device without faults sends them.
 
+    Raises ValueError if the samples do not fill the frames.
+
     Parameters
     ----------
     first_index : int
@@ -144,11 +140,6 @@ def encode_frames(
     -------
     (frames, 15 + 8 n) uint8
         A frame a row; `.tobytes()` is what is sent.
-
-    Raises
-    ------
-    ValueError
-        If the samples do not fill the frames.
     """
     frames = len(times_us)
     n, rest = divmod(len(counts), max(frames, 1))

@@ -56,13 +56,8 @@ class SlipstandBinarySource(StreamSource):
         """Stop the device, set it up, start it, and wait for the first good frame.
 
         A device that does not answer `IDENTIFY` is accepted if its frames come; its rate is then measured.
-
-        Raises
-        ------
-        NoDataError
-            If no good frame came within 3 s.
-        ProtocolError
-            If the device does not take the rate, or has not two channels.
+        Raises NoDataError if no good frame came within 3 s. Raises ProtocolError if the device does not take
+        the rate, or has not two channels.
         """
         self.prepare()
         deadline_s = time.monotonic() + self.timeout_s
