@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import msgspec
 import numpy as np
@@ -269,14 +268,6 @@ class TimeBase(msgspec.Struct, frozen=True):
             skew_ms=1e3 * abs(self.skew_s),
             uncertainty_ms=1e3 * (self.skew_standard_uncertainty_s or 0.0),
         )
-
-
-@runtime_checkable
-class HasSkew(Protocol):
-    """A source whose gauges are read one after the other, not by one converter at the same time."""
-
-    def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """Skew of the samples first_index <= index < end_index; None where there is none."""
 
 
 class SkewStatistics:

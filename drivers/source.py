@@ -1,13 +1,16 @@
 """The interfaces between a port, a device and the application."""
 
+import contextlib
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from drivers.clock import Skew
 from drivers.errors import DeviceLostError
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
-from messages.message import Message
+from messages.message import EMPTY, Message
 
 
 class Link(Protocol):
@@ -64,7 +67,7 @@ class CancellableLink:
             raise DeviceLostError("the connection was cancelled: connect again")
 
 
-class SampleSource(Protocol):
+class SampleSource(ABC):
     """One device: its conversation and its decoder.
 
     `start` and `stop` talk to the device. `decode` uses no port, clock or thread, so that recorded bytes are
@@ -74,40 +77,54 @@ class SampleSource(Protocol):
     replay too, and decodes next what `source.resume(link)` returns.
     """
 
-    batch_delay_s: float
+    batch_delay_s = 0.0
     """How long `read` may let bytes collect (s); set by the caller. Polled devices ignore it."""
+    stop_command = b""
+    """What asks the device to stop sending."""
 
     @property
     def channels(self) -> int:
         """Gauges that the device reads, 1 or 2; the column of a missing one is 0."""
+        return 2
 
     @property
+    @abstractmethod
     def identity(self) -> DeviceIdentity:
         """Known after `start`; before it, the protocol alone."""
 
     @property
+    @abstractmethod
     def rate_hz(self) -> float:
-        """Nominal samples a second; known after `start`, or from settings, or from device times."""
+        """Nominal samples a second, from settings, `start` or device times. Raises ProtocolError before."""
 
     @property
+    @abstractmethod
     def losses(self) -> Losses:
         """Counts until now."""
 
     @property
     def run_note(self) -> Message:
         """Remark to store with every run of this device, known after `start`; empty for most."""
+        return EMPTY
 
     def take_warnings(self) -> list[Message]:
         """Warnings about the stream since the last call; to be called after each `decode`."""
+        return []
 
+    def skew(self, first_index: int, end_index: int) -> Skew | None:  # noqa: ARG002
+        """Skew of samples first_index <= index < end_index; None where one converter reads both gauges."""
+        return None
+
+    @abstractmethod
     def prepare(self) -> None:
-        """Compile what decoding needs. `start` does it where it was not done."""
+        """Compile what decoding needs, which takes seconds on the very first use; `start` does it too."""
 
+    @abstractmethod
     def start(self, link: Link) -> bytes:
         """Bring the device into a known state, set it up and start the stream.
 
         Returns what was read of the stream, to be decoded first. Raises NoDataError within about 3 s where
-        nothing intelligible comes.
+        nothing intelligible comes, ProtocolError where the device does not do what is asked.
         """
 
     def resume(self, link: Link) -> bytes:
@@ -115,6 +132,7 @@ class SampleSource(Protocol):
 
         A device that is still sending is left alone: its sequence then proves what is missing.
         """
+        return self.start(link)
 
     def read(self, link: Link) -> bytes:
         """Next bytes to decode, b"" if none came within a fraction of a second.
@@ -122,10 +140,15 @@ class SampleSource(Protocol):
         A polled device is asked once, when its poll is due. One thread may call this while another decodes.
         Raises DeviceLostError.
         """
+        return link.read()
 
     def stop(self, link: Link) -> None:
-        """Ask the device to stop sending. Does not raise where the device is gone."""
+        """Send the stop command, if the device has one; nothing happens where it is gone."""
+        if self.stop_command:
+            with contextlib.suppress(DeviceLostError):
+                link.write(self.stop_command)
 
+    @abstractmethod
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Samples completed by `data`; an unfinished rest of bounded size is kept. Exhaust the iterator.
 

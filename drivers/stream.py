@@ -1,20 +1,19 @@
 """What sources share: settings, the conversation with a device, and decoding once the rate is known."""
 
-import contextlib
 import logging
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Protocol, TypeVar
 
 import msgspec
 
-from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
+from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.port_reader import BatchedReader
 from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
-from drivers.source import Link
-from messages.message import EMPTY, Message, MessageError
+from drivers.source import Link, SampleSource
+from messages.message import MessageError
 
 _log = logging.getLogger(__name__)
 _Settings = TypeVar("_Settings", bound=msgspec.Struct)
@@ -46,7 +45,7 @@ class Decoder(Protocol):
         """Blocks that `data` completes."""
 
 
-class StreamSource(ABC):
+class StreamSource(SampleSource):
     """A `SampleSource` around a decoder that needs to know the rate.
 
     Parameters
@@ -63,9 +62,6 @@ class StreamSource(ABC):
     """How long `start` waits for the first good data."""
     answer_timeout_s = 0.4
     """How long an answer to one request is waited for."""
-    batch_delay_s = 0.0
-    stop_command = b""
-    """What asks the device to stop sending."""
 
     def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:
         self._identity = identity
@@ -76,18 +72,13 @@ class StreamSource(ABC):
         self._reader = BatchedReader()
 
     @property
-    def channels(self) -> int:
-        """See `SampleSource`."""
-        return 2
-
-    @property
     def identity(self) -> DeviceIdentity:
         """See `SampleSource`."""
         return self._identity
 
     @property
     def rate_hz(self) -> float:
-        """Nominal samples a second. Raises ProtocolError while it is not known."""
+        """See `SampleSource`."""
         if self._rate_hz is None:
             raise ProtocolError(
                 "{protocol}: the rate is not known before the first samples", protocol=self._identity.protocol
@@ -99,36 +90,9 @@ class StreamSource(ABC):
         """See `SampleSource`."""
         return self._decoder.losses if self._decoder else Losses()
 
-    @property
-    def run_note(self) -> Message:
-        """See `SampleSource`."""
-        return EMPTY
-
-    def take_warnings(self) -> list[Message]:
-        """See `SampleSource`."""
-        return []
-
-    @abstractmethod
-    def prepare(self) -> None:
-        """See `SampleSource`."""
-
-    @abstractmethod
-    def start(self, link: Link) -> bytes:
-        """See `SampleSource`."""
-
-    def resume(self, link: Link) -> bytes:
-        """See `SampleSource`."""
-        return self.start(link)
-
     def read(self, link: Link) -> bytes:
         """See `SampleSource`."""
         return self._reader.read(link, self.batch_delay_s)
-
-    def stop(self, link: Link) -> None:
-        """Send the stop command; nothing happens where the device is gone."""
-        if self.stop_command:
-            with contextlib.suppress(DeviceLostError):
-                link.write(self.stop_command)
 
     @abstractmethod
     def make_decoder(self, data: bytes) -> Decoder | None:

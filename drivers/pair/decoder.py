@@ -86,7 +86,7 @@ class PairDecoder:
         )
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `drivers.clock.HasSkew`."""
+        """See `SampleSource`."""
         return self._skew_statistics.skew(first_index, end_index)
 
     def take_warnings(self) -> list[Message]:

@@ -10,7 +10,7 @@ from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.host_time import ActiveTimer
 from drivers.pair.decoder import PairDecoder, PairedChannel, choose_base_gauge
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
-from drivers.source import Link
+from drivers.source import Link, SampleSource
 from messages.message import Message, joined
 
 _OWN_PREFIX = "relative."
@@ -35,8 +35,10 @@ class PolledSource(Protocol):
         """Change the rate of polls."""
 
 
-class PairSource:
+class PairSource(SampleSource):
     """Rows of both gauges, from enveloped reads of two ports (`drivers.pair.link.PairLink`).
+
+    The threads of the ports collect bytes, not this source. The link starts and stops the devices.
 
     Parameters
     ----------
@@ -44,9 +46,6 @@ class PairSource:
         Devices of gauge 1 and gauge 2.
     """
 
-    batch_delay_s = 0.0
-    """See `drivers.source.SampleSource`. The threads of the ports collect bytes, not this source."""
-    channels = 2
     timeout_s = 8.0
     """How long `start` waits for both devices."""
 
@@ -92,7 +91,7 @@ class PairSource:
         return joined(list({str(note): note for note in notes if note}.values()), "; ")
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `drivers.clock.HasSkew`."""
+        """See `SampleSource`."""
         return self._decoder.skew(first_index, end_index) if self._decoder else None
 
     def take_warnings(self) -> list[Message]:
@@ -126,17 +125,6 @@ class PairSource:
         if self._decoder is None:
             self._synchronise_polling()
         return received
-
-    def resume(self, link: Link) -> bytes:
-        """Continue with devices that were lost and found again; see `start`."""
-        return self.start(link)
-
-    def read(self, link: Link) -> bytes:
-        """What came from either port."""
-        return link.read()
-
-    def stop(self, link: Link) -> None:
-        """The link stops both devices when it is closed."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in envelopes
         """Rows completed by `data`, b"" where both connections broke. Exhaust it.

@@ -17,7 +17,7 @@ from drivers.simulated.faults import (
     FaultRates,
     FrameDamager,
 )
-from drivers.simulated.protocol import Command, CommandKind, PolledProtocol, SimulatedProtocol
+from drivers.simulated.protocol import Command, CommandKind, CommandParser, PolledProtocol, SimulatedProtocol
 from drivers.simulated.stream_sender import (
     DeviceClock,
     Signal,
@@ -107,7 +107,7 @@ class SimulatedDevice:
         self._schedule = DisturbanceSchedule(setup.disturbances)
         damager = FrameDamager(setup.faults, protocol.line_end, setup.seed)
         self._output = WireOutput(transport, protocol, damager, self._schedule)
-        self._parser = protocol.command_parser()
+        self._parser = CommandParser(protocol.find_commands)
         self._has_reader = False
         self._cable_fault: DisturbanceKind | None = None
         self._stream: Stream | None = None
@@ -183,7 +183,7 @@ class SimulatedDevice:
     def _receive(self, received: bytes, now_ns: int) -> None:
         if not self._has_reader:
             self._has_reader = True
-            self._parser = self._protocol.command_parser()
+            self._parser = CommandParser(self._protocol.find_commands)
             if self._protocol.streams_on_open and self._stream is None:
                 was_interrupted = self._was_interrupted
                 self._start(now_ns)

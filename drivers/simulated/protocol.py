@@ -1,9 +1,9 @@
 """The device's side of a protocol: how a simulated device encodes samples and answers commands."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,19 +33,23 @@ class Command:
     parameters: bytes = b""
 
 
-class CommandParser(Protocol):
-    """Finds the commands of a protocol in received bytes."""
+_MAX_UNFINISHED_BYTES = 256
+"""No command of any device is longer."""
+
+
+class CommandParser:
+    """Finds the commands of a protocol in bytes in any cut; other bytes are skipped."""
+
+    def __init__(self, find: Callable[[bytes], tuple[list[Command], int]]) -> None:
+        self._find = find
+        self._unfinished = b""
 
     def feed(self, data: bytes) -> list[Command]:
-        """Commands completed by `data`, which may be cut anywhere."""
-
-
-class NullCommandParser:
-    """For a device that takes no commands."""
-
-    def feed(self, data: bytes) -> list[Command]:  # noqa: ARG002
-        """No commands."""
-        return []
+        """Commands completed by `data`."""
+        data = self._unfinished + data
+        commands, used = self._find(data)
+        self._unfinished = data[used:][-_MAX_UNFINISHED_BYTES:]
+        return commands
 
 
 class SimulatedProtocol(ABC):
@@ -59,13 +63,13 @@ class SimulatedProtocol(ABC):
     flags_overload = False
     """Whether a frame says that one of its readings is clipped."""
 
-    @abstractmethod
-    def command_parser(self) -> CommandParser:
-        """A new parser for what a reader sends."""
+    def find_commands(self, data: bytes) -> tuple[list[Command], int]:
+        """Whole commands in `data`, and the number of bytes that were used; the rest may begin a command."""
+        return [], len(data)
 
-    @abstractmethod
-    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Answer to a command that the device did or could not do, at its rate (Hz); b"" for none."""
+        return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - most have one
         """Samples in each frame at this rate."""

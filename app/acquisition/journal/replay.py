@@ -13,7 +13,7 @@ from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.acquisition.stream.connection import create_source
 from app.acquisition.stream.reads import losses_between
 from app.runs.journal import JournalRecord, RecordKind, read_journal
-from drivers.clock import HasSkew, Skew
+from drivers.clock import Skew
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
 from drivers.source import SampleSource
@@ -121,8 +121,6 @@ class Replay:
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """How much later gauge 2 was read than gauge 1 in these samples; None if they were read at once."""
         offset = self._offset or 0
-        if not isinstance(self._source, HasSkew):
-            return None
         return self._source.skew(first_index - offset, end_index - offset)
 
     def _take_note(self, data: bytes) -> None:

@@ -13,7 +13,7 @@ from app.acquisition.stream.connection import Connection, Reconnection, create_o
 from app.acquisition.stream.monitors import RateMonitor, StallDetector
 from app.acquisition.stream.reads import DecodedRead, RawRead, ReadQueue, losses_between
 from config.schema import Gauges
-from drivers.clock import ClockEstimate, HasSkew, TimeBase
+from drivers.clock import ClockEstimate, TimeBase
 from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostMonitor
 from drivers.port import OpenPort
@@ -197,9 +197,7 @@ class LiveStream:
     def time_base(self, first_index: int, end_index: int, *, recent: bool = False) -> TimeBase:
         """Time base of the samples first_index <= index < end_index; `recent` as in `recent_clock`."""
         clock = self.recent_clock() if recent else self.clock()
-        source = self._source
-        skew = source.skew(first_index, end_index) if isinstance(source, HasSkew) else None
-        return TimeBase.from_estimates(clock, skew)
+        return TimeBase.from_estimates(clock, self._source.skew(first_index, end_index))
 
     def take_events(self) -> list[StreamEvent]:
         """What has happened to the stream since the last call."""

@@ -7,7 +7,7 @@ from drivers.devices.csv_lines import DRIVER
 from drivers.devices.csv_lines.codec import encode_lines
 from drivers.devices.csv_lines.columns import LineFormat
 from drivers.devices.csv_lines.source import CsvSettings
-from drivers.simulated.protocol import Command, NullCommandParser, SimulatedProtocol
+from drivers.simulated.protocol import SimulatedProtocol
 from drivers.stream import parse_settings
 
 
@@ -19,14 +19,6 @@ class SimulatedCsv(SimulatedProtocol):
 
     def __init__(self, layout: LineFormat | None = None) -> None:
         self._layout = layout or LineFormat()
-
-    def command_parser(self) -> NullCommandParser:
-        """It takes no commands."""
-        return NullCommandParser()
-
-    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
-        """Nothing."""
-        return b""
 
     def encode(
         self,

@@ -33,30 +33,22 @@ _FLOAT = set_float()[3:-1]
 _KINDS = {Code.START: CommandKind.START, Code.STOP: CommandKind.STOP, Code.WRITE_RATE: CommandKind.RATE}
 
 
-class GsvCommandParser:
-    """Requests in bytes in any cut; other bytes are skipped."""
-
-    def __init__(self) -> None:
-        self._unfinished = b""
-
-    def feed(self, data: bytes) -> list[Command]:
-        """Requests completed by `data`."""
-        data = self._unfinished + data
-        commands = []
-        at = data.find(SYNC)
-        while 0 <= at <= len(data) - _MIN_REQUEST_BYTES:
-            end = at + _MIN_REQUEST_BYTES + (data[at + 1] & LENGTH)
-            if data[at + 1] & ~LENGTH != REQUEST:
-                at = data.find(SYNC, at + 1)
-            elif end > len(data):
-                break
-            elif data[end - 1] != END:
-                at = data.find(SYNC, at + 1)
-            else:
-                commands.append(_command(data[at + 2], data[at + 3 : end - 1]))
-                at = data.find(SYNC, end)
-        self._unfinished = data[at:] if at >= 0 else b""
-        return commands
+def find_commands(data: bytes) -> tuple[list[Command], int]:
+    """Requests in `data`; see `SimulatedProtocol`."""
+    commands = []
+    at = data.find(SYNC)
+    while 0 <= at <= len(data) - _MIN_REQUEST_BYTES:
+        end = at + _MIN_REQUEST_BYTES + (data[at + 1] & LENGTH)
+        if data[at + 1] & ~LENGTH != REQUEST:
+            at = data.find(SYNC, at + 1)
+        elif end > len(data):
+            break
+        elif data[end - 1] != END:
+            at = data.find(SYNC, at + 1)
+        else:
+            commands.append(_command(data[at + 2], data[at + 3 : end - 1]))
+            at = data.find(SYNC, end)
+    return commands, at if at >= 0 else len(data)
 
 
 def _command(code: int, parameters: bytes) -> Command:
@@ -75,16 +67,13 @@ class SimulatedGsv(SimulatedProtocol):
     streams_on_open = True
     max_rate_hz = MAX_RATE_HZ
     flags_overload = True
+    find_commands = staticmethod(find_commands)
 
     def __init__(self, settings: GsvSettings) -> None:
         self._channels = (settings.table, settings.relative)
         self._kind = ValueKind.FLOAT32 if settings.format == "float32" else ValueKind.INT24
         self._last = np.zeros(2)
         self._zero = np.zeros(2)
-
-    def command_parser(self) -> GsvCommandParser:
-        """See `SimulatedProtocol`."""
-        return GsvCommandParser()
 
     def encode(
         self,

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from drivers.devices.harp import DRIVER
 from drivers.devices.harp.codec import (
     ERROR,
-    MAX_MESSAGE_BYTES,
     PAYLOAD_TYPES,
     READ,
     TICKS_PER_S,
@@ -32,18 +31,10 @@ _STANDBY = 0xE0
 _ALL_EVENTS = 0x0F
 
 
-class HarpCommandParser:
-    """Requests in bytes in any cut; other bytes are skipped."""
-
-    def __init__(self) -> None:
-        self._unfinished = b""
-
-    def feed(self, data: bytes) -> list[Command]:
-        """Requests completed by `data`; `parameters` are their type and payload."""
-        data = self._unfinished + data
-        messages, used = find_messages(data)
-        self._unfinished = data[used:][-MAX_MESSAGE_BYTES:]
-        return [_command(message) for message in messages if message.kind in (READ, WRITE)]
+def find_commands(data: bytes) -> tuple[list[Command], int]:
+    """Requests in `data`, their type and payload as `parameters`; see `SimulatedProtocol`."""
+    messages, used = find_messages(data)
+    return [_command(message) for message in messages if message.kind in (READ, WRITE)], used
 
 
 def _command(message: HarpMessage) -> Command:
@@ -57,6 +48,7 @@ class SimulatedHarp(SimulatedProtocol):
     """Sends an event a sample. Readings are limited to 16 bits and show as overload there."""
 
     max_rate_hz = MAX_RATE_HZ
+    find_commands = staticmethod(find_commands)
 
     def __init__(self, settings: HarpSettings) -> None:
         self._channels = (settings.table, settings.relative)
@@ -70,10 +62,6 @@ class SimulatedHarp(SimulatedProtocol):
             Register.ACQUISITION: 0,
             Register.EVENTS: _ALL_EVENTS,
         }
-
-    def command_parser(self) -> HarpCommandParser:
-        """See `SimulatedProtocol`."""
-        return HarpCommandParser()
 
     def encode(
         self,

@@ -74,7 +74,7 @@ class ResponseDecoder:
         return self._unwrapper.unfinished_bytes
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `drivers.clock.HasSkew`; None where one request reads both gauges."""
+        """See `SampleSource`; None where one request reads both gauges."""
         return self._skew_statistics.skew(first_index, end_index) if self._skew_statistics else None
 
     def expect_restart(self) -> None:

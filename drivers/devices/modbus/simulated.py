@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from drivers.devices.modbus import DRIVER
 from drivers.devices.modbus.frames import (
-    LONGEST,
     MAX_REGISTERS,
     READ_FUNCTIONS,
     WRITE_FUNCTIONS,
@@ -33,25 +32,17 @@ _READ_BYTES = 8
 _OVERLOADS = {"table": SampleStatus.OVERLOAD_TABLE, "relative": SampleStatus.OVERLOAD_RELATIVE}
 
 
-class ModbusCommandParser:
-    """Requests in bytes in any cut; other bytes are skipped one by one."""
-
-    def __init__(self) -> None:
-        self._unfinished = b""
-
-    def feed(self, data: bytes) -> list[Command]:
-        """Requests completed by `data`: `code` is the unit, `parameters` are all from the function on."""
-        data = self._unfinished + data
-        commands, at = [], 0
-        while (size := _request_bytes(data, at)) and at + size <= len(data):
-            frame = data[at : at + size]
-            if with_crc(frame[:-2]) == frame:
-                commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
-                at += size
-            else:
-                at += 1
-        self._unfinished = data[at:][-LONGEST:]
-        return commands
+def find_commands(data: bytes) -> tuple[list[Command], int]:
+    """Requests in `data`: `code` is the unit, `parameters` are all from the function on."""
+    commands, at = [], 0
+    while (size := _request_bytes(data, at)) and at + size <= len(data):
+        frame = data[at : at + size]
+        if with_crc(frame[:-2]) == frame:
+            commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
+            at += size
+        else:
+            at += 1
+    return commands, at
 
 
 def _request_bytes(data: bytes, at: int) -> int:
@@ -71,6 +62,7 @@ class SimulatedModbus(PolledProtocol):
     """
 
     max_rate_hz = MAX_RATE_HZ
+    find_commands = staticmethod(find_commands)
     byte_s = _BITS_PER_BYTE / DRIVER.default_baud
     turnaround_s = _TURNAROUND_S
 
@@ -80,10 +72,6 @@ class SimulatedModbus(PolledProtocol):
         self._latest = dict.fromkeys(GAUGES, 0)
         self._zero = dict.fromkeys(GAUGES, 0)
         self.store_sample(np.zeros(2, dtype=np.int32), 0)
-
-    def command_parser(self) -> ModbusCommandParser:
-        """See `SimulatedProtocol`."""
-        return ModbusCommandParser()
 
     def request_bytes(self, command: Command) -> int:
         """See `PolledProtocol`."""

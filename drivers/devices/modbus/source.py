@@ -126,7 +126,7 @@ class ModbusSource(StreamSource):
         return joined(parts, "; ")
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `drivers.clock.HasSkew`; None where one request reads both gauges."""
+        """See `SampleSource`; None where one request reads both gauges."""
         decoder = self._decoder
         return decoder.skew(first_index, end_index) if isinstance(decoder, ResponseDecoder) else None
 

@@ -19,25 +19,12 @@ from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
 from drivers.stream import parse_settings
 
 FIRMWARE = "simulated-1"
-_MAX_COMMAND_BYTES = 16
 _COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
 _KINDS = {b"S": CommandKind.START, b"P": CommandKind.STOP, b"I": CommandKind.IDENTIFY}
 
 
-class FirmwareCommandParser:
-    """Commands of the reference firmware in bytes in any cut; other bytes are skipped."""
-
-    def __init__(self) -> None:
-        self._unfinished = b""
-
-    def feed(self, data: bytes) -> list[Command]:
-        """Commands completed by `data`."""
-        text = self._unfinished + data
-        matches = list(_COMMAND.finditer(text))
-        end = matches[-1].end() if matches else 0
-        unfinished = text.rfind(b"R", end)
-        self._unfinished = text[unfinished:][:_MAX_COMMAND_BYTES] if unfinished >= 0 else b""
-        return [Command(CommandKind.RATE, float(m[1])) if m[1] else Command(_KINDS[m[0]]) for m in matches]
+def _command(match: re.Match[bytes]) -> Command:
+    return Command(CommandKind.RATE, float(match[1])) if match[1] else Command(_KINDS[match[0]])
 
 
 class SimulatedBinary(SimulatedProtocol):
@@ -45,9 +32,14 @@ class SimulatedBinary(SimulatedProtocol):
 
     flags_overload = True
 
-    def command_parser(self) -> FirmwareCommandParser:
+    def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         """See `SimulatedProtocol`."""
-        return FirmwareCommandParser()
+        matches = list(_COMMAND.finditer(data))
+        unfinished = data.rfind(b"R", matches[-1].end() if matches else 0)
+        commands = [
+            Command(CommandKind.RATE, float(m[1])) if m[1] else Command(_KINDS[m[0]]) for m in matches
+        ]
+        return commands, unfinished if unfinished >= 0 else len(data)
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Answer `IDENTIFY`; other commands have no answer."""

@@ -16,10 +16,11 @@ from drivers.devices.gsv.commands import (
     set_zero,
     write_rate,
 )
-from drivers.devices.gsv.simulated import GsvCommandParser, SimulatedGsv
+from drivers.devices.gsv.simulated import SimulatedGsv, find_commands
 from drivers.devices.gsv.source import GsvSettings
 from drivers.registry import find_driver
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
+from drivers.simulated.protocol import CommandParser
 
 
 def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> bytes:
@@ -118,7 +119,7 @@ def test_a_device_left_at_whole_numbers_changes_to_floats_when_told(wire):
 
 
 def test_a_reader_keeps_little_of_what_is_no_request():
-    reader = GsvCommandParser()
+    reader = CommandParser(find_commands)
     for _ in range(100):
         assert reader.feed(b"\xaa\x9fno request" * 20) == []
         assert len(reader._unfinished) < 20

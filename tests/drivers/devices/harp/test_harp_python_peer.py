@@ -5,9 +5,9 @@ import pytest
 
 from drivers.devices.harp.codec import EventDecoder, encode_events, encode_start, encode_stop, encode_write
 from drivers.devices.harp.codec import Register as OurRegister
-from drivers.devices.harp.simulated import HarpCommandParser, SimulatedHarp
+from drivers.devices.harp.simulated import SimulatedHarp, find_commands
 from drivers.devices.harp.source import HarpSettings
-from drivers.simulated.protocol import Command
+from drivers.simulated.protocol import Command, CommandParser
 
 harp = pytest.importorskip("harp.io", reason="harp-python is not installed")
 
@@ -45,7 +45,7 @@ def test_we_decode_what_the_peer_writes():
 )
 def test_the_peer_reads_our_replies(request_bytes, kind):
     device = SimulatedHarp(HarpSettings())
-    (command,) = HarpCommandParser().feed(request_bytes)
+    (command,) = CommandParser(find_commands).feed(request_bytes)
     reply = device.respond(command, True, 1000.0)
     said = harp.read(reply, address=command.code, dtype=np.dtype(np.uint8), length=1, keep_type=True)
     assert said["MessageType"].tolist() == [kind]

@@ -14,11 +14,11 @@ from drivers.devices.harp.codec import (
     encode_stop,
     encode_write,
 )
-from drivers.devices.harp.simulated import HarpCommandParser, SimulatedHarp
+from drivers.devices.harp.simulated import SimulatedHarp, find_commands
 from drivers.devices.harp.source import HarpSettings, HarpSource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.samples import DeviceIdentity
-from drivers.simulated.protocol import CommandKind
+from drivers.simulated.protocol import CommandKind, CommandParser
 
 EVENTS = 800
 
@@ -34,7 +34,7 @@ class Firmware:
     def __init__(self, rate_hz: float = 1000.0) -> None:
         self._device, self._listener, self._rate_hz = (
             SimulatedHarp(HarpSettings()),
-            HarpCommandParser(),
+            CommandParser(find_commands),
             rate_hz,
         )
 

@@ -8,10 +8,11 @@ from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import Request, encode_read_response
 from drivers.devices.modbus.maps import GAUGES
 from drivers.devices.modbus.registers import Poll, plan_poll
-from drivers.devices.modbus.simulated import ModbusCommandParser, SimulatedModbus
+from drivers.devices.modbus.simulated import SimulatedModbus, find_commands
 from drivers.devices.modbus.source import read_modbus_settings
 from drivers.errors import DeviceLostError
 from drivers.samples import SampleBlock
+from drivers.simulated.protocol import CommandParser
 
 COUNTS = np.array([70_000, -80_000], dtype=np.int32)
 
@@ -51,7 +52,7 @@ class Transmitter:
         self._clock = clock
         self.registers = SimulatedModbus(read_modbus_settings(settings)[1])
         self.registers.store_sample(COUNTS, 0)
-        self._listener = ModbusCommandParser()
+        self._listener = CommandParser(find_commands)
         self.waiting = b""
         self.sent: list[bytes] = []
         self.is_lost = False

@@ -4,10 +4,12 @@ from modbus_kit import COUNTS, Clock, Transmitter
 from wire_helpers import join
 
 from drivers.devices.modbus.frames import Function, Request, encode_exception, parse_response, with_crc
+from drivers.devices.modbus.simulated import find_commands
 from drivers.devices.modbus.source import ModbusSource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity, Losses
+from drivers.simulated.protocol import CommandParser
 
 READ = Request(1, Function.READ_HOLDING, 0, 4)
 
@@ -222,9 +224,8 @@ def test_a_late_answer_is_not_that_of_the_next_request(clock):
 
 
 def _asked(request: Request):
-    from drivers.devices.modbus.simulated import ModbusCommandParser
 
-    (command,) = ModbusCommandParser().feed(request.encode())
+    (command,) = CommandParser(find_commands).feed(request.encode())
     return command, True, 0.0
 
 

@@ -13,11 +13,12 @@ from drivers.devices.modbus.frames import (
     parse_response,
     with_crc,
 )
-from drivers.devices.modbus.simulated import ModbusCommandParser
+from drivers.devices.modbus.simulated import find_commands
 from drivers.errors import SettingsError
 from drivers.registry import find_driver
 from drivers.simulated.device import DeviceSetup, PolledDevice, SimulatedDevice, make_device
 from drivers.simulated.faults import FaultRates, parse_disturbance
+from drivers.simulated.protocol import CommandParser
 
 READ = Request(1, Function.READ_HOLDING, 0, 4)
 RATE_HZ = 1000.0
@@ -71,7 +72,7 @@ def test_requests_in_any_cut_and_behind_rubbish():
 
 
 def test_what_a_listener_keeps_is_bounded():
-    listener = ModbusCommandParser()
+    listener = CommandParser(find_commands)
     assert listener.feed(bytes(100_000)) == []
     assert len(listener._unfinished) <= 256
     assert len(listener.feed(READ.encode())) == 1
