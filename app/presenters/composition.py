@@ -2,12 +2,11 @@
 
 import datetime
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import PortSettings
-from app.presenters.connection import Connection, Engine, Simulation
+from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import StandContext
@@ -18,12 +17,10 @@ from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import Truth
 from config.files import (
     load_gauges,
     load_settings,
     load_stand,
-    published_row,
     published_table,
     save_settings,
     settings_file,
@@ -47,7 +44,7 @@ def read_personal() -> PersonalSettings:
         SettingsFile(N_("Gauges"), str(settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return PersonalSettings(settings, fault, str(recordings), overridden, files, _SettingsStore())
+    return PersonalSettings(settings, fault, str(recordings), overridden, files, _save)
 
 
 def make_window_presenter(
@@ -57,13 +54,7 @@ def make_window_presenter(
 ) -> WindowPresenter:
     """Make the presenters of the window, not connected to a device. Raises ConfigError.
 
-    Parameters
-    ----------
-    simulation : SimulatedStandOptions, optional
-        Options of the simulated stand that Start offers.
-    personal : PersonalSettings, optional
-        Read unless given.
-    errors : ErrorReporter, optional
+    Start offers a simulated stand with options `simulation`. Settings are read unless `personal` is given.
     """
     simulation = simulation or SimulatedStandOptions()
     personal = personal or read_personal()
@@ -71,7 +62,7 @@ def make_window_presenter(
     stand, gauges = load_stand(), load_gauges()
     context = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
-        Connection(ProcessLauncher(), errors.report),
+        Connection(start_engine, SimulatedStand.start, errors.report),
         Workers.sharing(errors.report),
         WindowContext(
             context,
@@ -85,11 +76,8 @@ def make_window_presenter(
     )
 
 
-class _SettingsStore:
-    """Stores settings in the person's file."""
-
-    def save(self, settings: Settings) -> Path | None:
-        return save_settings(settings, datetime.datetime.now().astimezone().date())
+def _save(settings: Settings) -> Path | None:
+    return save_settings(settings, datetime.datetime.now().astimezone().date())
 
 
 def list_port_choices() -> tuple[PortChoice, ...]:
@@ -124,53 +112,10 @@ def _protocols() -> tuple[ProtocolChoice, ...]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessLauncher:
-    """Starts processes of this installation."""
+def start_engine(port: PortSettings) -> EngineClient:
+    """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
 
-    def engine(self, port: PortSettings) -> Engine:
-        """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
-
-        It takes the settings that are in use now: a calibration may have been made meanwhile.
-        """
-        stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
-        return EngineClient.start(port, stand, gauges, low_latency=True)
-
-    def simulation(self, options: SimulatedStandOptions) -> Simulation:
-        """Start a simulated stand. Raises SimulatedStandError, ConfigError."""
-        row = published_row(options.series)
-        friction = row.friction_dynamic if options.friction is None else options.friction
-        return RunningStand(SimulatedStand.start(options), options, friction)
-
-
-@dataclass(frozen=True, slots=True)
-class RunningStand:
-    """A simulated stand with what a reader of it must know."""
-
-    _stand: SimulatedStand
-    _options: SimulatedStandOptions
-    true_friction: float
-
-    @property
-    def port(self) -> PortSettings:
-        """How to read it."""
-        return PortSettings(
-            url=self._stand.port, protocol=self._options.protocol, device=self._options.device
-        )
-
-    @property
-    def series(self) -> str:
-        """What it runs."""
-        return self._options.series
-
-    def truth(self) -> Truth:
-        """What is true of it, as last told."""
-        return self._stand.truth()
-
-    def disturb(self, text: str) -> None:
-        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
-        self._stand.disturb(text)
-
-    def stop(self) -> None:
-        """End it."""
-        self._stand.stop()
+    It takes the settings that are in use now: a calibration may have been made meanwhile.
+    """
+    stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
+    return EngineClient.start(port, stand, gauges, low_latency=True)

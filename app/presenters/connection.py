@@ -1,71 +1,23 @@
 """Connection of the window: an engine, and the simulated stand if that is the device."""
 
-import contextlib
+import logging
 import queue
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Command, Event, Failed, PortSettings
 from app.acquisition.ring import RingRows
 from app.presenters.error_reports import ErrorReport, error_report
+from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import Truth
-from messages.i18n import gettext
-from messages.message import message_of
+from config.files import published_row
+from messages.message import message, message_of
 
-
-class Engine(Protocol):
-    """A running acquisition engine."""
-
-    def send(self, command: Command) -> None:
-        """Send a command."""
-
-    def poll(self) -> list[Event]:
-        """Events since the last call."""
-
-    def new_rows(self) -> RingRows | None:
-        """Samples since the last call; None without any."""
-
-    def close(self) -> None:
-        """Finish a run that is being recorded, and end the engine."""
-
-
-class Simulation(Protocol):
-    """A running simulated stand."""
-
-    @property
-    def port(self) -> PortSettings:
-        """Settings to connect to it."""
-
-    @property
-    def series(self) -> str:
-        """Code of its series."""
-
-    @property
-    def true_friction(self) -> float:
-        """Its f_d."""
-
-    def truth(self) -> Truth:
-        """True values and events of the stand, as last reported."""
-
-    def disturb(self, text: str) -> None:
-        """Disturb it. Raises SettingsError, SimulatedStandError."""
-
-    def stop(self) -> None:
-        """End it."""
-
-
-class Launcher(Protocol):
-    """Starts processes; a call may take seconds and is made outside the thread of the window."""
-
-    def engine(self, port: PortSettings) -> Engine:
-        """Start an engine that connects to `port`."""
-
-    def simulation(self, options: SimulatedStandOptions) -> Simulation:
-        """Start a simulated stand."""
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,25 +30,29 @@ class SimulationStarted:
 
 @dataclass(slots=True)
 class _Opened:
-    engine: Engine
-    simulation: Simulation | None = None
+    engine: EngineClient
+    stand: SimulatedStand | None = None
+    started: SimulationStarted | None = None
 
 
 class Connection:
     """One connection at a time. No method but `close` waits; `poll` returns what has happened.
 
-    Parameters
-    ----------
-    launcher : Launcher
-    report_error : callable
-        Takes errors of ending engine and stand; called from another thread.
+    `start_engine` and `start_stand` may take seconds: they are called in another thread, as is `report_error`
+    with errors of ending engine and stand.
     """
 
     CLOSE_S = 240.0
     """Longer than an engine takes to give up storing a run: three minutes."""
 
-    def __init__(self, launcher: Launcher, report_error: Callable[[ErrorReport], None]) -> None:
-        self._launcher = launcher
+    def __init__(
+        self,
+        start_engine: Callable[[PortSettings], EngineClient],
+        start_stand: Callable[[SimulatedStandOptions], SimulatedStand],
+        report_error: Callable[[ErrorReport], None],
+    ) -> None:
+        self._start_engine = start_engine
+        self._start_stand = start_stand
         self._report_error = report_error
         self._background = DaemonExecutor("slipstand-session")
         self._opening: Future[_Opened] | None = None
@@ -110,12 +66,12 @@ class Connection:
 
     def open_port(self, port: PortSettings) -> None:
         """Replace the connection by one to a port, in the background."""
-        self._open(lambda: _Opened(self._launcher.engine(port)))
+        self._open(lambda: _Opened(self._start_engine(port)))
 
     @property
-    def simulation(self) -> Simulation | None:
+    def stand(self) -> SimulatedStand | None:
         """Simulated stand that is connected; None without one."""
-        return None if self._opened is None else self._opened.simulation
+        return None if self._opened is None else self._opened.stand
 
     def open_simulated(self, options: SimulatedStandOptions) -> None:
         """Start a simulated stand in the background and connect to it."""
@@ -128,7 +84,7 @@ class Connection:
             return started
         events: list[Event | SimulationStarted] = [*started, *self._opened.engine.poll()]
         if any(isinstance(event, Failed) for event in events):
-            self._disconnect()
+            self.disconnect()
         return events
 
     def send(self, command: Command) -> None:
@@ -149,30 +105,42 @@ class Connection:
         self._listeners.append(listener)
 
     def disconnect(self) -> None:
-        """End the connection in the background; a run in progress is finished and kept."""
-        self._disconnect()
+        """End the connection in the background; a run in progress is finished and kept.
+
+        A connection that is being opened is ended as soon as it is open.
+        """
+        opening, opened = self._opening, self._opened
+        self._opening = self._opened = None
+        if opening is not None:
+            self._background.submit(lambda: self._end_opening(opening))
+        if opened is not None:
+            self._background.submit(lambda: self._end(opened))
 
     def close(self) -> None:
         """End the connection and wait until it has ended, at most `CLOSE_S`."""
-        self._disconnect()
+        self.disconnect()
         if not self._background.close(self.CLOSE_S):
-            words = gettext(
+            late = message(
                 "Engine or simulated stand did not end within {seconds} s. Runs that are left unfinished"
                 " are offered for recovery at the next start",
                 seconds=f"{self.CLOSE_S:g}",
             )
-            self._report_error(ErrorReport(words, words))
+            self._report_error(ErrorReport(late, str(late)))
 
     def _open(self, open_it: Callable[[], _Opened]) -> None:
-        self._disconnect()
+        self.disconnect()
         self._opening = self._background.submit(open_it)
 
     def _simulate(self, options: SimulatedStandOptions) -> _Opened:
-        simulation = self._launcher.simulation(options)
+        stand = self._start_stand(options)
         try:
-            return _Opened(self._launcher.engine(simulation.port), simulation)
+            friction = options.friction
+            if friction is None:
+                friction = published_row(options.series).friction_dynamic
+            port = PortSettings(url=stand.port, protocol=options.protocol, device=options.device)
+            return _Opened(self._start_engine(port), stand, SimulationStarted(options.series, friction))
         except BaseException:
-            simulation.stop()
+            stand.stop()
             raise
 
     def _take_opened(self) -> list[Event | SimulationStarted]:
@@ -182,54 +150,32 @@ class Connection:
         opening, self._opening = self._opening, None
         error = opening.exception()
         if error is not None:
+            _log.error("no connection: %s", error)
             return [Failed(message_of(error))]
         self._opened = opening.result()
-        simulation = self._opened.simulation
-        return [] if simulation is None else [SimulationStarted(simulation.series, simulation.true_friction)]
-
-    def _disconnect(self) -> None:
-        """End the open connection, and one that is being opened as soon as it is open."""
-        opening, opened = self._opening, self._opened
-        self._opening = self._opened = None
-        if opening is not None:
-            self._background.submit(lambda: self._end_opening(opening))
-        if opened is not None:
-            self._background.submit(lambda: self._end(opened))
+        return [] if self._opened.started is None else [self._opened.started]
 
     def _end_opening(self, opening: Future[_Opened]) -> None:
-        """In the background: end a connection that was opened too late; a failed one is ignored."""
         if opening.exception() is None:
             self._end(opening.result())
 
     def _end(self, opened: _Opened) -> None:
-        """In the background: end engine and stand, each whether or not the other fails."""
-        with self._errors_reported():
-            opened.engine.close()
-        if opened.simulation is not None:
-            with self._errors_reported():
-                opened.simulation.stop()
-
-    @contextlib.contextmanager
-    def _errors_reported(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:
-            self._report_error(error_report(error))
+        """End engine and stand, each whether or not the other fails."""
+        for end in (opened.engine.close, opened.stand.stop if opened.stand else None):
+            try:
+                if end is not None:
+                    end()
+            except Exception as error:
+                self._report_error(error_report(error))
 
 
 Answer = TypeVar("Answer")
 
 
 class DaemonExecutor:
-    """Does calls in the order in which they were submitted.
+    """Makes calls in the order in which they were submitted.
 
-    Unlike an executor's, the thread does not keep the program from ending: a call that never returns
-    is given up.
-
-    Parameters
-    ----------
-    name : str
-        Of the thread.
+    Unlike an executor's, the thread does not keep the program from ending if a call never returns.
     """
 
     def __init__(self, name: str) -> None:
@@ -238,13 +184,20 @@ class DaemonExecutor:
         self._thread.start()
 
     def submit(self, call: Callable[[], Answer]) -> Future[Answer]:
-        """Do `call` after those before it; what it returns or raises is in the future."""
+        """Make `call` after those before it; the future has what it returns or raises."""
         future: Future[Answer] = Future()
-        self._calls.put(lambda: _into(future, call))
+
+        def run() -> None:
+            try:
+                future.set_result(call())
+            except Exception as error:
+                future.set_exception(error)
+
+        self._calls.put(run)
         return future
 
     def close(self, patience_s: float) -> bool:
-        """Do what was submitted, and end; False if that takes longer than `patience_s`."""
+        """Make the submitted calls, and end; False if that takes longer than `patience_s`."""
         self._calls.put(None)
         self._thread.join(patience_s)
         return not self._thread.is_alive()
@@ -252,10 +205,3 @@ class DaemonExecutor:
     def _work(self) -> None:
         while (call := self._calls.get()) is not None:
             call()
-
-
-def _into(future: Future[Answer], call: Callable[[], Answer]) -> None:
-    try:
-        future.set_result(call())
-    except Exception as error:
-        future.set_exception(error)

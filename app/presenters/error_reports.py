@@ -18,8 +18,7 @@ import platformdirs
 from app.acquisition.errors import AcquisitionError
 from app.version import __version__
 from config.schema import ConfigError
-from messages.i18n import gettext, translate
-from messages.message import MessageError, message_of
+from messages.message import EMPTY, Message, MessageError, message, message_of
 
 _REPEATED_S = 10.0
 """An error that repeats, as one of a timer does, is reported this often."""
@@ -31,7 +30,7 @@ _FILE_BYTES_MAX = 1_000_000
 class ErrorReport:
     """Error in one line for the operator, and in detail for a developer."""
 
-    message: str
+    message: Message
     details: str
 
 
@@ -50,7 +49,7 @@ class ErrorReporter:
         self._log = log
         self._clock = clock
         self._waiting: deque[ErrorReport] = deque()
-        self._last = ("", float("-inf"))
+        self._last = (EMPTY, float("-inf"))
 
     def report(self, report: ErrorReport) -> None:
         """Add a report, unless the same one was added just before."""
@@ -98,15 +97,15 @@ def log_file() -> Path:
 def error_report(error: Exception) -> ErrorReport:
     """Report an error with its traceback and the version of everything."""
     name, text = type(error).__name__, " ".join(str(error).split())
-    message = translate(message_of(error))
+    shown = message_of(error)
     if not is_user_error(error):
-        message = gettext(
+        shown = message(
             "Slipstand itself failed ({fault}). What is recorded is kept. Report what the details say",
             fault=f"{name}: {text}" if text else name,
         )
     trace = "".join(traceback.format_exception(error)).strip()
     about = f"Slipstand {__version__}, Python {platform.python_version()}, {platform.platform()}"
-    return ErrorReport(message, f"{about}\n{trace}")
+    return ErrorReport(shown, f"{about}\n{trace}")
 
 
 def is_user_error(error: Exception) -> bool:

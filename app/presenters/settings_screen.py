@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
@@ -16,19 +16,18 @@ THEMES = {
     "dark": N_("Dark"),
 }
 LANGUAGES = {"system": N_("As the system"), "en": "English", "ru": "Русский"}
+LOG_LEVELS = {
+    "error": N_("Errors only"),
+    "warning": N_("Errors and warnings"),
+    "info": N_("Usual"),
+    "debug": N_("Everything"),
+}
 SCALES = (1.0, 1.25, 1.5, 1.75, 2.0)
 
 
 @dataclass(frozen=True, slots=True)
 class SettingsFile:
-    """A settings file.
-
-    Attributes
-    ----------
-    name : str
-        Its content, as a label.
-    path : str
-    """
+    """A settings file, and a label of its content."""
 
     name: str
     path: str
@@ -36,89 +35,48 @@ class SettingsFile:
 
 @dataclass(frozen=True, slots=True)
 class SettingsState:
-    """State of the screen.
-
-    Attributes
-    ----------
-    settings : Settings
-    recordings : str
-        Folder of the runs that is in use.
-    override : str
-        Environment variable that overrides the setting; empty if none does.
-    files : tuple of SettingsFile
-    needs_restart : bool
-        Whether a change takes effect after a restart.
-    can_undo : bool
-    message : Chip
-        Fault of the last change.
-    """
+    """State of the screen; folder, override and files as in `PersonalSettings`."""
 
     settings: Settings = field(default_factory=Settings)
     recordings: str = ""
     override: str = ""
     files: tuple[SettingsFile, ...] = ()
     needs_restart: bool = False
+    """A change takes effect after a restart."""
     can_undo: bool = False
     message: Chip = EMPTY_CHIP
+    """Fault of the last change."""
 
 
-_AT_START = ("language", "scale", "recordings")
+_AT_START = ("language", "scale", "recordings", "log_level")
 """Settings that take effect after a restart."""
-
-
-class SettingsStore(Protocol):
-    """Storage of settings."""
-
-    def save(self, settings: Settings) -> Path | None:
-        """Save settings; return the backup of an unreadable file, if there was one. Raises ConfigError."""
-
-
-class NullStore:
-    """Storage that saves nothing."""
-
-    def save(self, _settings: Settings) -> None:
-        """Save nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonalSettings:
-    """Personal settings at the start of the window.
-
-    Attributes
-    ----------
-    settings : Settings
-    fault : str
-        Why the defaults are used; empty if the settings were read.
-    recordings, override : str
-        The folder in use, and the environment variable that sets it.
-    files : tuple of SettingsFile
-    store : Store
-    """
+    """Personal settings at the start of the window."""
 
     settings: Settings = field(default_factory=Settings)
     fault: str = ""
+    """Why the defaults are used; empty if the settings were read."""
     recordings: str = ""
+    """Folder of the runs that is in use."""
     override: str = ""
+    """Environment variable that overrides the folder; empty if none does."""
     files: tuple[SettingsFile, ...] = ()
-    store: SettingsStore = field(default_factory=NullStore)
+    save: Callable[[Settings], Path | None] = lambda _: None
+    """Saves settings; returns the backup of an unreadable file, if there was one. Raises ConfigError."""
 
 
 class SettingsPresenter(Presenter[SettingsState]):
-    """Changes personal settings.
-
-    Parameters
-    ----------
-    personal : Personal
-    apply : callable
-        Applies new settings to the window.
-    """
+    """Changes personal settings; `apply` applies new ones to the window."""
 
     def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
         super().__init__(
             SettingsState(personal.settings, personal.recordings, personal.override, personal.files)
         )
         self._at_start = personal.settings
-        self._store = personal.store
+        self._save_settings = personal.save
         self._apply = apply
         self._before: list[Settings] = []
 
@@ -150,7 +108,7 @@ class SettingsPresenter(Presenter[SettingsState]):
 
     def _save(self, settings: Settings) -> Chip:
         try:
-            backup = self._store.save(settings)
+            backup = self._save_settings(settings)
         except ConfigError as error:
             return Chip(sentence(str(error)), Tone.BAD)
         if backup is None:

@@ -9,10 +9,10 @@ import msgspec
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.connection import Simulation
 from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import format_fixed, format_millimetres, parse_number
 from app.presenters.results import sentence
+from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
@@ -89,7 +89,7 @@ class StandPresenter(Presenter[StandState]):
         options: SimulatedStandOptions,
         all_series: tuple[str, ...],
         open_stand: Callable[[SimulatedStandOptions], None],
-        running: Callable[[], Simulation | None],
+        running: Callable[[], SimulatedStand | None],
     ) -> None:
         form = StandForm(options.series)
         super().__init__(StandState(all_series, form, _default_form(options, form)))

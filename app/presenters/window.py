@@ -20,8 +20,6 @@ from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Connecting,
     Disconnected,
-    IdentificationFailed,
-    IdentificationProgress,
     RunsChanged,
     ScreenEntered,
     StandContext,
@@ -158,7 +156,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.gauges = GaugesPresenter(workers.gauges, workers.ports, stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
-            context.simulation, context.start.all_series, self.open_stand, lambda: connection.simulation
+            context.simulation, context.start.all_series, self.open_stand, lambda: connection.stand
         )
         self.runs = RunsPresenter(
             workers.runs, workers.batch, self._folder, stand.all_series, author, self.open_run
@@ -389,10 +387,10 @@ class WindowPresenter(Presenter[WindowState]):
         elif isinstance(event.argument, IdentifyTask):
             self.identify.on_event(event)
         elif isinstance(event, TaskProgress):
-            self.record.dispatch(IdentificationProgress(event.argument, event.progress))
+            self.record.dispatch(event)
             self.identify.on_progress(event.argument, event.progress)
         elif isinstance(event, TaskFailed):
-            self.record.dispatch(IdentificationFailed(event.argument, event.message))
+            self.record.dispatch(event)
             self.identify.on_failed(event.argument, event.message)
         elif event.answer is not None:
             self.record.dispatch(event.answer)

@@ -16,13 +16,17 @@ from app.log import start_log
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
-from messages.i18n import N_, language, use_language
+from messages.i18n import language, use_language
+from messages.message import Message, message
 
 Answer = TypeVar("Answer")
 ReportProgress = Callable[[Progress], None]
 Task = Callable[[Any, ReportProgress], Any]
 """Module-level function that takes its argument and a function to report progress with."""
-CANCELLED = N_("The analysis was given up. Open the recording to repeat it")
+CANCELLED = message("The analysis was given up. Open the recording to repeat it")
+_PROCESS_DIED = message(
+    "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
+)
 _GRACE_S = 3.0
 """An aborted process has this long to end the processes that it has started itself."""
 _END_S = 4.0
@@ -52,10 +56,11 @@ class TaskDone(Generic[Answer]):
 
 @dataclass(frozen=True, slots=True)
 class TaskFailed:
-    """A task has failed; `message` is one line for people."""
+    """A task has failed, or was cancelled."""
 
     argument: Any
-    message: str
+    message: Message
+    is_cancelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +159,8 @@ class Worker:
 
     def cancel(self) -> None:
         """Abort all tasks, which fail; the next one starts another process."""
-        self._cancelled += [TaskFailed(argument, CANCELLED) for _, argument in self._waiting]
+        for _, argument in self._waiting:
+            self._cancelled.append(TaskFailed(argument, CANCELLED, is_cancelled=True))
         self._waiting.clear()
         self._end(abort=True)
 
@@ -193,10 +199,7 @@ class Worker:
         waiting, self._waiting = self._waiting, deque()
         for task, later in waiting:
             self.submit(task, later)
-        message = (
-            "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
-        )
-        return [TaskFailed(argument, message)]
+        return [TaskFailed(argument, _PROCESS_DIED)]
 
 
 class _TaskProcess:

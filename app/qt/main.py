@@ -16,7 +16,7 @@ from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
 from config.files import load_window_layout, save_window_layout
 from config.schema import ConfigError, Settings, WindowLayout
-from messages.i18n import LANGUAGE_VARIABLE, language, use_language
+from messages.i18n import LANGUAGE_VARIABLE, language, translate, use_language
 
 _WARM_UP_MS = 2000
 """Delay before the analysis is loaded: engine and simulated stand, needed earlier, start first."""
@@ -106,7 +106,7 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
 def _print_late_errors(errors: ErrorReporter) -> None:
     """Print errors that received after the window had closed; the log has them too."""
     while (report := errors.next_report()) is not None:
-        sys.stderr.write(f"error: {report.message}\n")
+        sys.stderr.write(f"error: {translate(report.message)}\n")
 
 
 def _has_display() -> bool:

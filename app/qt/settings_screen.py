@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from app.presenters.base import Chip, Tone
 from app.presenters.settings_screen import (
     LANGUAGES,
+    LOG_LEVELS,
     SCALES,
     THEMES,
     SettingsFile,
@@ -47,6 +48,7 @@ class SettingsScreen(QWidget):
         self._scale = _choice(
             {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: presenter.change(scale=scale)
         )
+        self._log_level = _choice(LOG_LEVELS, lambda level: presenter.change(log_level=level))
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
         self._browse = QPushButton(gettext("Browse…"))
@@ -67,6 +69,7 @@ class SettingsScreen(QWidget):
             (self._theme, settings.theme),
             (self._language, settings.language),
             (self._scale, settings.scale),
+            (self._log_level, settings.log_level),
         ):
             choice.setCurrentIndex(choice.findData(value))
         for field, text in ((self._operator, settings.operator), (self._recordings, settings.recordings)):
@@ -78,7 +81,9 @@ class SettingsScreen(QWidget):
         self._in_use.setText(_folder_words(state))
         show_chip(self._message, state.message)
         waiting = (
-            gettext("Language, size and folder hold from the next start on") if state.needs_restart else ""
+            gettext("Language, size, folder and log hold from the next start on")
+            if state.needs_restart
+            else ""
         )
         show_chip(self._waits, Chip(waiting, Tone.WARN))
         if state.files != old.files:
@@ -168,6 +173,7 @@ class SettingsScreen(QWidget):
         self._files.setVerticalSpacing(8)
         self._files.setColumnStretch(1, 1)
         layout.addLayout(self._files)
+        layout.addLayout(make_form_grid(((gettext("Log"), self._log_level),), wide=False))
         return card
 
     def _status_line(self) -> QHBoxLayout:

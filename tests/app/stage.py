@@ -234,18 +234,16 @@ class FakeSimulation:
     """A simulated stand that is none."""
 
     def __init__(self, options: SimulatedStandOptions) -> None:
-        self.port = PortSettings("fake://", "slipstand-binary")
+        self.port = "fake://"
         self.options = options
-        self.series = options.series
         self.disturbed: list[str] = []
-        self.true_friction = 0.1
         self.stopped = False
 
     def truth(self) -> Truth:
         at_s = iter(range(3, 100))
         happened = [replace(parse_disturbance(text), at_s=float(next(at_s))) for text in self.disturbed]
         return Truth(
-            port=self.port.url,
+            port=self.port,
             stand=stand_truth(self.options, load_stand()),
             options=self.options,
             timetable=self.options.timetable(),
@@ -274,6 +272,11 @@ class FakeLauncher:
         self.ports: list[PortSettings] = []
         self._directory = directory
         self._error = error
+
+    @property
+    def starters(self) -> tuple[Any, Any]:
+        """What `Connection` starts engine and stand with."""
+        return self.engine, self.simulation
 
     def engine(self, port: PortSettings) -> FakeEngine:
         if self._error is not None:

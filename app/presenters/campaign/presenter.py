@@ -19,7 +19,7 @@ from app.presenters.campaign.tasks import (
 )
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
@@ -166,13 +166,13 @@ class CampaignPresenter(Presenter[CampaignState]):
         if task == self._collecting:
             self._collecting = None
         if isinstance(event, TaskFailed):
-            self._on_failed(event.message)
+            self._on_failed(event)
         else:
             self._on_done(event)
 
-    def _on_failed(self, message: str) -> None:
-        if message != CANCELLED:
-            self._set_message(Chip(sentence(message), Tone.BAD))
+    def _on_failed(self, event: TaskFailed) -> None:
+        if not event.is_cancelled:
+            self._set_message(Chip(sentence(event.message), Tone.BAD))
 
     def _on_done(self, event: TaskDone[Any]) -> None:
         task, answer = event.argument, event.answer

@@ -23,6 +23,7 @@ from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.results import sentence
 from config.schema import Gauges
 from messages.i18n import gettext
+from messages.message import Message
 
 _LIVE_S: Final = 0.5
 """Averaging time of the live counts: long enough to read the number, short enough to follow a hand."""
@@ -157,7 +158,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
         )
 
-    def on_failed(self, task: FitCalibration | SaveCalibration, message: str) -> None:
+    def on_failed(self, task: FitCalibration | SaveCalibration, message: Message) -> None:
         """Show why a task failed; too few points for a curve are no fault."""
         if isinstance(task, SaveCalibration):
             self._update(message=Chip(sentence(message), Tone.BAD), can_save=True)

@@ -14,6 +14,7 @@ from app.presenters.number_text import parse_number
 from app.presenters.results import sentence
 from config.schema import Gauges
 from messages.i18n import gettext
+from messages.message import Message
 
 
 class CheckPresenter(Presenter[CheckState]):
@@ -85,7 +86,7 @@ class CheckPresenter(Presenter[CheckState]):
         self._end(EMPTY_CHIP)
         self._update(outcome=outcome, values=checked.values, warnings=(*checked.warnings, *remedy))
 
-    def on_failed(self, message: str) -> None:
+    def on_failed(self, message: Message) -> None:
         """Show why the check could not be evaluated or recorded."""
         self._end(Chip(sentence(message), Tone.BAD))
 

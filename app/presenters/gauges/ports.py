@@ -8,7 +8,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import CANCELLED, LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
 LIST_PORTS: Final = LazyFunction("app.presenters.gauges.port_tasks", "list_port_cards")
@@ -89,9 +89,8 @@ class PortsPresenter(Presenter[PortsState]):
         if isinstance(event, TaskProgress):
             self._update(progress=event.progress.text)
         elif isinstance(event, TaskFailed):
-            is_cancelled = event.message == CANCELLED
-            text = gettext("Given up") if is_cancelled else sentence(event.message)
-            self._end(Chip(text, Tone.PLAIN if is_cancelled else Tone.BAD))
+            cancelled = Chip(gettext("Given up"))
+            self._end(cancelled if event.is_cancelled else Chip(sentence(event.message), Tone.BAD))
         elif isinstance(event.argument, ListPorts):
             self._update(ports=_with_known_devices(event.answer, self.state.ports))
         else:

@@ -28,6 +28,7 @@ from app.presenters.results import sentence
 from app.presenters.worker import TaskDone, TaskFailed, Worker, WorkerEvent
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import N_, gettext
+from messages.message import Message
 
 HEALTH_S: Final = 5.0
 """Length of the samples that health is measured from: resolves hum to 0.2 Hz and drift to minutes."""
@@ -157,7 +158,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         elif isinstance(event, TaskDone):
             self._on_done(event)
 
-    def _on_failed(self, task: Any, message: str) -> None:
+    def _on_failed(self, task: Any, message: Message) -> None:
         match task:
             case FitCalibration() | SaveCalibration():
                 self.calibration.on_failed(task, message)

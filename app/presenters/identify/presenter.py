@@ -30,7 +30,8 @@ from app.presenters.identify.state import (
     Span,
 )
 from app.presenters.worker import LazyFunction, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
-from messages.i18n import gettext
+from messages.i18n import gettext, translate
+from messages.message import Message
 
 SIMULATE_FRICTION: Final = LazyFunction("app.presenters.identify.tasks", "simulate_friction")
 ESTIMATE_CLASSICAL: Final = LazyFunction("app.presenters.identify.tasks", "estimate_classical")
@@ -87,10 +88,14 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if path == self._path and self.state.progress is not None:
             self._update(progress=progress)
 
-    def on_failed(self, path: str, message: str) -> None:
+    def on_failed(self, path: str, message: Message) -> None:
         """Show why the analysis failed; offer the analysis as one mass."""
         if path == self._path:
-            self._update(progress=None, failure=message, alternative_kind=None if self._shown else "one-mass")
+            self._update(
+                progress=None,
+                failure=translate(message),
+                alternative_kind=None if self._shown else "one-mass",
+            )
 
     def on_analysed(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         """Show an analysed run, unless another is being opened."""
@@ -111,7 +116,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         elif isinstance(event, TaskProgress):
             self.on_progress(task.path, event.progress)
         elif isinstance(event, TaskFailed):
-            self._on_variant_failed(task, event.message)
+            self._on_variant_failed(task, translate(event.message))
         else:
             self._on_variant(task, event.answer)
 

@@ -10,6 +10,7 @@ from app.presenters.record.state import PendingDecision
 from app.presenters.results import FRICTION, make_row, sentence
 from app.runs.next_tests import NextTests
 from messages.i18n import gettext
+from messages.message import Message
 
 # --- tasks for the worker process --------------------------------------------------------
 
@@ -229,7 +230,7 @@ class RunDecisions:
             message=Chip(gettext("Moved {name} to the trash", name=name), Tone.WARN, trash_path),
         )
 
-    def after_failure(self, task: RecordTask, message: str) -> "RunDecisions":
+    def after_failure(self, task: RecordTask, message: Message) -> "RunDecisions":
         """A task failed; the files are as they were."""
         is_moving = self.is_moving and not isinstance(task, MoveToTrash)
         return replace(self, is_moving=is_moving, message=Chip(sentence(message), Tone.BAD))

@@ -1,12 +1,12 @@
 """Presenter of the Record screen: dispatches events to the reducer, carries out effects, shows the state."""
 
 import time
-from typing import Protocol
 
 from app.acquisition.guidance import guidance_for
-from app.acquisition.messages import Arm, Command, PullbackState, Quit, Stop
+from app.acquisition.messages import Arm, PullbackState, Quit, Stop
 from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
+from app.presenters.connection import Connection
 from app.presenters.record.decisions import KeepRun, MoveToTrash, RecordTask, RestoreFromTrash, SavePlan
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
@@ -47,36 +47,19 @@ _CUES = {
 _TARGET_SHOWN = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
-class Recorder(Protocol):
-    """The engine as far as Record needs it."""
-
-    def send(self, command: Command) -> None:
-        """Send a command."""
-
-    def new_rows(self) -> RingRows | None:
-        """Samples since the last call; None without any."""
-
-
 class RecordPresenter(Presenter[RecordState]):
     """Leads the operator through one pullback test after another.
 
-    Parameters
-    ----------
-    recorder : Recorder
-    stand : StandContext
-    files : Worker
-        Carries out tasks with run files. `close` closes it.
-    author : str
-        Who decides about runs, for their history.
+    `files` carries out tasks with run files, and is closed by `close`. `author` decides about runs.
     """
 
     CLOSE_S = 30.0
     """Time for tasks that are under way when the window is closed; an analysis takes a second."""
 
-    def __init__(self, recorder: Recorder, stand: StandContext, files: Worker, author: str) -> None:
+    def __init__(self, connection: Connection, stand: StandContext, files: Worker, author: str) -> None:
         self._model = RecordModel.of_stand(stand, author)
         super().__init__(record_state(self._model))
-        self._recorder = recorder
+        self._connection = connection
         self._files = files
         self._unfinished: list[RecordTask] = []
 
@@ -104,7 +87,7 @@ class RecordPresenter(Presenter[RecordState]):
         """Take answers of the worker and new samples; to be called some 60 times a second."""
         self._poll_files()
         self.dispatch(ClockTicked(self._model.stand.clock()))
-        rows = self._recorder.new_rows()
+        rows = self._connection.new_rows()
         if rows is not None and len(rows):
             self.dispatch(rows)
 
@@ -123,7 +106,7 @@ class RecordPresenter(Presenter[RecordState]):
 
     def _execute(self, effect: Effect) -> None:
         if isinstance(effect, Arm | Stop | Quit):
-            self._recorder.send(effect)
+            self._connection.send(effect)
             return
         if isinstance(effect, KeepRun | MoveToTrash | RestoreFromTrash | SavePlan):
             self._unfinished.append(effect)

@@ -49,8 +49,6 @@ from app.presenters.record.state import (
     ClockTicked,
     Connecting,
     Disconnected,
-    IdentificationFailed,
-    IdentificationProgress,
     LiveEstimate,
     NoteEdited,
     PlanEdited,
@@ -63,9 +61,10 @@ from app.presenters.record.state import (
     StatusBar,
 )
 from app.presenters.results import Result, sentence
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
+from messages.message import Message
 
 Effect = Command | RecordTask
 """A command for the engine, or a task for the worker."""
@@ -108,10 +107,12 @@ class _Reduction:
                 self._on_operator(event)
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
-            case TaskFailed(task, message):
-                self._on_task_failed(task, message)
-            case AnalysedRun() | IdentificationFailed() | IdentificationProgress():
+            case AnalysedRun() | TaskFailed(str()) | TaskProgress():
                 self._on_identification(event)
+            case TaskFailed(is_cancelled=False):
+                self._on_task_failed(event.argument, event.message)
+            case TaskFailed():
+                pass
             case Connecting() | Disconnected() | SimulationStarted():
                 self._on_connection(event)
             case Settings():
@@ -304,9 +305,7 @@ class _Reduction:
             self._show_again(path)
             self._say(Chip(gettext("Brought back {name}", name=run.name), Tone.OK))
 
-    def _on_task_failed(self, task: RecordTask, message: str) -> None:
-        if message == CANCELLED:
-            return
+    def _on_task_failed(self, task: RecordTask, message: Message) -> None:
         self._set(decisions=self.model.decisions.after_failure(task, message))
         if isinstance(task, LoadPlan):  # the stored plan cannot be read; the runs can
             self._count_completed()
@@ -327,30 +326,28 @@ class _Reduction:
 
     # --- identification of the run ---
 
-    def _on_identification(self, event: AnalysedRun | IdentificationFailed | IdentificationProgress) -> None:
+    def _on_identification(self, event: AnalysedRun | TaskFailed | TaskProgress) -> None:
         model = self.model
-        path = str(event.path)
+        path = str(event.path) if isinstance(event, AnalysedRun) else event.argument
         ended = model.ended
         if ended is None or ended.result is not None or ended.event.path != path:
             self._on_late_identification(event, path)
             return
         match event:
-            case IdentificationProgress(_, progress):
+            case TaskProgress(_, progress):
                 self._set(ended=replace(ended, progress=progress))
             case AnalysedRun():
                 self._set(decisions=replace(model.decisions, pending=RecordedRun.of(event)))
                 self._set_result(results.make_result(event, model.session.true_friction))
-            case IdentificationFailed(_, message):
+            case TaskFailed(_, message):
                 pending = RecordedRun(path, ended.note, ended.note)
                 self._set(decisions=replace(model.decisions, pending=pending))
                 self._set_result(results.failed_result(message, path, ended.event.ended))
 
-    def _on_late_identification(
-        self, event: AnalysedRun | IdentificationFailed | IdentificationProgress, path: str
-    ) -> None:
+    def _on_late_identification(self, event: AnalysedRun | TaskFailed | TaskProgress, path: str) -> None:
         """Keep a run that the operator has gone on from; without a result it stays as it is."""
         decisions = self.model.decisions
-        if isinstance(event, IdentificationProgress) or path not in decisions.to_keep:
+        if isinstance(event, TaskProgress) or path not in decisions.to_keep:
             return
         self._set(decisions=replace(decisions, to_keep=decisions.to_keep - {path}))
         if isinstance(event, AnalysedRun):

@@ -16,7 +16,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.connection import SimulationStarted
 from app.presenters.decimated_history import Polyline
 from app.presenters.results import Result, ResultRow
-from app.presenters.worker import TaskDone, TaskFailed
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 
@@ -378,22 +378,6 @@ class ClockTicked:
 
 
 @dataclass(frozen=True, slots=True)
-class IdentificationProgress:
-    """The identification of a run has progressed."""
-
-    path: str
-    progress: Progress
-
-
-@dataclass(frozen=True, slots=True)
-class IdentificationFailed:
-    """A run could not be identified; `message` is one line for people."""
-
-    path: str
-    message: str
-
-
-@dataclass(frozen=True, slots=True)
 class RunsChanged:
     """Runs were added to the folder or removed from it."""
 
@@ -411,14 +395,16 @@ RecordEvent = (
     | SimulationStarted
     | RingRows
     | ClockTicked
-    | IdentificationProgress
     | AnalysedRun
-    | IdentificationFailed
     | Settings
     | Gauges
     | RunsChanged
     | TaskDone[Any]
     | TaskFailed
+    | TaskProgress
     | Event
 )
-"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves."""
+"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves.
+
+The argument of a `TaskFailed` or `TaskProgress` is a `RecordTask`, or the path of a run being identified.
+"""

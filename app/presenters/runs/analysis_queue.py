@@ -106,7 +106,7 @@ class AnalysisQueue:
         self._pending.remove(event.argument)
         if isinstance(event, TaskFailed):
             first = Path(event.argument.paths[0]).name
-            self._summary.faults.append(f"{first}: {event.message}" if _is_one(event) else event.message)
+            self._summary.faults.append(f"{first}: {event.message}" if _is_one(event) else str(event.message))
         return True
 
     def _set_progress(self, progress: Progress) -> None:

@@ -8,6 +8,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
 from messages.i18n import N_, gettext, ngettext
+from messages.message import Message
 
 FORMATS = {
     "csv": N_("CSV, for anything"),
@@ -128,7 +129,7 @@ class ExportPresenter(Presenter[ExportState]):
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
 
-    def on_failed(self, message: str) -> None:
+    def on_failed(self, message: Message) -> None:
         """Show why nothing was written."""
         text = (
             sentence(message)

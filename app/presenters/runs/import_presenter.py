@@ -12,6 +12,7 @@ from app.presenters.runs.import_form import METADATA_FIELDS, PER_FILE_FIELDS, Im
 from app.presenters.runs.state import Overlay
 from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport, SurveyFile
 from messages.i18n import N_, gettext, ngettext
+from messages.message import Message
 
 if TYPE_CHECKING:
     from app.runs.exchange.importing import FilePreview
@@ -153,10 +154,10 @@ class ImportPresenter(Presenter[ImportState]):
             else:
                 self._show_preview(answer, task.form)
 
-    def on_failed(self, task: ImportTask, message: str) -> None:
+    def on_failed(self, task: ImportTask, message: Message) -> None:
         """Show why a task failed, at the field that the message names."""
         words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
-        faults = dict.fromkeys(_named_field(message), words)
+        faults = dict.fromkeys(_named_field(str(message)), words)
         if isinstance(task, ImportFile):
             self._update(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
         elif self._is_current(task):

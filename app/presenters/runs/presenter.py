@@ -30,7 +30,7 @@ from app.presenters.runs.tasks import (
     UndoEdits,
 )
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ class RunsPresenter(Presenter[RunsState]):
         if isinstance(event, TaskProgress):
             self._on_progress(event.argument, event.progress)
         elif isinstance(event, TaskFailed):
-            self._on_failed(event.argument, event.message)
+            self._on_failed(event)
         else:
             self._on_done(event)
 
@@ -215,7 +215,8 @@ class RunsPresenter(Presenter[RunsState]):
         elif not isinstance(task, LoadOverlay | ImportTask):
             self._progress = progress
 
-    def _on_failed(self, task: RunsTask, message: str) -> None:
+    def _on_failed(self, event: TaskFailed) -> None:
+        task, message = event.argument, event.message
         if isinstance(task, ListRuns):
             self._is_listing = False
             self._update(is_listed=True)
@@ -226,7 +227,7 @@ class RunsPresenter(Presenter[RunsState]):
             self.import_dialog.on_failed(task, message)
             return
         self._progress = None
-        if message != CANCELLED:
+        if not event.is_cancelled:
             self._set_message(Chip(sentence(message), Tone.BAD))
 
     def _on_done(self, event: TaskDone[Any]) -> None:

@@ -228,7 +228,7 @@ def test_giving_up_leaves_what_was_shown(stage: Stage) -> None:
     stage.presenter.refresh()
     stage.presenter.cancel()
     assert stage.worker.cancelled == 1
-    stage.say(TaskFailed(stage.last(), CANCELLED))
+    stage.say(TaskFailed(stage.last(), CANCELLED, is_cancelled=True))
     state = stage.presenter.state
     assert (state.runs, state.progress, state.message.text) == (9, None, "")
     stage.presenter.refresh()

@@ -12,6 +12,7 @@ from app.acquisition.ring import RingRows
 from app.presenters.connection import Connection, SimulationStarted
 from app.presenters.error_reports import ErrorReporter
 from app.simulated_stand.options import SimulatedStandOptions
+from config.files import published_row
 from drivers.errors import PortUnavailableError
 
 PORT = PortSettings("COM7", "csv")
@@ -29,7 +30,7 @@ def faults() -> ErrorReporter:
 
 @pytest.fixture
 def session(launcher: FakeLauncher, faults: ErrorReporter) -> Iterator[Connection]:
-    made = Connection(launcher, faults.report)
+    made = Connection(*launcher.starters, faults.report)
     yield made
     made.close()
     assert faults.next_report() is None
@@ -75,7 +76,7 @@ def test_the_simulated_stand_is_started_first_and_ended_last(
 ) -> None:
     session.open_simulated(SimulatedStandOptions(series="2SSM1"))
     events = poll_until(session, Connected)
-    assert events[0] == SimulationStarted("2SSM1", 0.1)
+    assert events[0] == SimulationStarted("2SSM1", published_row("2SSM1").friction_dynamic)
     session.disconnect()
     wait_for(lambda: launcher.simulations[0].stopped)
     assert launcher.engines[0].closed
@@ -83,7 +84,7 @@ def test_the_simulated_stand_is_started_first_and_ended_last(
 
 def test_an_error_of_opening_is_an_event() -> None:
     launcher = FakeLauncher(error=PortUnavailableError("COM7 is busy.\nClose the other program"))
-    failing = Connection(launcher, ErrorReporter().report)
+    failing = Connection(*launcher.starters, ErrorReporter().report)
     failing.open_port(PORT)
     (event,) = poll_until(failing, Failed)
     assert str(event.message) == "COM7 is busy. Close the other program"
@@ -93,7 +94,7 @@ def test_an_error_of_opening_is_an_event() -> None:
 
 def test_a_stand_whose_engine_does_not_start_is_ended(launcher: FakeLauncher) -> None:
     failing = FakeLauncher(error=PortUnavailableError("no"))
-    session = Connection(failing, ErrorReporter().report)
+    session = Connection(*failing.starters, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Failed)
     session.close()
@@ -131,7 +132,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
             return super().engine(port)
 
     launcher = SlowLauncher()
-    session = Connection(launcher, ErrorReporter().report)
+    session = Connection(*launcher.starters, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     launcher.started.wait(5.0)
     threading.Timer(0.05, launcher.go_on.set).start()
@@ -142,7 +143,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
 
 def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) -> None:
     before = threading.active_count()
-    session = Connection(launcher, ErrorReporter().report)
+    session = Connection(*launcher.starters, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     session.close()
@@ -164,12 +165,12 @@ def test_whoever_listens_sees_the_samples_that_are_drawn(session: Connection, la
 
 
 def test_the_stand_that_is_connected_can_be_disturbed(session: Connection, launcher: FakeLauncher) -> None:
-    assert session.simulation is None
+    assert session.stand is None
     session.open_simulated(SimulatedStandOptions(series="2SSM1"))
     poll_until(session, Connected)
-    assert session.simulation is launcher.simulations[0]
+    assert session.stand is launcher.simulations[0]
     session.disconnect()
-    assert session.simulation is None
+    assert session.stand is None
 
 
 class BadEnds(FakeLauncher):
@@ -192,13 +193,13 @@ class BadEnds(FakeLauncher):
 def said(faults: ErrorReporter) -> list[str]:
     words = []
     while (fault := faults.next_report()) is not None:
-        words.append(fault.message)
+        words.append(str(fault.message))
     return words
 
 
 @pytest.mark.parametrize("opened", [True, False], ids=["connected", "still connecting"])
 def test_what_goes_wrong_while_something_is_ended_is_told(opened: bool, faults: ErrorReporter) -> None:
-    session = Connection(BadEnds(), faults.report)
+    session = Connection(*BadEnds().starters, faults.report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     if opened:
         poll_until(session, Connected)
@@ -216,7 +217,7 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorRe
             made.close = lambda: self.go_on.wait(10.0)  # type: ignore[method-assign]
             return made
 
-    session = Connection(Hangs(), faults.report)
+    session = Connection(*Hangs().starters, faults.report)
     session.CLOSE_S = 0.05
     session.open_port(PORT)
     poll_until(session, Connected)

@@ -8,20 +8,21 @@ import pytest
 
 from app.presenters.error_reports import ErrorReport, ErrorReporter, error_report
 from config.schema import ConfigError
+from messages.message import EMPTY
 
 
 def test_an_expected_error_speaks_for_itself() -> None:
-    assert error_report(ConfigError("x = 3\n is wrong")).message == "x = 3 is wrong"
-    assert error_report(OSError()).message == "OSError"
+    assert str(error_report(ConfigError("x = 3\n is wrong")).message) == "x = 3 is wrong"
+    assert str(error_report(OSError()).message) == "OSError"
 
 
 def test_a_fault_of_the_program_is_called_one_and_tells_where_it_was() -> None:
     with pytest.raises(KeyError) as caught:
         {}["gone"]
     fault = error_report(caught.value)
-    assert fault.message.startswith("Slipstand itself failed (KeyError: 'gone')")
+    assert str(fault.message).startswith("Slipstand itself failed (KeyError: 'gone')")
     assert "test_error_reports.py" in fault.details
-    assert "\n" not in fault.message
+    assert "\n" not in str(fault.message)
 
 
 def test_the_same_again_and_again_is_said_once_in_a_while(tmp_path: Path) -> None:
@@ -65,8 +66,8 @@ def test_what_nobody_catches_is_told(
     thread = threading.Thread(target=lambda: {}["nothing"])
     thread.start()
     thread.join()
-    assert "ZeroDivisionError" in (faults.next_report() or ErrorReport("", "")).message
-    assert "KeyError" in (faults.next_report() or ErrorReport("", "")).message
+    assert "ZeroDivisionError" in str((faults.next_report() or ErrorReport(EMPTY, "")).message)
+    assert "KeyError" in str((faults.next_report() or ErrorReport(EMPTY, "")).message)
     assert "nothing to divide by" in capsys.readouterr().err, "a terminal is told as ever"
     sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None)
     assert faults.next_report() is None

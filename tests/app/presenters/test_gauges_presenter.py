@@ -245,7 +245,7 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
     desk.presenter.ports.probe()
     desk.presenter.ports.cancel()
     assert desk.prober.cancelled == 1
-    desk.hear(TaskFailed(desk.prober.submitted[-1][1], CANCELLED), prober=True)
+    desk.hear(TaskFailed(desk.prober.submitted[-1][1], CANCELLED, is_cancelled=True), prober=True)
     assert desk.presenter.ports.state.progress == ""
     assert desk.presenter.ports.state.message.text == "Given up"
 

@@ -26,12 +26,11 @@ from app.presenters.record.state import (
     Action,
     Connecting,
     Disconnected,
-    IdentificationFailed,
-    IdentificationProgress,
     RunForm,
     SeriesChosen,
     StepStatus,
 )
+from app.presenters.worker import TaskFailed, TaskProgress
 from app.runs.metadata import Conditions
 from drivers.samples import SampleStatus
 
@@ -231,7 +230,7 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     assert presenter.state.traces.span == frozen.span
     assert presenter.state.guidance.instruction == "Finding friction"
     assert presenter.state.progress is not None
-    presenter.dispatch(IdentificationProgress(RUN, Progress("Fitting coulomb", 0.4)))
+    presenter.dispatch(TaskProgress(RUN, Progress("Fitting coulomb", 0.4)))
     assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
 
 
@@ -281,9 +280,7 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     presenter.dispatch(Action.STOP)
     assert recorder.stopped == 1
     presenter.dispatch(ended(reason=EndReason.STOPPED))
-    presenter.dispatch(
-        IdentificationFailed(RUN, "no release in 1 s of record. Pull and release while recording")
-    )
+    presenter.dispatch(TaskFailed(RUN, "no release in 1 s of record. Pull and release while recording"))
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"

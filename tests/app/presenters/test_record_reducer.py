@@ -17,10 +17,10 @@ from app.presenters.record.state import (
     Action,
     Connecting,
     Disconnected,
-    IdentificationProgress,
     RecordEvent,
     StepStatus,
 )
+from app.presenters.worker import TaskProgress
 from messages.i18n import ENGLISH, gettext, use_language
 
 PULLBACK_M = 0.012
@@ -67,7 +67,7 @@ def test_a_reduction_changes_no_model_but_its_own(screen: Screen) -> None:
 
 
 def test_only_the_run_that_is_awaited_is_shown(screen: Screen) -> None:
-    screen.send(IdentificationProgress("/elsewhere.h5", Progress("Fitting", 0.5)))
+    screen.send(TaskProgress("/elsewhere.h5", Progress("Fitting", 0.5)))
     screen.send(analysed("/elsewhere.h5"))
     assert screen.model.ended is not None
     assert (screen.model.ended.result, screen.model.ended.progress) == (None, Progress("Identifying"))

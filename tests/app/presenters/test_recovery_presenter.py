@@ -24,7 +24,7 @@ class Desk:
         self.unfinished = 2
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.session = Connection(self.launcher, ErrorReporter().report)
+        self.session = Connection(*self.launcher.starters, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         context = WindowContext(bench(), start, count_unfinished=lambda: self.unfinished)
         self.window = WindowPresenter(self.session, fake_workers(analysis=self.worker), context)

@@ -32,7 +32,6 @@ from app.presenters.record.state import (
     Action,
     Connecting,
     Cue,
-    IdentificationFailed,
     NoteEdited,
     PendingDecision,
     PlanEdited,
@@ -339,7 +338,7 @@ def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk = Desk()
     desk.record.dispatch(Action.ARM)
     desk.run()
-    desk.record.dispatch(IdentificationFailed(RUN, "no release"))
+    desk.record.dispatch(TaskFailed(RUN, "no release"))
     assert {Action.NEXT, Action.REPEAT, Action.DISCARD} <= desk.record.state.allowed
     desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()

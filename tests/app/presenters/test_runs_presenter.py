@@ -302,7 +302,7 @@ def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     assert desk.analyst.cancelled == 1
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert desk.runs.state.progress is None
-    desk.analyst_says(TaskFailed(task, CANCELLED))
+    desk.analyst_says(TaskFailed(task, CANCELLED, is_cancelled=True))
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert isinstance(desk.tasks[-1], ListRuns)
 

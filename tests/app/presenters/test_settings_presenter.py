@@ -26,7 +26,7 @@ class Page:
     def __init__(self) -> None:
         self.store = FakeStore()
         self.applied: list[Settings] = []
-        self.presenter = SettingsPresenter(PersonalSettings(store=self.store), self.applied.append)
+        self.presenter = SettingsPresenter(PersonalSettings(save=self.store.save), self.applied.append)
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ class Desk:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.runs_worker = FakeWorker()
-        self.session = Connection(self.launcher, ErrorReporter().report)
+        self.session = Connection(*self.launcher.starters, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,

@@ -27,6 +27,7 @@ from app.presenters.worker import (
 )
 from app.runs.batch.executors import ProcessExecutor
 from config.schema import ConfigError
+from messages.message import message
 from tests.drills.processes import gone, is_alive
 
 
@@ -85,7 +86,7 @@ def test_tasks_are_done_in_turn_with_progress_and_errors_in_words(worker: Worker
         TaskProgress(8, half),
         TaskDone(8, 4.0),
         TaskProgress(3, half),
-        TaskFailed(3, "3 is odd. Give an even one"),
+        TaskFailed(3, message("{text}", text="3 is odd. Give an even one")),
         TaskProgress(10, half),
         TaskDone(10, 5.0),
     ]
@@ -101,8 +102,8 @@ def test_a_fault_of_the_program_itself_is_told_apart_with_all_that_is_known() ->
         broken, failed = (news for news in news_until(worker, 2) if isinstance(news, TaskFailed))
     finally:
         worker.close()
-    assert broken.message.startswith("Slipstand itself failed (KeyError: 'nothing')")
-    assert failed.message == "3 is odd. Give an even one"
+    assert str(broken.message).startswith("Slipstand itself failed (KeyError: 'nothing')")
+    assert str(failed.message) == "3 is odd. Give an even one"
     (fault,) = faults
     assert fault.message == broken.message
     assert "in stumble" in fault.details
@@ -121,7 +122,7 @@ def test_cancelling_ends_the_task_at_once_and_says_so(worker: Worker) -> None:
     news_until(worker, 1, TaskProgress)
     worker.submit(halve, 2)
     worker.cancel()
-    assert worker.poll() == [TaskFailed(600.0, CANCELLED), TaskFailed(2, CANCELLED)]
+    assert worker.poll() == [TaskFailed(argument, CANCELLED, is_cancelled=True) for argument in (600.0, 2)]
     worker.submit(halve, 4)
     assert news_until(worker, 1)[-1] == TaskDone(4, 2.0)
 
@@ -131,7 +132,7 @@ def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(worker: Worker)
     worker.submit(halve, 4)
     news = news_until(worker, 2)
     assert isinstance(news[0], TaskFailed)
-    assert "ended unexpectedly" in news[0].message
+    assert "ended unexpectedly" in str(news[0].message)
     assert news[-1] == TaskDone(4, 2.0)
 
 
@@ -168,7 +169,7 @@ def with_a_crew(worker: Worker) -> list[int]:
 def test_giving_up_returns_at_once_and_leaves_no_process_of_the_crew(worker: Worker) -> None:
     running = with_a_crew(worker)
     worker.cancel()
-    assert worker.poll() == [TaskFailed(None, CANCELLED)]
+    assert worker.poll() == [TaskFailed(None, CANCELLED, is_cancelled=True)]
     assert all(gone(number) for number in running)
 
 
@@ -183,7 +184,7 @@ def test_a_worker_that_is_killed_takes_its_crew_along(worker: Worker) -> None:
     running = with_a_crew(worker)
     os.kill(running[0], signal.SIGKILL)
     (failure,) = news_until(worker, 1)
-    assert "ended unexpectedly" in failure.message
+    assert "ended unexpectedly" in str(failure.message)
     assert all(gone(number) for number in running)
 
 

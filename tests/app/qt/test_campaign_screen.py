@@ -71,7 +71,7 @@ def test_what_goes_on_is_shown_before_anything_is_claimed_to_be_missing(stage: S
 
 
 def test_what_was_given_up_is_not_called_empty(stage: Stage) -> None:
-    stage.say(TaskFailed(stage.worker.submitted[-1][1], CANCELLED))
+    stage.say(TaskFailed(stage.worker.submitted[-1][1], CANCELLED, is_cancelled=True))
     assert "have not been gathered. Refresh (F5) looks for them." in stage.words()
     assert "There are no runs" not in stage.words()
 

@@ -57,7 +57,7 @@ class Desk:
             recordings=str(Path.home()),
         )
         self.presenter = WindowPresenter(
-            Connection(self.launcher, ErrorReporter().report),
+            Connection(*self.launcher.starters, ErrorReporter().report),
             fake_workers(analysis=self.worker),
             WindowContext(
                 bench(),

@@ -12,7 +12,8 @@ from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, healt
 
 from app.acquisition.messages import Connected, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, Connecting, IdentificationFailed
+from app.presenters.record.state import Action, Connecting
+from app.presenters.worker import TaskFailed
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 
@@ -98,7 +99,7 @@ def failure(stage: Stage) -> None:
     tail(stage)
     stage.presenter.dispatch(ended())
     message = "the decay lasts 0.213 s, under two periods. Record until rest"
-    stage.presenter.dispatch(IdentificationFailed(str(analysed().path), message))
+    stage.presenter.dispatch(TaskFailed(str(analysed().path), message))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
