@@ -80,12 +80,8 @@ class SettingsScreen(QWidget):
         self._undo.setEnabled(state.can_undo)
         self._in_use.setText(_folder_words(state))
         show_chip(self._message, state.message)
-        waiting = (
-            gettext("Language, size, folder and log hold from the next start on")
-            if state.needs_restart
-            else ""
-        )
-        show_chip(self._waits, Chip(waiting, Tone.WARN))
+        waits = gettext("Language, size, folder and log change at the next start")
+        show_chip(self._waits, Chip(waits if state.needs_restart else "", Tone.WARN))
         if state.files != old.files:
             self._list_files(state.files)
 

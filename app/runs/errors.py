@@ -1,6 +1,7 @@
 """Errors of run files. Each message names the file, the fault and the remedy in one line."""
 
 from pathlib import Path
+from typing import cast
 
 from messages.message import Message, MessageError, message
 
@@ -38,6 +39,16 @@ class RunExistsError(RunError):
 
 class MetadataError(RunError, ValueError):
     """A value of the metadata cannot be stored."""
+
+
+class ConditionError(MetadataError):
+    """A condition of a test cannot be stored; `field` names it, and `condition` in its values shows it."""
+
+    @property
+    def field(self) -> str:
+        """Field of `Conditions`, or name of another condition."""
+        condition = cast(Message, self.message.values["condition"])
+        return str(condition.values["name"])
 
 
 class DiskFullError(RunError):

@@ -7,10 +7,11 @@ from typing import Any, Literal, Self
 
 import msgspec
 
-from app.runs.errors import MetadataError
+from app.runs.errors import ConditionError, MetadataError
 from config.schema import ConfigError, GaugeCheck, Gauges, Stand
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, Losses
+from messages.message import message
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
@@ -57,9 +58,9 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
         for name, (low, high) in _PLAUSIBLE.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise MetadataError(
-                    "condition {name} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
-                    name=name,
+                raise ConditionError(
+                    "{condition} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
+                    condition=message("condition {name}", name=name),
                     value=value,
                     low=low,
                     high=high,
@@ -67,9 +68,9 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
         texts = {name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other
         for name, text in texts.items():
             if len(text) > _TEXT_MAX or not text.isprintable():
-                raise MetadataError(
-                    "condition {name} = {text!r} is not a line of text of up to {text_max} characters",
-                    name=name,
+                raise ConditionError(
+                    "{condition} = {text!r} is not a line of text of up to {text_max} characters",
+                    condition=message("condition {name}", name=name),
                     text=text[:40],
                     text_max=_TEXT_MAX,
                 )
@@ -113,8 +114,10 @@ def _typed(name: str, text: str) -> str | float | int:
             return float(text)
         return int(text) if name == "run_in_number" else text
     except ValueError:
-        raise MetadataError(
-            "condition {name} = {text!r} is not a number. Give digits, or leave it out", name=name, text=text
+        raise ConditionError(
+            "{condition} = {text!r} is not a number. Give digits, or leave it out",
+            condition=message("condition {name}", name=name),
+            text=text,
         ) from None
 
 

@@ -15,20 +15,21 @@ from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from app.presenters.record.decisions import LoadedPlan, SavePlan
 from app.presenters.record.state import NO_PLAN, PlanState, RunChoices, RunForm, SeriesProgress
 from app.presenters.results import sentence
-from app.runs.errors import MetadataError
+from app.runs.errors import ConditionError, MetadataError
 from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
 from messages.i18n import gettext
+from messages.message import Message, message
 
 REPEATS_DEFAULT = 3
 """Repeats of a planned series without a number: the fewest that show an outlier."""
 _PLAN_PART = re.compile(r"([0-9A-Z*?]+)(?:\s*[X×]\s*(\d+))?")
 _CONDITION_NAMES = {
-    "temperature_c": "temperature in °C",
-    "humidity_percent": "humidity in %",
-    "plate_id": "plate",
-    "contact_id": "contact",
-    "surface_preparation": "surfaces",
-    "run_in_number": "run-in number",
+    "temperature_c": message("temperature in °C"),
+    "humidity_percent": message("humidity in %"),
+    "plate_id": message("plate"),
+    "contact_id": message("contact"),
+    "surface_preparation": message("surfaces"),
+    "run_in_number": message("run-in number"),
 }
 
 Plan = tuple[PlannedSeries, ...]
@@ -323,11 +324,11 @@ def _form_error(form: RunForm) -> str:
     try:
         parse_conditions(form, {})
         _parse_count(form)
-    except ValueError as error:
-        text = str(error)
-        for name, title in _CONDITION_NAMES.items():
-            text = text.replace(f"condition {name}", title)
-        return sentence(text)
+    except ConditionError as error:
+        values = {**error.message.values, "condition": _CONDITION_NAMES[error.field]}
+        return sentence(Message(error.message.template, values))
+    except MetadataError as error:
+        return sentence(error.message)
     return ""
 
 

@@ -59,7 +59,7 @@ def test_a_choice_holds(page: Page, name: str, words: str, field: str, value: ob
     box.setCurrentText(words)
     box.activated.emit(box.currentIndex())
     assert getattr(page.settings, field) == value
-    waits = "hold from the next start on" in visible_words(page.view)
+    waits = "change at the next start" in visible_words(page.view)
     assert waits == (field != "theme")
 
 
