@@ -26,9 +26,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import analyse_run
+from app.presenters.events import TaskDone
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import IdentifyTask
-from app.presenters.worker import TaskDone, Worker
+from app.presenters.worker import Worker
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.runs.reader import open_run

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from app.presenters.analysed_run import AnalysedRun, AnalysisKind, Channel, Kinematics, Objective
-from app.presenters.base import Progress
+from app.presenters.base import Progress, ReportProgress
 from app.presenters.results import FRICTION, sentence
-from app.presenters.worker import ReportProgress
 
 if TYPE_CHECKING:
     from analysis.identification import Identification

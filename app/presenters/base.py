@@ -1,10 +1,12 @@
 """Base of all screens: presenter with an immutable state, and small values that states are made of."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from messages.i18n import N_
+from messages.i18n import N_, gettext, ngettext
 
 State = TypeVar("State")
 Shown = TypeVar("Shown", contravariant=True)
@@ -64,6 +66,14 @@ EMPTY_CHIP = Chip("")
 
 
 @dataclass(frozen=True, slots=True)
+class LabelledValue:
+    """A row of a table: a label, and a value with its unit."""
+
+    label: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
 class Notice:
     """Message above the screen, shown until it is dismissed.
 
@@ -84,3 +94,28 @@ class Progress:
 
     text: str
     fraction: float | None = None
+
+
+ReportProgress = Callable[[Progress], None]
+_ROUNDING = 1e-9
+
+
+def batch_progress(
+    report: ReportProgress, template: str, paths: Sequence[str]
+) -> Callable[[float, str], None]:
+    """Make a callback for `app.runs.batch` that reports which run is being processed.
+
+    `template` has the fields `{name}`, `{number}` and `{all}`, and is translated here.
+    """
+
+    def on_share(share: float, _what: str) -> None:
+        number = min(int(share * len(paths) + _ROUNDING), len(paths) - 1)
+        name = Path(paths[number]).stem
+        report(Progress(gettext(template, name=name, number=number + 1, all=len(paths)), share))
+
+    return on_share
+
+
+def run_count_text(paths: Sequence[str]) -> str:
+    """Name of a single run, or the number of runs."""
+    return Path(paths[0]).stem if len(paths) == 1 else ngettext("{count} run", "{count} runs", len(paths))

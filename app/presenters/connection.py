@@ -12,20 +12,13 @@ from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Command, Event, Failed, PortSettings
 from app.acquisition.ring import RingRows
 from app.presenters.error_reports import ErrorReport, error_report
+from app.presenters.events import SimulationStarted
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import published_row
 from messages.message import message, message_of
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class SimulationStarted:
-    """A simulated stand has started and is being connected."""
-
-    series: str
-    true_friction: float
 
 
 @dataclass(slots=True)

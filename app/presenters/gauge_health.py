@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.formatting import MINUS, with_unit
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
-from app.presenters.gauges.state import LabelledValue
+from app.presenters.base import LabelledValue
 from app.presenters.number_text import format_fixed
 from messages.i18n import gettext, translate
 

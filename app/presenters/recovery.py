@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.presenters.base import Notice, Progress, Tone
+from app.presenters.base import Notice, Progress, ReportProgress, Tone
 from app.presenters.results import sentence
-from app.presenters.worker import ReportProgress
 from messages.i18n import N_, gettext, ngettext, translate
 
 RECOVER = N_("Recover")

@@ -8,8 +8,7 @@ from typing import Final
 import msgspec
 
 from analysis.formatting import typeset, with_unit
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.state import LabelledValue
+from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
 from app.presenters.number_text import format_fixed, format_millimetres, parse_number
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand

@@ -10,8 +10,9 @@ from app.acquisition.messages import Connected, Event, Failed, PortSettings, Run
 from app.presenters import recovery
 from app.presenters.base import Notice, Presenter, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.connection import Connection, SimulationStarted
+from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.events import SimulationStarted, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import IdentifyTask
@@ -31,7 +32,7 @@ from app.presenters.runs.state import RunFilter
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
-from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent, WorkerPool
+from app.presenters.worker import LazyFunction, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext

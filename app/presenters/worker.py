@@ -10,17 +10,16 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from app.log import start_log
-from app.presenters.base import Progress
+from app.presenters.base import ReportProgress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import language, use_language
-from messages.message import Message, message
+from messages.message import message
 
-Answer = TypeVar("Answer")
-ReportProgress = Callable[[Progress], None]
 Task = Callable[[Any, ReportProgress], Any]
 """Module-level function that takes its argument and a function to report progress with."""
 CANCELLED = message("The analysis was given up. Open the recording to repeat it")
@@ -44,34 +43,6 @@ class LazyFunction:
     def __call__(self, *arguments: Any) -> Any:
         """Import the function and call it."""
         return getattr(importlib.import_module(self.module), self.name)(*arguments)
-
-
-@dataclass(frozen=True, slots=True)
-class TaskDone(Generic[Answer]):
-    """A task has returned `answer`."""
-
-    argument: Any
-    answer: Answer
-
-
-@dataclass(frozen=True, slots=True)
-class TaskFailed:
-    """A task has failed, or was cancelled."""
-
-    argument: Any
-    message: Message
-    is_cancelled: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class TaskProgress:
-    """A task has reported progress."""
-
-    argument: Any
-    progress: Progress
-
-
-WorkerEvent = TaskDone[Any] | TaskFailed | TaskProgress
 
 
 class WorkerPool:

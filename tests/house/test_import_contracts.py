@@ -30,6 +30,18 @@ VIOLATIONS = [
         "device folders",
         id="device-knows-device",
     ),
+    pytest.param(
+        "app/presenters/identify/presenter.py",
+        "import app.presenters.record.state",
+        "inside presenters",
+        id="screen-knows-screen",
+    ),
+    pytest.param(
+        "app/presenters/record/reducer.py",
+        "import app.presenters.worker",
+        "states and reducers",
+        id="reducer-knows-workers",
+    ),
     pytest.param("drivers/samples.py", "import serial", "pyserial only", id="serial-outside-port"),
     pytest.param("app/acquisition/__init__.py", "import h5py", "h5py only", id="h5py-outside-runs"),
 ]

@@ -17,9 +17,10 @@ from app.presenters.campaign.tasks import (
     UndoExclusion,
     WriteProduct,
 )
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import Worker
 from messages.i18n import gettext, ngettext
 
 

@@ -4,9 +4,8 @@ import datetime
 from pathlib import Path
 
 from analysis.campaign.campaign import Campaign
-from app.presenters.base import Progress
+from app.presenters.base import Progress, ReportProgress
 from app.presenters.campaign.state import Product
-from app.presenters.worker import ReportProgress
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.content import TableContent
 from app.reports.table.files import as_text, write_text, write_workbook

@@ -10,7 +10,7 @@ from analysis.campaign.contacts import friction_by_contact
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.plan import plan
 from analysis.record import AnalysisError
-from app.presenters.batch_text import batch_progress
+from app.presenters.base import ReportProgress, batch_progress
 from app.presenters.campaign.tasks import (
     TARGET_REPEATS,
     CampaignData,
@@ -24,7 +24,7 @@ from app.presenters.campaign.tasks import (
     WriteProduct,
 )
 from app.presenters.results import sentence
-from app.presenters.worker import LazyFunction, ReportProgress
+from app.presenters.worker import LazyFunction
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import map_runs
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, RunCollection, iter_collected

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from analysis.formatting import typeset, with_unit
-from app.presenters.base import Chip, Tone
-from app.presenters.gauges.state import NAMES, GaugeCard, LabelledValue
+from app.presenters.base import Chip, LabelledValue, Tone
+from app.presenters.gauges.state import NAMES, GaugeCard
 from app.presenters.number_text import format_fixed, format_millimetres
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext

@@ -4,11 +4,10 @@ from dataclasses import replace
 from functools import partial
 
 from analysis.formatting import with_unit
-from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, ReportProgress, Tone
 from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
-from app.presenters.worker import ReportProgress
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, list_ports
 from drivers.port_probe import PortReport, ProbeOutcome, probe_port

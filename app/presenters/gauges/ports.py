@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
+from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import LazyFunction, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import LazyFunction, Worker
 from messages.i18n import gettext
 
 LIST_PORTS: Final = LazyFunction("app.presenters.gauges.port_tasks", "list_port_cards")

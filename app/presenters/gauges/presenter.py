@@ -7,6 +7,7 @@ from typing import Any, Final
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
+from app.presenters.events import TaskDone, TaskFailed, WorkerEvent
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.cards import gauge_cards
 from app.presenters.gauges.check import CheckPresenter
@@ -25,7 +26,7 @@ from app.presenters.gauges.tasks import (
 )
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import TaskDone, TaskFailed, Worker, WorkerEvent
+from app.presenters.worker import Worker
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import N_, gettext
 from messages.message import Message

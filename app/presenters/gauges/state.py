@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.base import EMPTY_CHIP, Chip
+from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue
 from app.presenters.navigator import ConnectForm
 from messages.i18n import N_
 
@@ -27,14 +27,6 @@ class GaugesTab(StrEnum):
     PORTS = N_("Ports and devices")
     CALIBRATE = N_("Calibrate")
     CHECK = N_("Check")
-
-
-@dataclass(frozen=True, slots=True)
-class LabelledValue:
-    """A row of a table: a label, and a value with its unit."""
-
-    label: str
-    value: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ from typing import Final
 
 from app.acquisition.averaged_counts import AveragedCounts
 from app.acquisition.ring import RingRows
-from app.presenters.gauges.state import CalibrationPoint, CheckForm, LabelledValue
+from app.presenters.base import LabelledValue
+from app.presenters.gauges.state import CalibrationPoint, CheckForm
 from app.presenters.worker import LazyFunction
 from config.schema import GaugeChecks, Gauges
 

@@ -12,8 +12,9 @@ from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
 from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
 from app.acquisition.gauge_samples import samples_from_ring
+from app.presenters.base import LabelledValue, ReportProgress
 from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
-from app.presenters.gauges.state import NAMES, CalibrationFit, CheckKind, LabelledValue
+from app.presenters.gauges.state import NAMES, CalibrationFit, CheckKind
 from app.presenters.gauges.tasks import (
     ActiveCalibrations,
     CheckGauge,
@@ -26,7 +27,6 @@ from app.presenters.gauges.tasks import (
     SavedCalibration,
 )
 from app.presenters.number_text import format_fixed
-from app.presenters.worker import ReportProgress
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, write_points
 from config.files import (
     activate_calibration,

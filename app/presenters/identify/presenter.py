@@ -9,6 +9,7 @@ from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask, run_analysis
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.identify import plot_data, result_tables
 from app.presenters.identify.cursors import (
     first_cursors,
@@ -29,7 +30,7 @@ from app.presenters.identify.state import (
     SimulateFriction,
     Span,
 )
-from app.presenters.worker import LazyFunction, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import LazyFunction, Worker
 from messages.i18n import gettext, translate
 from messages.message import Message
 

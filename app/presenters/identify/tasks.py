@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.classical_estimates import estimate_classically
 from app.presenters.analysis_task import AnalysisTask, cached_analysis
-from app.presenters.base import Progress
+from app.presenters.base import Progress, ReportProgress
 from app.presenters.identify.state import (
     ClassicalFigures,
     DecimatedLine,
@@ -14,7 +14,6 @@ from app.presenters.identify.state import (
     SimulateFriction,
     Span,
 )
-from app.presenters.worker import ReportProgress
 
 _MAX_SIMULATED_SAMPLES = 40_000
 """A longer span is simulated at every n-th sample: the handle must follow the mouse."""

@@ -7,6 +7,7 @@ from app.acquisition.messages import Arm, PullbackState, Quit, Stop
 from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
+from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.record.decisions import KeepRun, MoveToTrash, RecordTask, RestoreFromTrash, SavePlan
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
@@ -23,7 +24,7 @@ from app.presenters.record.state import (
     StepStatus,
 )
 from app.presenters.results import sentence
-from app.presenters.worker import LazyFunction, TaskDone, TaskFailed, Worker
+from app.presenters.worker import LazyFunction, Worker
 from messages.i18n import N_, gettext, translate
 
 _EXECUTE = LazyFunction("app.presenters.record.tasks", "execute")

@@ -24,7 +24,7 @@ from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.connection import SimulationStarted
+from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.record.decisions import (
     CountCompletedRuns,
     KeepRun,
@@ -61,7 +61,6 @@ from app.presenters.record.state import (
     StatusBar,
 )
 from app.presenters.results import Result, sentence
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
 from messages.message import Message

@@ -13,10 +13,9 @@ from app.acquisition.pullback.plan import AllowedPlateRange, allowed_plate_range
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
-from app.presenters.connection import SimulationStarted
 from app.presenters.decimated_history import Polyline
+from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.results import Result, ResultRow
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 

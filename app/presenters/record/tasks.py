@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from app.presenters.base import ReportProgress
 from app.presenters.record.decisions import (
     CountCompletedRuns,
     KeepRun,
@@ -13,7 +14,6 @@ from app.presenters.record.decisions import (
     RestoreFromTrash,
     SavePlan,
 )
-from app.presenters.worker import ReportProgress
 from app.runs.batch.tasks import AnalysisTask, analyze_one
 from app.runs.edits import edit_run
 from app.runs.errors import RunError

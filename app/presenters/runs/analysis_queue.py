@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.presenters.base import Progress
-from app.presenters.batch_text import batch_progress, run_count_text
+from app.presenters.base import Progress, batch_progress, run_count_text
+from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.runs.tasks import ANALYSE_RUNS, ANALYSING, AnalyseRuns, RunAnalysed
-from app.presenters.worker import TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import Worker
 from messages.i18n import gettext, ngettext
 
 

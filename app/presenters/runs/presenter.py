@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.results import sentence
 from app.presenters.runs.analysis_queue import AnalysisQueue, AnalysisSummary
 from app.presenters.runs.export_presenter import ExportPresenter
@@ -30,7 +31,7 @@ from app.presenters.runs.tasks import (
     UndoEdits,
 )
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import Worker
 from messages.i18n import gettext
 
 if TYPE_CHECKING:

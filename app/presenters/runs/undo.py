@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.presenters.base import Chip, Tone
-from app.presenters.batch_text import run_count_text
+from app.presenters.base import Chip, Tone, run_count_text
 from app.presenters.results import sentence
 from app.presenters.runs.table import parse_mass_kg
 from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits

@@ -10,8 +10,7 @@ from msgspec import convert
 
 from analysis.formatting import with_unit
 from analysis.record import AnalysisError
-from app.presenters.base import Progress
-from app.presenters.batch_text import batch_progress
+from app.presenters.base import Progress, ReportProgress, batch_progress
 from app.presenters.conditions import parse_conditions
 from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.runs.import_form import GAIN, NUMBER_FIELDS, ImportForm, TextFormat, parse_pairs
@@ -37,7 +36,6 @@ from app.presenters.runs.tasks import (
     TrashRuns,
     UndoEdits,
 )
-from app.presenters.worker import ReportProgress
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.blocks import RunBlock

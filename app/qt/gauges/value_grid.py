@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from app.presenters.gauges.state import LabelledValue
+from app.presenters.base import LabelledValue
 from app.qt.widgets.text import label
 
 

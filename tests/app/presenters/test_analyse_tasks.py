@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from app.presenters.base import Progress
+from app.presenters.events import TaskProgress
 from app.presenters.runs.tasks import AnalyseRuns, RunAnalysed
 from app.presenters.runs.work import analyse_runs
-from app.presenters.worker import TaskProgress, Worker
+from app.presenters.worker import Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from tests.drills.processes import descendants_of, gone

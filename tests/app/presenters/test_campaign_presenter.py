@@ -17,7 +17,8 @@ from app.presenters.campaign.tasks import (
     UndoExclusion,
     WriteProduct,
 )
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
+from app.presenters.worker import CANCELLED
 
 
 class Stage:

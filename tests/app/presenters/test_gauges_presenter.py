@@ -12,6 +12,7 @@ from stage import FakeWorker
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import Progress, Tone
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.gauges.cards import gauge_cards
 from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
@@ -35,7 +36,7 @@ from app.presenters.gauges.tasks import (
 )
 from app.presenters.gauges.work import execute
 from app.presenters.navigator import ConnectForm
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
+from app.presenters.worker import CANCELLED
 from config.files import load_checks, load_gauges
 from config.schema import GaugeCheck, GaugeChecks, Gauges
 from drivers.samples import SampleStatus

@@ -12,6 +12,7 @@ from analysis.quantities import ResultWarning
 from app.presenters.analysed_run import Channel, Objective
 from app.presenters.analysis_task import AnalysisTask
 from app.presenters.base import Progress, Tone
+from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import (
     ClassicalFigures,
@@ -21,7 +22,6 @@ from app.presenters.identify.state import (
     ManualSimulation,
     SimulateFriction,
 )
-from app.presenters.worker import TaskDone, TaskFailed
 from messages.message import message
 
 RUN = str(analysed().path)

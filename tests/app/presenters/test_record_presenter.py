@@ -20,7 +20,7 @@ from stage import (
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.connection import SimulationStarted
+from app.presenters.events import SimulationStarted, TaskFailed, TaskProgress
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
@@ -30,7 +30,6 @@ from app.presenters.record.state import (
     SeriesChosen,
     StepStatus,
 )
-from app.presenters.worker import TaskFailed, TaskProgress
 from app.runs.metadata import Conditions
 from drivers.samples import SampleStatus
 

@@ -7,6 +7,7 @@ from stage import RUN, analysed, bench, ended, health, rows_between, standing
 
 from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.base import Chip, Progress, Tone
+from app.presenters.events import TaskProgress
 from app.presenters.record.decisions import KeepRun, MoveToTrash
 from app.presenters.record.live import LiveTraces, tare_chip
 from app.presenters.record.model import RecordModel
@@ -20,7 +21,6 @@ from app.presenters.record.state import (
     RecordEvent,
     StepStatus,
 )
-from app.presenters.worker import TaskProgress
 from messages.i18n import ENGLISH, gettext, use_language
 
 PULLBACK_M = 0.012

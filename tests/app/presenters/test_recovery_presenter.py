@@ -11,10 +11,10 @@ from app.presenters import recovery
 from app.presenters.base import Notice, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport, recover_runs
 from app.presenters.start_screen import StartState
 from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 
 
 class Desk:

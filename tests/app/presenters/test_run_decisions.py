@@ -16,7 +16,7 @@ from app.acquisition.messages import (
 )
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Tone
-from app.presenters.connection import SimulationStarted
+from app.presenters.events import SimulationStarted, TaskDone, TaskFailed
 from app.presenters.record.decisions import (
     CountCompletedRuns,
     KeepRun,
@@ -38,7 +38,6 @@ from app.presenters.record.state import (
     RunForm,
     ScreenEntered,
 )
-from app.presenters.worker import TaskDone, TaskFailed
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, PlannedSeries
 from config.schema import Settings

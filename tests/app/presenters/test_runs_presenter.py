@@ -7,6 +7,7 @@ from msgspec.structs import replace
 from stage import FakeWorker
 
 from app.presenters.base import Progress, Tone
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Overlay, RunFilter, StatusFilter
 from app.presenters.runs.tasks import (
@@ -24,7 +25,7 @@ from app.presenters.runs.tasks import (
     TrashRuns,
     UndoEdits,
 )
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
+from app.presenters.worker import CANCELLED
 from app.runs.summary import RunSummary
 from messages.message import message
 

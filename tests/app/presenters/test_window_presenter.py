@@ -10,12 +10,12 @@ from app.acquisition.messages import EndReason, Failed, PortSettings
 from app.presenters.base import Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
 from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, Screen, WindowContext, WindowPresenter
-from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 
 
 class Desk:

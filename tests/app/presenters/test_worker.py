@@ -14,17 +14,10 @@ from typing import Any
 
 import pytest
 
-from app.presenters.base import Progress
+from app.presenters.base import Progress, ReportProgress
 from app.presenters.error_reports import ErrorReport
-from app.presenters.worker import (
-    CANCELLED,
-    ReportProgress,
-    TaskDone,
-    TaskFailed,
-    TaskProgress,
-    Worker,
-    WorkerPool,
-)
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
+from app.presenters.worker import CANCELLED, Worker, WorkerPool
 from app.runs.batch.executors import ProcessExecutor
 from config.schema import ConfigError
 from messages.message import message

@@ -13,7 +13,8 @@ from stage import FakeWorker
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.tasks import ExcludeRun, SimulateCampaign, UndoExclusion
-from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
+from app.presenters.events import TaskDone, TaskFailed, TaskProgress
+from app.presenters.worker import CANCELLED
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 

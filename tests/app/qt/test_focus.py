@@ -12,10 +12,10 @@ from stage import RUN, analysed
 from test_identify_screen import with_scan
 from test_main_window import Desk
 
+from app.presenters.events import TaskDone
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.window import Screen
-from app.presenters.worker import TaskDone
 from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme

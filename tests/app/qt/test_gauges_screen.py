@@ -15,21 +15,14 @@ from stage import FakeWorker
 
 from analysis.gauge_health import HealthGrade
 from app.acquisition.messages import Connected
-from app.presenters.base import Chip, Tone
+from app.presenters.base import Chip, LabelledValue, Tone
+from app.presenters.events import TaskDone
 from app.presenters.gauge_health import GaugeHealthState, SymptomText
 from app.presenters.gauges.ports import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.state import (
-    CalibrationFit,
-    CalibrationPoint,
-    CheckState,
-    GaugesTab,
-    LabelledValue,
-    PortCard,
-)
+from app.presenters.gauges.state import CalibrationFit, CalibrationPoint, CheckState, GaugesTab, PortCard
 from app.presenters.gauges.tasks import ActiveCalibrations, FitCalibration, LoadCalibrations
 from app.presenters.navigator import ConnectForm
-from app.presenters.worker import TaskDone
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme
 from config.files import load_gauges

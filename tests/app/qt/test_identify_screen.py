@@ -12,6 +12,7 @@ from analysis.identification import Events
 from analysis.quantities import BudgetLine, BudgetSource
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
+from app.presenters.events import TaskDone
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import (
     ClassicalFigures,
@@ -22,7 +23,6 @@ from app.presenters.identify.state import (
     PlotTab,
     SimulateFriction,
 )
-from app.presenters.worker import TaskDone
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack

@@ -26,11 +26,11 @@ from stage import RUN, FakeLauncher, FakeWorker, analysed, bench, fake_workers
 from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.events import TaskDone
 from app.presenters.navigator import ConnectForm
 from app.presenters.recovery import RecoverFolder
 from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowContext, WindowPresenter
-from app.presenters.worker import TaskDone
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow

@@ -11,9 +11,9 @@ from pytestqt.qtbot import QtBot
 from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
 
 from app.acquisition.messages import Connected, LiveResult, LiveValue, PullbackState, StateChanged
+from app.presenters.events import TaskFailed
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, Connecting
-from app.presenters.worker import TaskFailed
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 

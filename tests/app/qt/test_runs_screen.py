@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
+from app.presenters.events import TaskDone
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Overlay, Trace
 from app.presenters.runs.tasks import (
@@ -27,7 +28,6 @@ from app.presenters.runs.tasks import (
     SurveyFile,
     TrashRuns,
 )
-from app.presenters.worker import TaskDone
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.runs.screen import RunsScreen
 from app.qt.theme import Theme
