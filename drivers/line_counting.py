@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, Record, is_plausible_gap
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, Record, count_packet, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -66,14 +66,8 @@ def make_rules(
 ) -> NDArray[np.void]:
     """(1,) RULES; `place` is one of BY_SEQUENCE, BY_TIME and BY_COUNT, the gap in seconds."""
     rules = np.zeros(1, dtype=RULES)
-    rules["place"] = place
-    rules["period_s"] = 1 / rate_hz
-    rules["unit_s"] = unit_s
-    rules["clock_step_s"] = clock_step_s
-    rules["time_wrap"] = time_wrap
-    rules["sequence_wrap"] = sequence_wrap
-    rules["max_gap"] = max_gap_s * rate_hz
-    rules["overload_count"] = overload_count
+    max_gap = max_gap_s * rate_hz
+    rules[0] = place, 1 / rate_hz, unit_s, clock_step_s, time_wrap, sequence_wrap, max_gap, overload_count
     return rules
 
 
@@ -195,24 +189,12 @@ def _fill_packet(stream: Record, rule: Record, line: Record, step: int, packet: 
     elif stream.started:
         stream.row_time_s += _advance(line.time - stream.last_time, rule.time_wrap) * rule.unit_s
     packet.time_s = stream.row_time_s
-    _count(stream, packet, new_start or rule.place != BY_SEQUENCE, new_start)
-    stream.last_time = line.time
-    stream.last_sequence = line.sequence
-
-
-@inlined
-def _count(stream: Record, packet: Record, estimated: bool, new_start: bool) -> None:
-    stream.samples += 1 + packet.damaged + packet.missing
-    stream.damaged += packet.damaged
-    if estimated:
-        stream.missing_estimated += packet.missing
-    else:
-        stream.missing += packet.missing
-    if packet.status:
-        stream.overloaded += 1
+    count_packet(stream, packet, new_start or rule.place != BY_SEQUENCE)
     if new_start:
         stream.restarts += 1
         stream.restart_rows = 0  # two restarts in one read share their time
     stream.started = 1
     stream.restarting = 0
     stream.broken = 0
+    stream.last_time = line.time
+    stream.last_sequence = line.sequence

@@ -59,43 +59,32 @@ _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Packets:
-    """What one call of a decoder found."""
+Counts: TypeAlias = NDArray[np.int32] | NDArray[np.float64]
 
-    packets: NDArray[np.void]
-    """(p,) PACKET: in order of arrival."""
-    counts: NDArray[np.int32] | NDArray[np.float64]
-    """(s, 2) int32 or float64: samples of all packets, one after the other."""
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where packets begin in the stream."""
+
     first_index: int
-    """Row of the first lost or good sample of the first packet."""
-    rows: int
-    """Good and lost samples together."""
+    """Of the first lost or good sample of the first packet."""
     last_time_s: float
-    """Device time of the row before `first_index`."""
+    """Device time of the row before it."""
     period_s: float
     """Nominal time between the samples of a packet."""
-    has_time: bool
-    """Whether the device sends its time."""
-    arrival_ns: int
-    """Host's time of the read that completed the packets."""
 
 
 class PacketDecoder(ABC):
     """A `drivers.stream.Decoder` for devices that send by themselves; a device adds `_find_packets`.
 
-    Parameters
-    ----------
-    state : (1,) structured
-        What the compiled loops keep between calls, with the fields `LOSS_FIELDS` and `restarting`.
-    rate_hz : float
-        Nominal rate, > 0.
-    max_gap_s : float
-        Longest gap that rows stand for.
+    `state` (1,) is what compiled loops keep between calls, with the fields `LOSS_FIELDS`, `restarting` and
+    `row_time_s`; `rate_hz` the nominal rate, > 0; `max_gap_s` the longest gap that rows stand for.
     """
 
     _piece_bytes = 1 << 16
     """Long data are decoded in pieces that fit a processor's cache."""
+    _has_time = True
+    """Whether the device sends its time."""
 
     def __init__(self, state: NDArray[np.void], rate_hz: float, max_gap_s: float) -> None:
         self._state = state
@@ -126,42 +115,21 @@ class PacketDecoder(ABC):
         """Blocks that `data` completes; unfinished bytes are kept. Exhaust it."""
         for start in range(0, len(data), self._piece_bytes):
             piece = self._unfinished + data[start : start + self._piece_bytes]
-            found = self._find_packets(piece, arrival_ns)
-            if found is not None:
-                self._arrival_ns = arrival_ns
-                yield from sample_blocks(found)
+            first_index, last_time_s = int(self._state["samples"][0]), float(self._state["row_time_s"][0])
+            packets, counts = self._find_packets(piece, arrival_ns)
+            if not len(packets):
+                continue
+            self._arrival_ns = arrival_ns
+            rows = int(self._state["samples"][0]) - first_index
+            position = Position(first_index, last_time_s, 1 / self._rate_hz)
+            yield from sample_blocks(packets, counts, rows, position, arrival_ns, has_time=self._has_time)
 
     @abstractmethod
-    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
-        """Packets in `data`, which begin with the unfinished bytes; keeps the new ones."""
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+        """Packets (p,) in `data`, which begin with the unfinished bytes, and their samples (s, 2).
 
-    def _packets(
-        self,
-        packets: NDArray[np.void],
-        counts: NDArray[np.int32] | NDArray[np.float64],
-        before: tuple[int, float],
-        arrival_ns: int,
-        *,
-        has_time: bool = True,
-    ) -> Packets | None:
-        """Packets found in one call; `before` are index and device time before them. None without any."""
-        if not len(packets):
-            return None
-        first_index, last_time_s = before
-        return Packets(
-            packets,
-            counts,
-            first_index,
-            rows=int(self._state["samples"][0]) - first_index,
-            last_time_s=last_time_s,
-            period_s=1 / self._rate_hz,
-            has_time=has_time,
-            arrival_ns=arrival_ns,
-        )
-
-    def _position(self) -> tuple[int, float]:
-        """Index of the next row, and device time of the last one."""
-        return int(self._state["samples"][0]), float(self._state["row_time_s"][0])
+        Keeps the new unfinished bytes, and counts the packets in the state.
+        """
 
     def _rows_since(self, arrival_ns: int, samples: int) -> int:
         """Rows for which there was time since the last good packet, less `samples` that came."""
@@ -171,25 +139,44 @@ class PacketDecoder(ABC):
         return min(max(elapsed - samples, 0), self._max_gap)
 
 
-def sample_blocks(found: Packets) -> Iterator[SampleBlock]:
-    """Rows of `found`, lost ones included, in blocks of at most `MAX_BLOCK_ROWS`."""
+def sample_blocks(
+    packets: NDArray[np.void],
+    samples: Counts,
+    rows: int,
+    position: Position,
+    arrival_ns: int,
+    *,
+    has_time: bool = True,
+) -> Iterator[SampleBlock]:
+    """Rows of packets (p,) with samples (s, 2), lost rows included, in blocks of at most `MAX_BLOCK_ROWS`.
+
+    `rows` is the number of good and lost samples together.
+    """
     cursor = np.zeros(1, dtype=CURSOR)
-    cursor["time_s"] = found.last_time_s
+    cursor["time_s"] = position.last_time_s
     done = 0
-    while done < found.rows:
-        rows = min(found.rows - done, MAX_BLOCK_ROWS)
-        counts = np.empty((rows, 2), dtype=found.counts.dtype)
-        status = np.empty(rows, dtype=np.uint8)
-        times_s = np.empty(rows)
-        rows = fill_rows(found.packets, found.counts, found.period_s, cursor, counts, status, times_s)
-        yield SampleBlock(
-            first_index=found.first_index + done,
-            counts=counts[:rows],
-            status=status[:rows],
-            arrival_ns=found.arrival_ns,
-            device_time_s=times_s[:rows] if found.has_time else None,
-        )
-        done += rows
+    while done < rows:
+        size = min(rows - done, MAX_BLOCK_ROWS)
+        counts = np.empty((size, 2), dtype=samples.dtype)
+        status = np.empty(size, dtype=np.uint8)
+        times_s = np.empty(size)
+        size = fill_rows(packets, samples, position.period_s, cursor, counts, status, times_s)
+        device_s = times_s[:size] if has_time else None
+        yield SampleBlock(position.first_index + done, counts[:size], status[:size], arrival_ns, device_s)
+        done += size
+
+
+@inlined
+def count_packet(state: Record, packet: Record, is_estimated: bool) -> None:
+    """Add a packet and the rows before it to the counts of a decoder's state."""
+    state.samples += packet.damaged + packet.missing + packet.samples
+    state.damaged += packet.damaged
+    if is_estimated:
+        state.missing_estimated += packet.missing
+    else:
+        state.missing += packet.missing
+    if packet.status:
+        state.overloaded += packet.samples
 
 
 @inlined

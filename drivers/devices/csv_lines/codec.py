@@ -12,7 +12,7 @@ from drivers.crc import crc16
 from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
-from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, Packets
+from drivers.packets import MAX_GAP_S, PACKET, Counts, LossEstimator, PacketDecoder
 from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024
@@ -182,14 +182,11 @@ class LineDecoder(PacketDecoder):
             self._skipping = True
         return data[:end]
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
         data = self._whole_lines(data)
         lines = self._parser.read(data)
-        if not len(lines):
-            return None
         packets = np.empty(len(lines), dtype=PACKET)
         counts = np.empty((len(lines), 2))
-        before = self._position()
         self._state["restart_rows"] = self._rows_since(arrival_ns, len(lines))
         hold_from = len(data) if self._skipping else len(data) - _MAX_HELD_BYTES
         found, done = count_lines(lines, hold_from, self._state, self._rules, packets, counts)
@@ -197,7 +194,7 @@ class LineDecoder(PacketDecoder):
             self._unfinished = data[int(lines[done]["start"]) :] + self._unfinished
         if found and self._loss_estimator is not None:
             self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
-        return self._packets(packets[:found], counts[:found], before, arrival_ns, has_time=self._has_time)
+        return packets[:found], counts[:found]
 
 
 def rate_from_lines(layout: LineFormat, data: bytes) -> float | None:

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, Packets, Record
+from drivers.packets import (
+    LOSS_FIELDS,
+    MAX_GAP_S,
+    PACKET,
+    Counts,
+    LossEstimator,
+    PacketDecoder,
+    Record,
+    count_packet,
+)
 from drivers.samples import Losses, SampleStatus
 
 HEADER_BYTES = 3
@@ -167,6 +176,8 @@ class FrameDecoder(PacketDecoder):
         self._pattern = frame_pattern(layout)
         self._loss_estimator = LossEstimator(rate_hz)
 
+    _has_time = False
+
     @property
     def losses(self) -> Losses:
         """Counts until now."""
@@ -179,20 +190,17 @@ class FrameDecoder(PacketDecoder):
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
         found, used = find_frames(buffer, self._pattern, self._state, offsets, broken)
         self._unfinished = data[used:]
-        if not found:
-            return None
         packets = self._make_packets(buffer, offsets[:found], broken[:found], arrival_ns)
-        first_index = int(self._state["samples"][0])
-        count_packets(packets, self._state)
-        self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
-        values = self._values(buffer, offsets[:found])
-        return self._packets(packets, values, (first_index, 0.0), arrival_ns, has_time=False)
+        if found:
+            count_packets(packets, self._state)
+            self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
+        return packets, self._values(buffer, offsets[:found])
 
     def _make_packets(
         self,
@@ -206,8 +214,8 @@ class FrameDecoder(PacketDecoder):
         packets["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
         packets["damaged"] = broken
         if self._arrival_ns is None:
-            packets["damaged"][0] = 0
-        if self._state[0]["restarting"]:
+            packets["damaged"][:1] = 0
+        if len(packets) and self._state[0]["restarting"]:
             gap = self._rows_since(arrival_ns, len(offsets))
             packets["damaged"][0] = min(gap, broken[0])
             packets["missing"][0] = gap - packets["damaged"][0]
@@ -240,6 +248,7 @@ FRAME_PATTERN = np.dtype(
 STATE = np.dtype(
     [
         *LOSS_FIELDS,
+        ("row_time_s", np.float64),  # 0: the device sends no time
         ("restarting", np.int64),  # the connection broke after the last good frame
         ("garbage", np.int64),  # bytes since then
         ("begun", np.int64),  # frames that began in them
@@ -304,11 +313,7 @@ def count_packets(packets: NDArray[np.void], states: NDArray[np.void]) -> None:
     """Add `packets` to the counts in `states` (1,)."""
     state = states[0]
     for packet in packets:
-        state.samples += packet.damaged + packet.missing + packet.samples
-        state.damaged += packet.damaged
-        state.missing_estimated += packet.missing
-        if packet.status:
-            state.overloaded += 1
+        count_packet(state, packet, True)
     state.restarts += state.restarting
     state.restarting = 0
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drivers.clock import rate_from_steps
 from drivers.compiled import compiled, inlined
 from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
-from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder, Packets, Record
+from drivers.packets import MAX_GAP_S, PACKET, Counts, PacketDecoder, Record
 
 READ, WRITE, EVENT = 1, 2, 3
 ERROR = 0x08
@@ -348,14 +348,13 @@ class EventDecoder(PacketDecoder):
         self._garbage = 0
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
         lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
         buffer = np.frombuffer(data, dtype=np.uint8)
         found, used, discarded, self._garbage = find_events(buffer, self._channels, self._garbage, lines)
         self._unfinished = data[used:]
         packets = np.empty(found, dtype=PACKET)
         counts = np.empty((found, 2))
-        before = self._position()
         self._state["restart_rows"] = self._rows_since(arrival_ns, found)
         hold_from = len(data) - _MAX_HELD_BYTES
         good, done = count_lines(lines[:found], hold_from, self._state, self._rules, packets, counts)
@@ -364,7 +363,7 @@ class EventDecoder(PacketDecoder):
             discarded = int(lines[done]["discarded"])
             self._garbage = 0
         self._state["discarded_bytes"] += discarded
-        return self._packets(packets[:good], counts[:good], before, arrival_ns)
+        return packets[:good], counts[:good]
 
 
 def count_events(data: bytes) -> tuple[int, NDArray[np.float64]]:

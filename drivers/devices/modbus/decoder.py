@@ -8,7 +8,7 @@ from drivers.clock import Skew, SkewStatistics
 from drivers.devices.modbus.frames import ExceptionResponse, RegisterResponse, parse_response
 from drivers.devices.modbus.registers import ChannelValue, Poll
 from drivers.envelope import StampedRead, Unwrapper, wrap
-from drivers.packets import MAX_GAP_S, PACKET, Packets, sample_blocks
+from drivers.packets import MAX_GAP_S, PACKET, Position, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
 LATE = 0x80
@@ -89,21 +89,12 @@ class ResponseDecoder:
             self._add_response(read)
         self.losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
         if self._rows:
-            yield from sample_blocks(self._packets(first_index, last_time_s))
-
-    def _packets(self, first_index: int, last_time_s: float) -> Packets:
-        rows, counts = np.array(self._rows, dtype=PACKET), np.array(self._counts)
-        self._rows, self._counts = [], []
-        return Packets(
-            packets=rows,
-            counts=counts,
-            first_index=first_index,
-            rows=self.losses.samples - first_index,
-            last_time_s=last_time_s,
-            period_s=self._period_ns / _NS,
-            has_time=True,
-            arrival_ns=self._last_ns or 0,
-        )
+            rows, counts = np.array(self._rows, dtype=PACKET), np.array(self._counts)
+            self._rows, self._counts = [], []
+            position = Position(first_index, last_time_s, self._period_ns / _NS)
+            yield from sample_blocks(
+                rows, counts, self.losses.samples - first_index, position, self._last_ns or 0
+            )
 
     def _add_response(self, read: StampedRead) -> None:
         number = read.port & ~LATE

@@ -15,7 +15,16 @@ from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16, crc16_slice
 from drivers.errors import ProtocolError, SettingsError
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, PacketDecoder, Packets, Record, is_plausible_gap
+from drivers.packets import (
+    LOSS_FIELDS,
+    MAX_GAP_S,
+    PACKET,
+    Counts,
+    PacketDecoder,
+    Record,
+    count_packet,
+    is_plausible_gap,
+)
 
 START = b"S"
 STOP = b"P"
@@ -35,14 +44,11 @@ _FRAMES_PER_S = 200.0
 """Frames a second below 6.4 kHz: a sample waits for its frame for 5 ms at most."""
 _MAX_RATE_HZ = 1_000_000
 _HALF = 1 << 31
-_HEADER = np.dtype(
-    {
-        "names": ["seq", "t_us", "n"],
-        "formats": ["<u4", "<u4", "u1"],
-        "offsets": [4, 8, 12],
-        "itemsize": HEADER_BYTES,
-    }
+_U32 = 0xFFFFFFFF
+FRAME = np.dtype(
+    [("start", np.int64), ("end", np.int64), *((name, np.int64) for name in ("flags", "seq", "t_us", "n"))]
 )
+"""A good frame in a buffer: its place and its header."""
 
 
 class FrameFlags(IntFlag):
@@ -151,8 +157,8 @@ def encode_frames(
     table["sync"] = np.frombuffer(SYNC, dtype="<u2")
     table["version"] = VERSION
     table["flags"] = flags
-    table["seq"] = (first_index + n * np.arange(frames, dtype=np.int64)) & 0xFFFFFFFF
-    table["t_us"] = np.asarray(times_us, dtype=np.int64) & 0xFFFFFFFF
+    table["seq"] = (first_index + n * np.arange(frames, dtype=np.int64)) & _U32
+    table["t_us"] = np.asarray(times_us, dtype=np.int64) & _U32
     table["n"] = n
     table["counts"] = np.asarray(counts).reshape(frames, n, 2)
     wire = table.view(np.uint8).reshape(frames, frame_length(n))
@@ -204,26 +210,23 @@ class FrameDecoder(PacketDecoder):
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> Packets | None:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
         buffer = np.frombuffer(data, dtype=np.uint8)
-        offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
-        frames, samples, used = find_frames(buffer, offsets)
+        frames = np.empty(len(data) // MIN_FRAME_BYTES, dtype=FRAME)
+        found, samples, used = scan_frames(buffer, frames)
         self._unfinished = data[used:]
-        packets = np.empty(frames, dtype=PACKET)
+        packets = np.empty(found, dtype=PACKET)
         counts = np.empty((samples, 2), dtype=np.int32)
-        before = self._position()
         self._state["restart_rows"] = self._rows_since(arrival_ns, samples)
-        found, samples = count_frames(buffer, offsets[:frames], used, self._state, packets, counts)
-        return self._packets(packets[:found], counts[:samples], before, arrival_ns)
+        found, samples = count_frames(buffer, frames[:found], used, self._state, packets, counts)
+        return packets[:found], counts[:samples]
 
 
-def find_frame_headers(data: bytes) -> NDArray[np.void]:
-    """Headers of the good frames in `data`: (frames,) with fields seq, t_us and n."""
-    buffer = np.frombuffer(data, dtype=np.uint8)
-    offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
-    found, _, _ = find_frames(buffer, offsets)
-    headers: NDArray[np.void] = buffer[offsets[:found, None] + np.arange(HEADER_BYTES)].view(_HEADER)[:, 0]
-    return headers
+def find_frames(data: bytes) -> NDArray[np.void]:
+    """Good frames (f,) FRAME in `data`."""
+    frames = np.empty(len(data) // MIN_FRAME_BYTES, dtype=FRAME)
+    found, _, _ = scan_frames(np.frombuffer(data, dtype=np.uint8), frames)
+    return frames[:found]
 
 
 def rate_from_frames(data: bytes) -> float | None:
@@ -231,9 +234,9 @@ def rate_from_frames(data: bytes) -> float | None:
 
     Only frames after the last restart of the device count.
     """
-    frames = find_frame_headers(data)
-    steps = _differences(frames["seq"])
-    steps_us = _differences(frames["t_us"])
+    frames = find_frames(data)
+    steps = np.diff(frames["seq"]) & _U32
+    steps_us = np.diff(frames["t_us"]) & _U32
     is_ahead = (steps < _HALF) & (steps_us < _HALF)
     first = len(is_ahead) - int(np.argmin(is_ahead[::-1])) if not is_ahead.all() else 0
     span_us = int(steps_us[first:].sum())
@@ -242,17 +245,11 @@ def rate_from_frames(data: bytes) -> float | None:
     return float(steps[first:].sum()) / (span_us * 1e-6)
 
 
-def _differences(counter: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """Steps of a counter that wraps."""
-    return (counter[1:] - counter[:-1]).astype(np.int64)
-
-
 _SYNC_0, _SYNC_1 = SYNC
 _DROPPED_BEFORE = int(FrameFlags.DROPPED_BEFORE)
 _OVERLOADS = int(FrameFlags.OVERLOAD_TABLE | FrameFlags.OVERLOAD_RELATIVE)
 _OVERLOAD_SHIFT = 2
 """Shifts the overload bits of the frame onto those of `SampleStatus`."""
-_U32 = 0xFFFFFFFF
 
 STATE = np.dtype(
     [
@@ -275,14 +272,14 @@ STATE = np.dtype(
 
 
 @compiled
-def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Offsets of the good frames in `buffer`.
+def scan_frames(buffer: NDArray[np.uint8], frames: NDArray[np.void]) -> tuple[int, int, int]:
+    """Fill `frames` with the good ones in `buffer`; a bad candidate costs one byte.
 
-    A bad candidate costs one byte. Returns the number of frames, the number of their samples, and the number
-    of bytes that were used: the rest (at most 270) may become a frame.
+    Returns the number of frames, the number of their samples, and the number of bytes that were used: the
+    rest (at most 270) may become a frame.
     """
     at = 0
-    frames = 0
+    found = 0
     samples = 0
     while at + MIN_FRAME_BYTES <= len(buffer):
         if buffer[at] == _SYNC_0 and buffer[at + 1] == _SYNC_1 and buffer[at + 2] == VERSION:
@@ -293,25 +290,31 @@ def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[
                     break
                 crc = buffer[end - 2] | (np.uint64(buffer[end - 1]) << 8)
                 if crc16_slice(buffer, at + 2, end - 2) == crc:
-                    offsets[frames] = at
-                    frames += 1
+                    frame = frames[found]
+                    frame.start = at
+                    frame.end = end
+                    frame.flags = buffer[at + 3]
+                    frame.seq = _u32(buffer, at + 4)
+                    frame.t_us = _u32(buffer, at + 8)
+                    frame.n = n
+                    found += 1
                     samples += n
                     at = end
                     continue
         at += 1
-    return frames, samples, at
+    return found, samples, at
 
 
 @compiled
 def count_frames(
     buffer: NDArray[np.uint8],
-    offsets: NDArray[np.int64],
+    frames: NDArray[np.void],
     used: int,
     states: NDArray[np.void],
     packets: NDArray[np.void],
     counts: NDArray[np.int32],
 ) -> tuple[int, int]:
-    """Fill packets (frames,) and counts (samples, 2) of the frames at `offsets`; returns how many.
+    """Fill packets (frames,) and counts (samples, 2) of `frames`; returns how many.
 
     `used` bytes of the buffer will not be passed again; `states` (1,) is updated.
     """
@@ -319,26 +322,28 @@ def count_frames(
     found = 0
     sample = 0
     end = 0
-    for at in offsets:
-        _discard(state, at - end)
-        n = int(buffer[at + 12])
-        end = at + HEADER_BYTES + SAMPLE_BYTES * n + 2
-        if _is_repeated(state, buffer, at):
+    for frame in frames:
+        _discard(state, frame.start - end)
+        end = frame.end
+        is_again = frame.seq == state.last_seq and frame.t_us == state.last_t_us
+        if is_again and state.started and not state.restarting:
             state.repeated += 1
-            state.discarded_bytes += end - at
+            state.discarded_bytes += end - frame.start
             continue
-        gap, is_restart = _gap_before(state, buffer, at)
-        damaged = min(gap, -(-state.garbage // (end - at)) * n)
+        gap, is_restart = _gap_before(state, frame)
         packet = packets[found]
-        packet.damaged = damaged
-        packet.missing = gap - damaged
-        packet.time_s = _time_s(state, buffer, at, gap, is_restart)
-        packet.samples = n
-        packet.status = (buffer[at + 3] & _OVERLOADS) << _OVERLOAD_SHIFT
-        _count(state, packet, is_restart)
-        _update(state, buffer, at, packet)
-        _read_samples(buffer, at + HEADER_BYTES, counts[sample : sample + n])
-        sample += n
+        packet.damaged = min(gap, -(-state.garbage // (end - frame.start)) * frame.n)
+        packet.missing = gap - packet.damaged
+        packet.time_s = _time_s(state, frame, gap, is_restart)
+        packet.samples = frame.n
+        packet.status = (frame.flags & _OVERLOADS) << _OVERLOAD_SHIFT
+        count_packet(state, packet, is_restart)
+        state.restarts += is_restart
+        _update(state, frame, packet)
+        for at in range(frame.start + HEADER_BYTES, end - 2, SAMPLE_BYTES):
+            counts[sample, 0] = np.int32(_u32(buffer, at))
+            counts[sample, 1] = np.int32(_u32(buffer, at + 4))
+            sample += 1
         found += 1
     _discard(state, used - end)
     return found, sample
@@ -351,70 +356,42 @@ def _discard(state: Record, size: int) -> None:
 
 
 @inlined
-def _is_repeated(state: Record, buffer: NDArray[np.uint8], at: int) -> bool:
-    """Whether the frame is the last one again."""
-    if not state.started or state.restarting:
-        return False
-    return bool(_u32(buffer, at + 4) == state.last_seq and _u32(buffer, at + 8) == state.last_t_us)
-
-
-@inlined
-def _gap_before(state: Record, buffer: NDArray[np.uint8], at: int) -> tuple[int, bool]:
+def _gap_before(state: Record, frame: Record) -> tuple[int, bool]:
     """Rows lost before the frame, and whether a restart makes that an estimate."""
     if not state.started:
         return 0, False
-    gap = (_u32(buffer, at + 4) - state.next_seq) & _U32
+    gap = (frame.seq - state.next_seq) & _U32
     if gap > state.max_gap or (state.restarting and not is_plausible_gap(state, gap)):
         absent = state.restart_rows
         state.restart_rows = 0  # two restarts in one read share their time
         return absent, True
-    if gap == 0 and buffer[at + 3] & _DROPPED_BEFORE:
+    if gap == 0 and frame.flags & _DROPPED_BEFORE:
         state.unexplained_drops += 1
     return gap, False
 
 
 @inlined
-def _time_s(state: Record, buffer: NDArray[np.uint8], at: int, gap: int, is_restart: bool) -> float:
+def _time_s(state: Record, frame: Record, gap: int, is_restart: bool) -> float:
     """Unwrapped device time of the frame; it goes on over a restart."""
     if not state.started:
         state.packet_us = 0
     elif is_restart:
         state.packet_us = np.int64(np.rint((state.row_time_s + (gap + 1) * state.period_s) * 1e6))
     else:
-        step = (_u32(buffer, at + 8) - state.last_t_us) & _U32
+        step = (frame.t_us - state.last_t_us) & _U32
         state.packet_us += step if step < _U32 // 2 else step - _U32 - 1
     return float(state.packet_us * 1e-6)
 
 
 @inlined
-def _count(state: Record, packet: Record, is_restart: bool) -> None:
-    state.damaged += packet.damaged
-    if is_restart:
-        state.restarts += 1
-        state.missing_estimated += packet.missing
-    else:
-        state.missing += packet.missing
-    if packet.status:
-        state.overloaded += packet.samples
-    state.samples += packet.damaged + packet.missing + packet.samples
-
-
-@inlined
-def _update(state: Record, buffer: NDArray[np.uint8], at: int, packet: Record) -> None:
+def _update(state: Record, frame: Record, packet: Record) -> None:
     state.started = 1
     state.restarting = 0
     state.garbage = 0
-    state.last_seq = _u32(buffer, at + 4)
-    state.last_t_us = _u32(buffer, at + 8)
-    state.next_seq = (state.last_seq + packet.samples) & _U32
-    state.row_time_s = packet.time_s + (packet.samples - 1) * state.period_s
-
-
-@inlined
-def _read_samples(buffer: NDArray[np.uint8], at: int, counts: NDArray[np.int32]) -> None:
-    for k in range(len(counts)):
-        counts[k, 0] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k))
-        counts[k, 1] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k + 4))
+    state.last_seq = frame.seq
+    state.last_t_us = frame.t_us
+    state.next_seq = (frame.seq + frame.n) & _U32
+    state.row_time_s = packet.time_s + (frame.n - 1) * state.period_s
 
 
 @inlined

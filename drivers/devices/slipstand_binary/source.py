@@ -14,7 +14,7 @@ from drivers.devices.slipstand_binary.codec import (
     FrameDecoder,
     encode_frame,
     encode_rate,
-    find_frame_headers,
+    find_frames,
     find_identity,
     frame_length,
     rate_from_frames,
@@ -72,11 +72,9 @@ class SlipstandBinarySource(StreamSource):
 
     def resume(self, link: Link) -> bytes:
         """Continue; see `drivers.source.SampleSource`. Raises like `start`."""
-        received, sends = self.await_data(link, _LISTEN_S, lambda data: len(find_frame_headers(data)) > 0)
+        received, sends = self.await_data(link, _LISTEN_S, _has_frame)
         if sends:
-            more, _ = self.await_data(
-                link, _RATE_S, lambda data: rate_from_frames(received + data) is not None
-            )
+            more, _ = self.await_data(link, _RATE_S, lambda data: _has_rate(received + data))
             received += more
         rate_hz = rate_from_frames(received)
         if self._rate_hz and rate_hz and abs(rate_hz / self._rate_hz - 1) <= RATE_TOLERANCE:
@@ -108,10 +106,7 @@ class SlipstandBinarySource(StreamSource):
         return confirmed
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
-        def is_enough(received: bytes) -> bool:
-            return bool(rate_from_frames(received)) if measure else len(find_frame_headers(received)) > 0
-
-        received, good = self.await_data(link, timeout_s, is_enough)
+        received, good = self.await_data(link, timeout_s, _has_rate if measure else _has_frame)
         if not good:
             raise self.no_data_error(received)
         if measure:
@@ -130,6 +125,14 @@ class SlipstandBinarySource(StreamSource):
             )
 
 
+def _has_frame(received: bytes) -> bool:
+    return len(find_frames(received)) > 0
+
+
+def _has_rate(received: bytes) -> bool:
+    return rate_from_frames(received) is not None
+
+
 def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBinarySource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     parse_settings(BinarySettings, settings, DRIVER.name)
@@ -140,7 +143,7 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBin
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    frames = find_frame_headers(data)
+    frames = find_frames(data)
     share = sum(frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
     if not is_recognised(len(frames), share, has_checksum=True):
         return None

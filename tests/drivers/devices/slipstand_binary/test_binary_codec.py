@@ -11,7 +11,7 @@ from drivers.devices.slipstand_binary.codec import (
     FrameFlags,
     encode_frame,
     encode_frames,
-    find_frame_headers,
+    find_frames,
     rate_from_frames,
     samples_per_frame,
 )
@@ -404,7 +404,7 @@ def test_too_few_frames_show_no_rate():
 
 
 def test_frames_in_rubbish_are_listed():
-    found = find_frame_headers(RUBBISH + b"".join(stream(3, 4, first_index=9)) + RUBBISH)
+    found = find_frames(RUBBISH + b"".join(stream(3, 4, first_index=9)) + RUBBISH)
     assert found["seq"].tolist() == [9, 13, 17]
     assert found["n"].tolist() == [4, 4, 4]
 
