@@ -25,18 +25,12 @@ class Channel:
 
     @property
     def residual_m(self) -> Floats | None:
-        """Record minus fit."""
         return None if self.fit_m is None else self.record_m - self.fit_m
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Kinematics:
-    """Velocities and accelerations of the fitted motion, (n,) each at times in the base of the record.
-
-    Attributes
-    ----------
-    time_s, table_m, relative_m, table_m_per_s, plate_m_per_s, table_m_per_s2, plate_m_per_s2 : (n,) float64
-    """
+    """Velocities and accelerations of the fitted motion, (n,) each at times in the base of the record."""
 
     time_s: Floats
     table_m: Floats
@@ -49,20 +43,12 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Objective:
-    """What a fit would leave over with other values of f_d, all else as fitted.
-
-    Attributes
-    ----------
-    friction : (n,) float64
-        Rising.
-    residual_m : (n,) float64
-        Root mean square of what is left over, relative to the noise of each gauge.
-    fitted : float
-    interval_95 : (float, float)
-    """
+    """What a fit would leave over with other values of f_d, all else as fitted."""
 
     friction: Floats
+    """Rising."""
     residual_m: Floats
+    """Root mean square of what is left over, relative to the noise of each gauge."""
     fitted: float
     interval_95: tuple[float, float]
 
@@ -73,43 +59,29 @@ class Objective:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AnalysedRun:
-    """A stored run and what was found in it.
-
-    Attributes
-    ----------
-    path : Path
-    time_s : (n,) float64
-        In the base of the record, as are `events`.
-    table : Channel
-    relative : Channel or None
-        None without a second gauge.
-    results, labels, model, events, cautions
-        As in `analysis.identification.Identification`.
-    ended : str
-        Why the recording ended, as stored.
-    budget : tuple of BudgetLine
-        What the standard uncertainties consist of.
-    kinematics : Kinematics or None
-        None where no law without a running-in velocity was fitted.
-    objective : Objective or None
-        None where no f_d was found.
-    note : str
-        As stored with the run.
-    """
+    """A stored run and what was found in it."""
 
     path: Path
     time_s: Floats
+    """In the base of the record, as are `events`."""
     table: Channel
     relative: Channel | None
+    """None without a second gauge."""
     results: dict[str, Quantity] = field(default_factory=dict)
     labels: dict[str, str | bool] = field(default_factory=dict)
     model: ModelSelection | None = None
     events: Events = NO_EVENTS
     cautions: tuple[ResultWarning, ...] = ()
+    """results/labels/model/events/cautions: As in `analysis.identification.Identification`."""
     ended: str = ""
+    """Why the recording ended, as stored."""
     budget: tuple[BudgetLine, ...] = ()
+    """What the standard uncertainties consist of."""
     kinematics: Kinematics | None = None
+    """None where no law without a running-in velocity was fitted."""
     objective: Objective | None = None
+    """None where no f_d was found."""
     kind: AnalysisKind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
+    """As stored with the run."""

@@ -32,14 +32,12 @@ class Presenter(Generic[State]):
         view.show_state(self.state)
 
     def _set_state(self, state: State) -> None:
-        """Replace the state, and show it if it differs."""
         if state != self.state:
             self.state = state
             if self._view is not None:
                 self._view.show_state(state)
 
     def _update(self, **changes: Any) -> None:
-        """Replace fields of the state, and show it if that makes a difference."""
         if any(getattr(self.state, name) != value for name, value in changes.items()):
             self._set_state(replace(self.state, **changes))  # type: ignore[type-var]
 

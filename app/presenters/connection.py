@@ -54,7 +54,6 @@ class Connection:
 
     @property
     def is_active(self) -> bool:
-        """Tell whether a device is connected or being connected."""
         return self._opening is not None or self._opened is not None
 
     def open_port(self, port: PortSettings) -> None:
@@ -71,7 +70,6 @@ class Connection:
         self._open(lambda: self._simulate(options))
 
     def poll(self) -> list[Event | SimulationStarted]:
-        """Events since the last call."""
         started = self._take_opened()
         if self._opened is None:
             return started
@@ -153,7 +151,6 @@ class Connection:
             self._end(opening.result())
 
     def _end(self, opened: _Opened) -> None:
-        """End engine and stand, each whether or not the other fails."""
         for end in (opened.engine.close, opened.stand.stop if opened.stand else None):
             try:
                 if end is not None:

@@ -1,4 +1,4 @@
-"""Live samples kept for drawing: smallest and largest value of ever longer spans, kept up as samples come."""
+"""History of live samples for drawing: lowest and highest value of spans of doubling length."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,35 +13,27 @@ _LEVELS = 24
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Polyline:
-    """What is drawn of one channel.
-
-    Attributes
-    ----------
-    time_s : (n,) float64
-    value : (n,) float64
-        In the unit that was put in; NaN breaks the line.
-    """
+    """Line to draw of one channel; NaN breaks it."""
 
     time_s: NDArray[np.float64]
     value: NDArray[np.float64]
+    """In the unit that was put in; NaN breaks the line."""
 
     @classmethod
     def empty(cls) -> "Polyline":
-        """Nothing to draw."""
         return cls(np.empty(0), np.empty(0))
 
     @property
     def has_gaps(self) -> bool:
-        """Tell whether the line has gaps."""
         return bool(np.isnan(self.value).any())
 
     @property
     def is_min_max(self) -> bool:
-        """Tell whether points come in twos at one time: the lowest and the highest of a span."""
+        """Tell whether two points follow at each time: the lowest and the highest of a span."""
         return len(self.time_s) % 2 == 0 and np.array_equal(self.time_s[::2], self.time_s[1::2])
 
     def strokes(self, height: float) -> float:
-        """How often a pen that draws the line crosses the whole of a plot so high."""
+        """Length of the line in heights of the plot."""
         return float(np.nansum(np.abs(np.diff(self.value)))) / height
 
 
@@ -50,7 +42,7 @@ _Spans = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]
 
 
 class _Level:
-    """The newest spans of equally many rows: first time, lowest and highest value of each channel."""
+    """Newest spans of one length: first time, lowest and highest value of each channel."""
 
     def __init__(self, capacity: int) -> None:
         self._time_s = np.empty(capacity)
@@ -63,7 +55,6 @@ class _Level:
 
     @property
     def time_s(self) -> NDArray[np.float64]:
-        """Beginnings of the spans held."""
         return self._time_s[: self.end - self.first]
 
     def append(
@@ -78,7 +69,7 @@ class _Level:
         self.end += len(time_s)
 
     def spans(self, first: int, end: int) -> _Spans:
-        """Spans by number, as far as they are held."""
+        """Spans by number, as far as they are kept."""
         kept = slice(max(first - self.first, 0), max(end - self.first, 0))
         return self._time_s[kept], self._low[kept], self._high[kept]
 
@@ -96,14 +87,9 @@ class _Level:
 class DecimatedHistory:
     """Rows of two channels, from which any time span is drawn with a few points a pixel.
 
-    Appending costs the new rows only, drawing the pixels only, and the memory is bounded however long the
-    history is: of each length of span the newest are kept. So the last rows are there one by one, an hour
-    or a day as finely as a screen can show it whole.
-
-    Parameters
-    ----------
-    capacity : int
-        Spans kept of each length at most; at least 4096, four times the pixels of the widest screen.
+    Appending costs the new rows only, drawing the pixels only. The newest `capacity` spans of each length are
+    kept: the last rows one by one, a day as finely as a screen can show it. `capacity` is at least 4096, four
+    times the pixels of the widest screen.
     """
 
     def __init__(self, capacity: int = 1 << 16) -> None:
@@ -120,15 +106,7 @@ class DecimatedHistory:
         return float(time_s[-1]) if len(time_s) else float("nan")
 
     def append(self, time_s: NDArray[np.float64], values: NDArray[np.floating]) -> None:
-        """Add rows at the end.
-
-        Parameters
-        ----------
-        time_s : (n,) float64
-            Increasing, later than all rows before.
-        values : (n, 2) float
-            NaN where absent.
-        """
+        """Add later rows: times (n,), increasing, and values (n, 2), NaN where absent."""
         quarter = self._capacity // 4
         for start in range(0, len(time_s), quarter):
             chunk = slice(start, start + quarter)
@@ -155,7 +133,6 @@ class DecimatedHistory:
         return np.where(present, np.nansum(rows, axis=0) / np.maximum(present, 1), np.nan)
 
     def clear(self) -> None:
-        """Forget everything."""
         self._levels = [_Level(self._capacity) for _ in range(_LEVELS)]
 
     def _decimate(self) -> None:

@@ -37,12 +37,7 @@ class ErrorReport:
 class ErrorReporter:
     """Takes reports from any thread, appends them to a file, and hands them to the window.
 
-    Parameters
-    ----------
-    log : Path, optional
-        File; a full one is renamed to `.old`.
-    clock : callable
-        Monotonic time (s).
+    A full file `log` is renamed to `.old`. `clock` is monotonic (s).
     """
 
     def __init__(self, log: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:

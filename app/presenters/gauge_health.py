@@ -26,26 +26,17 @@ class SymptomText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GaugeHealthState:
-    """What is shown of one gauge.
-
-    Attributes
-    ----------
-    name : str
-    verdict : Verdict
-    symptoms : tuple of SymptomText
-        The worst first.
-    figures : tuple of Fact
-        The same lines for each gauge.
-    frequency_hz, density_um : (k,) float64
-        Its spectrum, in um/sqrt(Hz).
-    """
+    """What is shown of one gauge."""
 
     name: str
     verdict: HealthGrade
     symptoms: tuple[SymptomText, ...]
+    """The worst first."""
     figures: tuple[LabelledValue, ...]
+    """The same lines for each gauge."""
     frequency_hz: np.ndarray
     density_um: np.ndarray
+    """frequency_hz/density_um: Its spectrum, in um/sqrt(Hz)."""
 
 
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:

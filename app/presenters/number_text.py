@@ -1,19 +1,20 @@
-"""Numbers of the window: true minus signs, thin spaces, and what people type."""
+"""Numbers in the window: true minus signs, thin spaces, and numbers as typed."""
 
 import math
 
 from analysis import formatting
 from analysis.formatting import MINUS, format_value, typeset, with_unit
 from analysis.quantities import Quantity
+from messages.message import MessageError
 
 
 def normalize_number(text: str) -> str:
-    """What a person typed, as Python reads it: a decimal comma and a true minus are fine."""
+    """Convert a typed number to Python's form: a decimal comma and a true minus sign are accepted."""
     return text.strip().replace(",", ".").replace(MINUS, "-")
 
 
 def parse_number(text: str) -> float | None:
-    """Read a number that a person typed: None where nothing is, NaN where it is no finite number."""
+    """Read a typed number: None for an empty text, NaN for one that is no finite number."""
     if not text.strip():
         return None
     try:
@@ -23,14 +24,28 @@ def parse_number(text: str) -> float | None:
     return value if math.isfinite(value) else math.nan
 
 
+class FormError(MessageError, ValueError):
+    """A field of a form cannot be used; the message names field, value and remedy."""
+
+
+def parse_field(text: str, name: str, scale: float = 1.0) -> float | None:
+    """Read the field `name` of a form in `scale` per unit; None if it is empty. Raises FormError."""
+    value = parse_number(text)
+    if value is not None and math.isnan(value):
+        raise FormError(
+            "{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip()
+        )
+    return None if value is None else value / scale
+
+
 def format_uncertain(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
-    """Value and uncertainty to the same digit; `scale` of the shown unit make one of the quantity's own."""
+    """Write value and uncertainty to the same digit, multiplied by `scale`."""
     formatted = format_value(quantity.value * scale, quantity.standard_uncertainty * scale)
     return typeset(formatted.value), formatted.uncertainty
 
 
 def format_millimetres(value_m: float, decimals: int = 1) -> str:
-    """Write a length (m) in millimetres, without unit; a dash where there is none."""
+    """Write a length (m) in millimetres, without unit; a dash for NaN."""
     return format_fixed(value_m * 1e3, decimals) if math.isfinite(value_m) else "–"
 
 

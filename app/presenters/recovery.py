@@ -20,19 +20,10 @@ class RecoverFolder:
 
 @dataclass(frozen=True, slots=True)
 class RecoveryReport:
-    """What came of it.
-
-    Attributes
-    ----------
-    runs : tuple of str
-        Paths of the runs that are whole now.
-    kept : tuple of str
-        Files that they took the place of and that hold something of their own.
-    faults : tuple of str
-        A line for each journal that could not be used.
-    """
+    """What came of it."""
 
     runs: tuple[str, ...] = ()
+    """Paths of the runs that are whole now."""
     replaced_files: tuple[str, ...] = ()
     errors: tuple[str, ...] = ()
 

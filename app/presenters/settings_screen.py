@@ -9,6 +9,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
 from config.schema import ConfigError, Settings
 from messages.i18n import N_, gettext
+from messages.message import message_of
 
 THEMES = {
     "system": N_("As the system"),
@@ -81,21 +82,20 @@ class SettingsPresenter(Presenter[SettingsState]):
         self._before: list[Settings] = []
 
     def change(self, **changes: Any) -> None:
-        """Set fields of `Settings`; an invalid value changes nothing."""
+        """Set fields of `Settings`, and save them; an invalid value changes nothing."""
         before = self.state.settings
         try:
             if folder := changes.get("recordings"):
                 _check_folder(folder)
             settings = before.replace(**changes)
         except (ConfigError, ValueError) as error:
-            self._update(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(message_of(error)), Tone.BAD))
             return
         if settings != before:
             self._before.append(before)
             self._apply_settings(settings)
 
     def undo(self) -> None:
-        """Undo the last change."""
         if self._before:
             self._apply_settings(self._before.pop())
 
@@ -110,22 +110,18 @@ class SettingsPresenter(Presenter[SettingsState]):
         try:
             backup = self._save_settings(settings)
         except ConfigError as error:
-            return Chip(sentence(str(error)), Tone.BAD)
+            return Chip(sentence(error.message), Tone.BAD)
         if backup is None:
             return EMPTY_CHIP
-        return Chip(
-            gettext("The file before could not be read. It is kept as {name}", name=backup.name), Tone.WARN
-        )
+        text = gettext("The file before could not be read. It is kept as {name}", name=backup.name)
+        return Chip(text, Tone.WARN)
 
 
 def _check_folder(folder: str) -> None:
-    """Check a folder of runs. Raises ConfigError."""
     path = Path(folder).expanduser()
     if not path.is_absolute():
         raise ConfigError(
-            gettext(
-                "Folder {folder} is no full path: choose it, or write one from the root on", folder=folder
-            )
+            "Folder {folder} is no full path: choose it, or write one from the root on", folder=folder
         )
     if path.exists() and not path.is_dir():
-        raise ConfigError(gettext("{folder} is a file: choose a folder", folder=folder))
+        raise ConfigError("{folder} is a file: choose a folder", folder=folder)

@@ -1,6 +1,5 @@
 """The Simulated stand screen: state and presenter. Options before the start, faults and truth after it."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -9,7 +8,7 @@ import msgspec
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
-from app.presenters.number_text import format_fixed, format_millimetres, parse_number
+from app.presenters.number_text import format_fixed, format_millimetres, parse_field
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
@@ -17,6 +16,7 @@ from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError
 from messages.i18n import gettext
+from messages.message import message_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,33 +34,19 @@ class StandForm:
 
 @dataclass(frozen=True, slots=True)
 class StandState:
-    """State of the screen.
-
-    Attributes
-    ----------
-    all_series : tuple of str
-    form : StandForm
-    defaults : StandForm
-    is_running : bool
-        Whether the simulated stand is connected.
-    fault_duration_s : str
-        Duration of the next fault, as typed.
-    truth : tuple of LabelledValue
-        True parameters of the running stand.
-    disturbances : tuple of str
-        Injected faults, the newest first.
-    message : Chip
-        What is wrong with the last input.
-    """
+    """State of the screen."""
 
     all_series: tuple[str, ...]
     form: StandForm
     defaults: StandForm
     is_running: bool = False
     fault_duration_s: str = "2"
+    """Duration of the next fault, as typed."""
     truth: tuple[LabelledValue, ...] = ()
     disturbances: tuple[str, ...] = ()
+    """Injected faults, the newest first."""
     message: Chip = EMPTY_CHIP
+    """What is wrong with the last input."""
 
 
 _MAX_LISTED: Final = 8
@@ -72,15 +58,8 @@ _TRUTH_EVERY: Final = 30
 class StandPresenter(Presenter[StandState]):
     """Starts and disturbs the simulated stand.
 
-    Parameters
-    ----------
-    options : SimulatedStandOptions
-        Defaults, and options that are not on the screen.
-    all_series : tuple of str
-    open_stand : callable
-        Starts a stand and connects to it.
-    running : callable
-        Returns the connected stand, or None.
+    `options` are defaults, also of what is not on the screen. `open_stand` starts a stand and connects to it.
+    `running` returns the connected stand, or None.
     """
 
     def __init__(
@@ -98,24 +77,20 @@ class StandPresenter(Presenter[StandState]):
         self._ticks = 0
 
     def set_form(self, form: StandForm) -> None:
-        """Replace the form."""
         self._update(form=form, defaults=_default_form(self._options, form), message=EMPTY_CHIP)
 
     def start(self) -> None:
-        """Start a stand with these options, and connect to it."""
         try:
             options = stand_options(self.state.form, self._options)
         except ValueError as error:
-            self._update(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(message_of(error)), Tone.BAD))
         else:
             self._open_stand(options)
 
     def set_fault_duration(self, seconds: str) -> None:
-        """Set the duration of the next fault."""
         self._update(fault_duration_s=seconds, message=EMPTY_CHIP)
 
     def inject_fault(self, kind: str) -> None:
-        """Inject a fault now."""
         stand = self._running()
         if stand is None:
             self._update(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
@@ -124,7 +99,7 @@ class StandPresenter(Presenter[StandState]):
         try:
             stand.disturb(text)
         except (SettingsError, SimulatedStandError) as error:
-            self._update(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(error.message), Tone.BAD))
         else:
             self._update(message=EMPTY_CHIP)
 
@@ -134,7 +109,6 @@ class StandPresenter(Presenter[StandState]):
         return msgspec.structs.replace(self._options, series=series)
 
     def tick(self) -> None:
-        """Update the truth now and then."""
         self._ticks = (self._ticks + 1) % _TRUTH_EVERY
         stand = self._running()
         if self._ticks and (stand is not None) == self.state.is_running:
@@ -149,12 +123,12 @@ class StandPresenter(Presenter[StandState]):
 def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """Options of a form. Raises ValueError that names field, value and remedy."""
     wanted = {
-        "friction": _number(form.friction, gettext("Friction")),
-        "tilt_rad": _scaled(form.tilt_mrad, gettext("Tilt"), 1e3),
-        "noise_m": _scaled(form.noise_um, gettext("Noise"), 1e6),
-        "rate_hz": _number(form.rate_hz, gettext("Rate")),
-        "drop": _scaled(form.drop_percent, gettext("Frames that lose a byte"), 100.0),
-        "flip": _scaled(form.flip_percent, gettext("Frames with a wrong bit"), 100.0),
+        "friction": parse_field(form.friction, gettext("Friction")),
+        "tilt_rad": parse_field(form.tilt_mrad, gettext("Tilt"), 1e3),
+        "noise_m": parse_field(form.noise_um, gettext("Noise"), 1e6),
+        "rate_hz": parse_field(form.rate_hz, gettext("Rate")),
+        "drop": parse_field(form.drop_percent, gettext("Frames that lose a byte"), 100.0),
+        "flip": parse_field(form.flip_percent, gettext("Frames with a wrong bit"), 100.0),
     }
     filled = {name: value for name, value in wanted.items() if value is not None}
     return msgspec.structs.replace(base, series=form.series, **filled)
@@ -167,25 +141,22 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
     if truth.release_s:
         at = with_unit(f"{truth.release_s[-1]:.1f}", "s")
         releases = gettext("{count}, the last {at} after its start", count=releases, at=at)
-    return (
-        LabelledValue(gettext("series"), stand.series),
-        LabelledValue("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
-        LabelledValue("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
-        LabelledValue(gettext("tilt"), with_unit(typeset(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
-        LabelledValue(gettext("pullback"), with_unit(format_millimetres(stand.pullback_m, 2), "mm")),
-        LabelledValue("T", with_unit(format_fixed(stand.period_s * 1e3, 2), "ms")),
-        LabelledValue("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
-        LabelledValue(
-            gettext("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")
-        ),
-        LabelledValue(
-            gettext("slip of a release"),
-            with_unit(format_millimetres(truth.residual_displacement_m, 3), "mm"),
-        ),
-        LabelledValue(gettext("releases"), releases),
-        LabelledValue(gettext("frames sent"), f"{wire.frames}"),
-        LabelledValue(gettext("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
-    )
+    masses = f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}"
+    values = {
+        gettext("series"): stand.series,
+        "f<sub>d</sub>": f"{stand.friction_dynamic:.5g}",
+        "f<sub>s</sub>": f"{stand.friction_static:.5g}",
+        gettext("tilt"): with_unit(typeset(f"{stand.tilt_rad * 1e3:.3g}"), "mrad"),
+        gettext("pullback"): with_unit(format_millimetres(stand.pullback_m, 2), "mm"),
+        "T": with_unit(format_fixed(stand.period_s * 1e3, 2), "ms"),
+        "n<sub>1</sub>": with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s"),
+        gettext("table, plate"): with_unit(masses, "kg"),
+        gettext("slip of a release"): with_unit(format_millimetres(truth.residual_displacement_m, 3), "mm"),
+        gettext("releases"): releases,
+        gettext("frames sent"): f"{wire.frames}",
+        gettext("damaged, lost"): f"{wire.frames_damaged}, {wire.frames_lost}",
+    }
+    return tuple(LabelledValue(label, value) for label, value in values.items())
 
 
 def _happened(truth: Truth) -> tuple[str, ...]:
@@ -198,7 +169,6 @@ def _happened(truth: Truth) -> tuple[str, ...]:
 
 
 def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
-    """Defaults of the form."""
     friction = options.friction
     if friction is None:
         friction = published_row(form.series).friction_dynamic
@@ -211,21 +181,3 @@ def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
         f"{options.drop * 100:g}",
         f"{options.flip * 100:g}",
     )
-
-
-def _scaled(text: str, name: str, parts: float) -> float | None:
-    """Parse a number in `parts` per unit."""
-    value = _number(text, name)
-    return None if value is None else value / parts
-
-
-def _number(text: str, name: str) -> float | None:
-    """Parse a number; None for an empty text. Raises ValueError."""
-    value = parse_number(text)
-    if value is not None and math.isnan(value):
-        raise ValueError(
-            gettext(
-                "{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip()
-            )
-        )
-    return value

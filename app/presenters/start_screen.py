@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
 from app.presenters.navigator import ConnectForm, Navigator
-from app.presenters.number_text import parse_number
-from messages.i18n import gettext
+from app.presenters.number_text import FormError, parse_number
+from messages.i18n import gettext, translate
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +46,11 @@ class StartState:
 
     @property
     def selected_protocol(self) -> ProtocolChoice | None:
-        """Protocol of the form; None if it is unknown."""
         return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
 
 
 class StartPresenter(Presenter[StartState]):
-    """Checks the form, and opens connections and runs.
-
-    Parameters
-    ----------
-    state : StartState
-        Initial state.
-    navigator : Navigator
-    ports : callable
-        Lists the serial ports of this computer.
-    """
+    """Checks the form, and opens connections and runs; `ports` lists the serial ports of this computer."""
 
     def __init__(
         self, state: StartState, navigator: Navigator, ports: Callable[[], tuple[PortChoice, ...]]
@@ -70,21 +60,17 @@ class StartPresenter(Presenter[StartState]):
         self._ports = ports
 
     def set_series(self, code: str) -> None:
-        """Select the series of the simulated stand."""
         if code in self.state.all_series:
             self._update(series=code)
 
     def start_simulation(self) -> None:
-        """Start the simulated stand and connect to it."""
         if not self.state.busy:
             self.navigator.open_simulated(self.state.series)
 
     def refresh_ports(self) -> None:
-        """List the ports again."""
         self._update(ports=self._ports())
 
     def set_form(self, form: ConnectForm) -> None:
-        """Replace the form."""
         self._update(form=form, form_error="")
 
     def connect(self) -> None:
@@ -93,13 +79,12 @@ class StartPresenter(Presenter[StartState]):
             return
         try:
             port = port_settings(self.state.form)
-        except ValueError as error:
-            self._update(form_error=str(error))
+        except FormError as error:
+            self._update(form_error=translate(error.message))
         else:
             self.navigator.open_port(port)
 
     def open_run(self, path: str) -> None:
-        """Open a run file."""
         if path:
             self.navigator.open_run(path)
 
@@ -113,15 +98,15 @@ class StartPresenter(Presenter[StartState]):
 
 
 def port_settings(form: ConnectForm) -> PortSettings:
-    """Settings of a port. Raises ValueError that names field, value and remedy."""
+    """Settings of a port. Raises FormError."""
     if not form.port.strip():
-        raise ValueError(gettext("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port"))
+        raise FormError("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port")
     return PortSettings(
         url=form.port.strip(),
         protocol=form.protocol,
-        baud=_whole(form.baud, gettext("Baud")),
+        baud=_whole(form.baud.strip(), gettext("Baud")),
         parity=form.parity,
-        rate_hz=_number(form.rate_hz, gettext("Rate")),
+        rate_hz=_positive(form.rate_hz.strip(), gettext("Rate")),
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),
     )
@@ -132,37 +117,26 @@ def _settings(text: str) -> dict[str, str]:
     for pair in text.split():
         key, equals, value = pair.partition("=")
         if not (key and equals):
-            raise ValueError(
-                gettext("Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1", pair=pair)
+            raise FormError(
+                "Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1", pair=pair
             )
         settings[key] = value
     return settings
 
 
 def _whole(text: str, name: str) -> int | None:
-    value = _number(text, name)
+    value = _positive(text, name)
     if value is not None and value != int(value):
-        raise ValueError(
-            gettext(
-                "{name} {text!r} is not a whole number: write one, or leave it empty",
-                name=name,
-                text=text.strip(),
-            )
+        raise FormError(
+            "{name} {text!r} is not a whole number: write one, or leave it empty", name=name, text=text
         )
     return None if value is None else int(value)
 
 
-def _number(text: str, name: str) -> float | None:
-    """Parse a positive number; None for an empty text. Raises ValueError."""
+def _positive(text: str, name: str) -> float | None:
     value = parse_number(text)
-    if value is None:
-        return None
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(
-            gettext(
-                "{name} {text!r} is not a number above 0: write one, or leave it empty",
-                name=name,
-                text=text.strip(),
-            )
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise FormError(
+            "{name} {text!r} is not a number above 0: write one, or leave it empty", name=name, text=text
         )
     return value

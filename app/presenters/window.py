@@ -4,15 +4,17 @@ import getpass
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
+from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Notice, Presenter, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
-from app.presenters.events import SimulationStarted, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import IdentifyTask
@@ -67,19 +69,7 @@ class WindowState:
 
 @dataclass(frozen=True, slots=True)
 class WindowContext:
-    """What the window starts with.
-
-    Attributes
-    ----------
-    start : StartState
-        First state of the Start screen.
-    simulation : SimulatedStandOptions
-        Options of the simulated stand that is offered.
-    list_ports : callable
-        Serial ports of this computer.
-    count_unfinished : callable
-        Number of runs in the folder that a crash has left unfinished.
-    """
+    """What the window starts with."""
 
     stand: StandContext
     start: StartState
@@ -87,25 +77,15 @@ class WindowContext:
     simulation: SimulatedStandOptions = field(default_factory=SimulatedStandOptions)
     list_ports: Callable[[], tuple[PortChoice, ...]] = tuple
     count_unfinished: Callable[[], int] = lambda: 0
+    """Number of runs in the folder that a crash has left unfinished."""
 
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Workers of the screens: tasks of one worker are carried out in turn, those of two at the same time.
-
-    Attributes
-    ----------
-    analysis : Worker
-        Identifies recorded and opened runs, in a process of its own that has the analysis loaded.
-    record, runs, campaign, gauges : Worker
-        Tasks of these screens.
-    batch : Worker
-        Analyses of many runs.
-    ports : Worker
-        Probes ports.
-    """
+    """Workers of the screens: tasks of one worker are carried out in turn, those of two at the same time."""
 
     analysis: Worker
+    """Identifies recorded and opened runs, in a process of its own that has the analysis loaded."""
     record: Worker
     runs: Worker
     batch: Worker
@@ -123,16 +103,7 @@ class Workers:
 
 
 class WindowPresenter(Presenter[WindowState]):
-    """Owns the presenters of all screens, the connection and the workers.
-
-    Parameters
-    ----------
-    connection : Connection
-    workers : Workers
-    context : WindowContext
-    errors : ErrorReporter, optional
-        Its reports are shown.
-    """
+    """Owns the presenters of all screens, the connection and the workers; shows the reports of `errors`."""
 
     def __init__(
         self,
@@ -172,7 +143,6 @@ class WindowPresenter(Presenter[WindowState]):
     # --- screens and notices ---
 
     def show_screen(self, screen: Screen) -> None:
-        """Show another screen; a recording goes on."""
         if screen is Screen.RUNS:
             self.runs.refresh()
         elif screen is Screen.CAMPAIGN:
@@ -180,11 +150,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._show(screen)
 
     def dismiss_notice(self) -> None:
-        """Hide the notice."""
         self._update(notice=None)
 
     def execute_notice_action(self) -> None:
-        """Execute the action of the notice."""
         offered = self.state.notice.action if self.state.notice else ""
         self._update(notice=None)
         if offered == RECOVER:
@@ -194,31 +162,23 @@ class WindowPresenter(Presenter[WindowState]):
             self.reconnect()
 
     def open_simulated(self, series: str) -> None:
-        """Start the simulated stand with its usual options, and record from it."""
         self.open_stand(self.stand.select_series(series))
 
     def open_stand(self, options: SimulatedStandOptions) -> None:
-        """Start a simulated stand and record from it."""
-        self._connect(
-            gettext("Simulated stand"),
-            gettext("Starting the simulated stand"),
-            lambda: self._connection.open_simulated(options),
-        )
+        waiting_for = gettext("Starting the simulated stand")
+        open_it = partial(self._connection.open_simulated, options)
+        self._connect(gettext("Simulated stand"), waiting_for, open_it)
 
     def open_port(self, port: PortSettings) -> None:
-        """Record from an amplifier."""
-        self._connect(
-            port.url, gettext("Connecting to {port}", port=port.url), lambda: self._connection.open_port(port)
-        )
+        waiting_for = gettext("Connecting to {port}", port=port.url)
+        self._connect(port.url, waiting_for, partial(self._connection.open_port, port))
 
     def close_connection(self) -> None:
-        """Disconnect, unless a run is being recorded."""
         if not self._refuse_while_recording():
             self._connection.disconnect()
             self._forget_connection()
 
     def open_run(self, path: str) -> None:
-        """Show a run on Identify."""
         path = str(Path(path).absolute())
         self.identify.on_opening(path)
         self._show(Screen.IDENTIFY)
@@ -226,52 +186,44 @@ class WindowPresenter(Presenter[WindowState]):
         self._workers.analysis.submit(ANALYSE, path)
 
     def show_runs(self, folder: str, series: str) -> None:
-        """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
         if folder != self.runs.state.folder:
             self.runs.choose_folder(folder)
         self.runs.set_filter(RunFilter(series=series))
         self.show_screen(Screen.RUNS)
 
     def show_record(self) -> None:
-        """Show Record."""
         self.show_screen(Screen.RECORD)
 
     def show_start(self) -> None:
-        """Show Start, where a device is connected."""
         self.show_screen(Screen.START)
 
     def fill_connection(self, form: ConnectForm) -> None:
-        """Show Start with a form filled in."""
         self.start.set_form(form)
         self.show_screen(Screen.START)
 
     def fill_second_port(self, url: str) -> None:
-        """Show Start with the port of gauge 2's own device filled in."""
         self.fill_connection(replace(self.start.state.form, relative_port=url))
 
     def reconnect(self) -> None:
-        """Connect to the same device again."""
         if self._open_again is not None:
             self._open_again()
 
     def set_gauges(self, gauges: Gauges) -> None:
-        """Use these calibrations from now on."""
         self.record.dispatch(gauges)
 
     def ask_to_recover(self) -> None:
-        """Offer to recover runs that a crash has left unfinished, if there are any."""
         count = self._count_unfinished()
         if count:
             self._update(notice=recovery.recovery_question(count))
 
     def warm_up(self) -> None:
-        """Load the analysis beforehand, so that the first one is as fast as the others."""
+        """Load the analysis, so that the first one is as fast as the others."""
         self._workers.analysis.submit(WARM_UP, None)
 
     # --- events ---
 
     def tick(self) -> None:
-        """Take events of engine and workers, and new samples; to be called some 60 times a second."""
+        """Process events of engine and workers, and new samples; called some 60 times a second."""
         if (report := self._errors.next_report()) is not None:  # first: the rest may fail
             self._update(notice=Notice(sentence(report.message), Tone.BAD, details=report.details))
         for event in self._connection.poll():
@@ -284,7 +236,6 @@ class WindowPresenter(Presenter[WindowState]):
         self._poll_analysis()
 
     def close(self) -> None:
-        """Finish a run that is being recorded, and end all processes."""
         self._connection.close()
         self._workers.analysis.close()
         self.record.close()
@@ -304,7 +255,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
         if self._refuse_while_recording():
             return
-        self._open_again = lambda: self._connect(device, waiting_for, open_it)
+        self._open_again = partial(self._connect, device, waiting_for, open_it)
         self._forget_connection()
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
@@ -324,11 +275,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(screen=screen)
 
     def _refuse_while_recording(self) -> bool:
-        """Show a notice if a run is being recorded, which another connection would cut short."""
         if self.record.is_recording:
-            self._update(
-                notice=Notice(gettext("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
-            )
+            text = gettext("A run is being recorded. Stop it first: Esc on Record")
+            self._update(notice=Notice(text, Tone.WARN))
         return self.record.is_recording
 
     def _forget_connection(self) -> None:
@@ -345,26 +294,21 @@ class WindowPresenter(Presenter[WindowState]):
             self.start.set_connected(event.device)
             self.gauges.on_connected(event)
         elif isinstance(event, RunEnded):
-            self._run_ended(event)
+            self._on_run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
             self._update(notice=self._failure_notice(event.message, RECONNECT))
 
-    def _run_ended(self, event: RunEnded) -> None:
+    def _on_run_ended(self, event: RunEnded) -> None:
         if event.message:
-            self._update(
-                notice=self._failure_notice(
-                    event.message, tone=Tone.WARN if event.ended.is_normal else Tone.BAD
-                )
-            )
-        if not event.path:
-            return
-        self._true_frictions[event.path] = self._true_friction
-        self.identify.on_opening(event.path)
-        self._workers.analysis.submit(ANALYSE, event.path)
+            tone = Tone.WARN if event.ended.is_normal else Tone.BAD
+            self._update(notice=self._failure_notice(event.message, tone=tone))
+        if event.path:
+            self._true_frictions[event.path] = self._true_friction
+            self.identify.on_opening(event.path)
+            self._workers.analysis.submit(ANALYSE, event.path)
 
     def _failure_notice(self, message: Message | str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
-        """Notice of an error; if it has left a run unfinished, recovery is offered first."""
         if self._count_unfinished():
             return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
         return Notice(sentence(message), tone, action)
@@ -374,25 +318,27 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_analysis_event(event)
 
     def _on_recovery_event(self, event: WorkerEvent) -> None:
-        if isinstance(event, TaskProgress):
-            self._update(notice=recovery.recovery_progress(event.progress))
-        elif isinstance(event, TaskFailed):
-            self._update(notice=Notice(sentence(event.message), Tone.BAD, RECOVER, LATER))
-        else:
-            self._update(notice=recovery.recovery_outcome(event.answer))
-            self.record.dispatch(RunsChanged())
+        match event:
+            case TaskProgress(_, progress):
+                self._update(notice=recovery.recovery_progress(progress))
+            case TaskFailed(_, message):
+                self._update(notice=Notice(sentence(message), Tone.BAD, RECOVER, LATER))
+            case TaskDone(_, report):
+                self._update(notice=recovery.recovery_outcome(report))
+                self.record.dispatch(RunsChanged())
 
     def _on_analysis_event(self, event: WorkerEvent) -> None:
-        if isinstance(event.argument, RecoverFolder):
-            self._on_recovery_event(event)
-        elif isinstance(event.argument, IdentifyTask):
-            self.identify.on_event(event)
-        elif isinstance(event, TaskProgress):
-            self.record.dispatch(event)
-            self.identify.on_progress(event.argument, event.progress)
-        elif isinstance(event, TaskFailed):
-            self.record.dispatch(event)
-            self.identify.on_failed(event.argument, event.message)
-        elif event.answer is not None:
-            self.record.dispatch(event.answer)
-            self.identify.on_analysed(event.answer, self._true_frictions.get(event.argument))
+        match event:
+            case _ if isinstance(event.argument, RecoverFolder):
+                self._on_recovery_event(event)
+            case _ if isinstance(event.argument, IdentifyTask):
+                self.identify.on_event(event)
+            case TaskProgress(path, progress):
+                self.record.dispatch(event)
+                self.identify.on_progress(path, progress)
+            case TaskFailed(path, message):
+                self.record.dispatch(event)
+                self.identify.on_failed(path, message)
+            case TaskDone(path, AnalysedRun() as run):
+                self.record.dispatch(run)
+                self.identify.on_analysed(run, self._true_frictions.get(path))

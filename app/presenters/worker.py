@@ -1,4 +1,4 @@
-"""Long work in child processes, so that the window never waits."""
+"""Long tasks in child processes, so that the window does not wait."""
 
 import atexit
 import contextlib
@@ -41,7 +41,6 @@ class LazyFunction:
     name: str
 
     def __call__(self, *arguments: Any) -> Any:
-        """Import the function and call it."""
         return getattr(importlib.import_module(self.module), self.name)(*arguments)
 
 
@@ -55,7 +54,6 @@ class WorkerPool:
         self._idle: list[_TaskProcess] = []
 
     def acquire(self) -> "_TaskProcess":
-        """Take an idle process, or start one."""
         while self._idle:
             process = self._idle.pop()
             if process.is_alive:
@@ -64,11 +62,9 @@ class WorkerPool:
         return _TaskProcess()
 
     def release(self, process: "_TaskProcess") -> None:
-        """Give back a process that has no tasks."""
         self._idle.append(process)
 
     def close(self) -> None:
-        """End all idle processes."""
         processes, self._idle = self._idle, []
         for process in processes:
             process.detach()
@@ -79,15 +75,9 @@ class WorkerPool:
 class Worker:
     """Carries out tasks in a child process, one after another.
 
-    No method but `close` waits; `poll` returns what has happened. `close` must be called.
-
-    Parameters
-    ----------
-    report_error : callable, optional
-        Takes errors of the program itself, in addition to the failure of the task.
-    pool : WorkerPool, optional
-        Processes that are shared with other workers. Without one the worker keeps a process of its own, with
-        what its tasks have loaded.
+    No method but `close`, which must be called, waits. `report_error` takes errors of the program itself, in
+    addition to the failure of the task. Workers with a `pool` share its processes; a worker without one keeps
+    a process of its own, with what its tasks have loaded.
     """
 
     def __init__(
@@ -104,7 +94,6 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether a task is being carried out or waits."""
         return bool(self._waiting)
 
     def submit(self, task: Task, argument: Any) -> None:
@@ -115,7 +104,6 @@ class Worker:
         self._process.send(task, argument)
 
     def poll(self) -> list[WorkerEvent]:
-        """Events since the last call."""
         events, self._cancelled = self._cancelled, []
         self._ending = [process for process in self._ending if not process.has_ended()]
         try:
@@ -129,7 +117,7 @@ class Worker:
         return events
 
     def cancel(self) -> None:
-        """Abort all tasks, which fail; the next one starts another process."""
+        """Abort all tasks, which fail; the next task starts another process."""
         for _, argument in self._waiting:
             self._cancelled.append(TaskFailed(argument, CANCELLED, is_cancelled=True))
         self._waiting.clear()
@@ -161,7 +149,6 @@ class Worker:
         return TaskFailed(argument, content.message)
 
     def _on_process_death(self) -> list[WorkerEvent]:
-        """Fail the current task, and send the others to a new process."""
         self._end(abort=True)
         if not self._waiting:
             return []
@@ -183,7 +170,7 @@ class _TaskProcess:
         context = multiprocessing.get_context("spawn")
         self._pipe, child_pipe = context.Pipe()
         child_lifeline, self._lifeline = context.Pipe(duplex=False)
-        # If nobody calls `close`: the interpreter joins its children in the end.
+        # The interpreter joins its children at exit: they must end even if nobody calls `close`.
         atexit.register(self._lifeline.close)
         arguments = (child_pipe, child_lifeline, language())
         self._process: BaseProcess = context.Process(target=_serve, args=arguments, name="slipstand-analysis")
@@ -213,7 +200,7 @@ class _TaskProcess:
         return received
 
     def abort(self) -> None:
-        """Let the process exit at once, with the processes that it has started."""
+        """End the process at once, with the processes that it has started."""
         self._drop_lifeline()
         self.detach()
 
@@ -223,7 +210,7 @@ class _TaskProcess:
         self._end_s = time.monotonic() + _END_S
 
     def has_ended(self) -> bool:
-        """Tell whether the process has ended; one that hangs in foreign code is killed in time."""
+        """Tell whether the process has ended; one that hangs is killed after `_END_S`."""
         if self._process.is_alive() and time.monotonic() > self._end_s:
             _log.warning("killed process %s, which did not end", self._process.pid)
             self._process.kill()
@@ -234,7 +221,6 @@ class _TaskProcess:
         return True
 
     def join(self) -> None:
-        """Wait until the process has ended."""
         self._process.join(max(0.0, self._end_s - time.monotonic()))
         self._drop_lifeline()
         while not self.has_ended():
@@ -246,7 +232,6 @@ class _TaskProcess:
 
 
 def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
-    """Carry out tasks until the other end of the pipe is closed."""
     start_log("worker")
     use_language(language_code)
     exit_with_parent(lifeline, _GRACE_S)
@@ -256,6 +241,7 @@ def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
             try:
                 answer = task(argument, lambda progress: pipe.send(("progress", progress)))
             except Exception as error:
+                _log.warning("task failed: %s", error)
                 pipe.send(("failed" if is_user_error(error) else "error", error_report(error)))
             else:
                 pipe.send(("done", answer))

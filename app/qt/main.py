@@ -26,14 +26,8 @@ _INTERRUPTED = 130
 def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     """Open the window, and return the exit code when it has been closed.
 
-    0 closed; 1 could not open, with one line on stderr; 130 closed by Ctrl-C or SIGTERM.
-
-    Parameters
-    ----------
-    simulated : bool
-        Connect to the simulated stand at once.
-    series : str
-        Series that the simulated stand runs.
+    0 closed; 1 could not open, with one line on stderr; 130 closed by Ctrl-C or SIGTERM. With `simulated` it
+    connects at once to a simulated stand that runs `series`.
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
@@ -95,16 +89,16 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     window.show()
     if simulated is None:
         QTimer.singleShot(0, window, window.show_last_screen)
-    QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
-    if simulated is not None:
+    else:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
+    QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
     return _INTERRUPTED if interrupts else code
 
 
 def _print_late_errors(errors: ErrorReporter) -> None:
-    """Print errors that received after the window had closed; the log has them too."""
+    """Print errors that came after the window had closed; the log has them too."""
     while (report := errors.next_report()) is not None:
         sys.stderr.write(f"error: {translate(report.message)}\n")
 
@@ -121,7 +115,7 @@ def _refuse(reason: str) -> int:
 
 
 def _close_on_interrupt(window: MainWindow) -> list[int]:
-    """Let Ctrl-C and SIGTERM close the window; the returned list takes the signals that received."""
+    """Let Ctrl-C and SIGTERM close the window; the returned list takes the received signals."""
     received: list[int] = []
 
     def close(number: int, _frame: object) -> None:

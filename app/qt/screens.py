@@ -1,8 +1,8 @@
-"""Factory of screens. A screen is imported when it is first shown: those with plots load pyqtgraph."""
+"""Factory of screens. A screen is imported when it is first shown: screens with plots load pyqtgraph."""
 
 import importlib
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 
@@ -12,21 +12,11 @@ from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
 from app.qt.theme import Theme
 
-
-class WindowDialogs(Protocol):
-    """Dialogs of the window, for its screens."""
-
-    def ask_for_run(self) -> None:
-        """Let the operator choose a run file."""
-
-    def ask_for_export(self) -> None:
-        """Let the operator choose how to export the selected runs."""
-
-    def show_import(self) -> None:
-        """Show the dialog of the files to import."""
+if TYPE_CHECKING:
+    from app.qt.window import MainWindow
 
 
-def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: WindowDialogs) -> QWidget:
+def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: "MainWindow") -> QWidget:
     """Build the view of a screen, attached to its presenter."""
     view: QWidget
     match screen:

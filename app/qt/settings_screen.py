@@ -1,4 +1,4 @@
-"""The settings page: how it looks, how it records, and the files that everything else is kept in."""
+"""View of the Settings screen: look, recording, and the files of the other settings."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -9,10 +9,8 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QGridLayout,
-    QHBoxLayout,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -28,7 +26,15 @@ from app.presenters.settings_screen import (
 )
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox, ComboBox
-from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
+from app.qt.widgets.layouts import (
+    STRETCH,
+    Item,
+    make_card,
+    make_column,
+    make_form_grid,
+    make_row,
+    make_scroll_area,
+)
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
@@ -37,7 +43,7 @@ _WIDTH = 760
 
 
 class SettingsScreen(QWidget):
-    """Draws `SettingsState`."""
+    """Shows `SettingsState`."""
 
     def __init__(self, presenter: SettingsPresenter) -> None:
         super().__init__()
@@ -62,7 +68,6 @@ class SettingsScreen(QWidget):
         self._connect()
 
     def show_state(self, state: SettingsState) -> None:
-        """Draw the page."""
         old, self._state = self._state, state
         settings = state.settings
         for choice, value in (
@@ -91,7 +96,8 @@ class SettingsScreen(QWidget):
             button = QPushButton(gettext("Open"))
             button.setToolTip(gettext("Open {path} in the system's editor", path=file.path))
             button.setAccessibleName(gettext("Open {name}", name=name))
-            button.clicked.connect(lambda _checked, path=file.path: _open_file(path))
+            url = QUrl.fromLocalFile(file.path)
+            button.clicked.connect(lambda _checked, url=url: QDesktopServices.openUrl(url))
             self._files.addWidget(label(name), row, 0)
             self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
             self._files.addWidget(button, row, 2)
@@ -104,14 +110,13 @@ class SettingsScreen(QWidget):
         dialog.open()
 
     def _write_folder(self) -> None:
-        """Take the folder as written; where it cannot be, the field gets its old text back."""
+        """Apply the typed folder; the field gets its old text back if it cannot be used."""
         self._presenter.change(recordings=self._recordings.text().strip())
         self._recordings.setText(self._state.settings.recordings)
 
     def _connect(self) -> None:
-        self._operator.editingFinished.connect(
-            lambda: self._presenter.change(operator=self._operator.text().strip())
-        )
+        operator = self._operator
+        operator.editingFinished.connect(lambda: self._presenter.change(operator=operator.text().strip()))
         self._recordings.editingFinished.connect(self._write_folder)
         self._browse.clicked.connect(lambda _checked: self._choose_folder())
         self._sounds.clicked.connect(lambda checked: self._presenter.change(sounds=checked))
@@ -120,67 +125,51 @@ class SettingsScreen(QWidget):
 
     def _lay_out(self) -> None:
         page = QWidget()
-        column = QVBoxLayout(page)
-        column.setContentsMargins(24, 24, 24, 24)
-        column.setSpacing(16)
-        column.addWidget(label(gettext("Settings"), TextRole.HEADING))
-        for card in (self._look_card(), self._record_card(), self._files_card()):
-            card.setMaximumWidth(_WIDTH)
-            column.addWidget(card)
-        column.addLayout(self._status_line())
-        column.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(make_scroll_area(page, is_column=False))
+        said = make_column(self._message, self._waits, spacing=6)
+        undo = make_column(self._undo, STRETCH)
+        make_column(
+            label(gettext("Settings"), TextRole.HEADING),
+            self._look_card(),
+            self._record_card(),
+            self._files_card(),
+            make_row(undo, (said, 1), spacing=12),
+            STRETCH,
+            spacing=16,
+            margins=(24, 24),
+            of=page,
+        )
+        make_column(make_scroll_area(page, is_column=False), of=self)
 
     def _look_card(self) -> QFrame:
-        card, layout = make_card(gettext("Look"))
         fields = (
             (gettext("Theme"), self._theme),
             (gettext("Language"), self._language),
             (gettext("Size"), self._scale),
         )
-        layout.addLayout(make_form_grid(fields, wide=False))
-        return card
+        return _card(gettext("Look"), "", make_form_grid(fields, wide=False))
 
     def _record_card(self) -> QFrame:
-        card, layout = make_card(gettext("Recording"))
         self._operator.setPlaceholderText(gettext("written into each run"))
-        place = QWidget()
-        line = QHBoxLayout(place)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.setSpacing(8)
-        line.addWidget(self._recordings, 1)
-        line.addWidget(self._browse)
-        layout.addLayout(
-            make_form_grid(((gettext("Operator"), self._operator), (gettext("Folder of the runs"), place)))
-        )
+        folder = QWidget()
+        make_row((self._recordings, 1), self._browse, spacing=8, of=folder)
+        fields = ((gettext("Operator"), self._operator), (gettext("Folder of the runs"), folder))
+        grid = make_form_grid(fields)
         self._recordings.setAccessibleName(gettext("Folder of the runs"))
-        layout.addWidget(self._in_use)
-        layout.addWidget(self._sounds)
-        return card
+        return _card(gettext("Recording"), "", grid, self._in_use, self._sounds)
 
     def _files_card(self) -> QFrame:
-        card, layout = make_card(
-            gettext("Files"),
-            gettext("Stand and gauges are read when the window starts or a device is connected."),
-        )
+        hint = gettext("Stand and gauges are read when the window starts or a device is connected.")
         self._files.setHorizontalSpacing(12)
         self._files.setVerticalSpacing(8)
         self._files.setColumnStretch(1, 1)
-        layout.addLayout(self._files)
-        layout.addLayout(make_form_grid(((gettext("Log"), self._log_level),), wide=False))
-        return card
+        log = make_form_grid(((gettext("Log"), self._log_level),), wide=False)
+        return _card(gettext("Files"), hint, self._files, log)
 
-    def _status_line(self) -> QHBoxLayout:
-        said = QVBoxLayout()
-        said.addWidget(self._message)
-        said.addWidget(self._waits)
-        line = QHBoxLayout()
-        line.setSpacing(12)
-        line.addWidget(self._undo, 0, Qt.AlignmentFlag.AlignTop)
-        line.addLayout(said, 1)
-        return line
+
+def _card(title: str, hint: str, *parts: Item) -> QFrame:
+    card, _ = make_card(title, hint, *parts)
+    card.setMaximumWidth(_WIDTH)
+    return card
 
 
 def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> ComboBox:
@@ -190,10 +179,6 @@ def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> ComboBox
     made.setMinimumWidth(200)
     made.activated.connect(lambda _: chosen(made.currentData()))
     return made
-
-
-def _open_file(path: str) -> None:
-    QDesktopServices.openUrl(QUrl.fromLocalFile(path))
 
 
 def _folder_words(state: SettingsState) -> str:

@@ -1,22 +1,14 @@
-"""The Simulated stand screen: its settings, faults on demand, and what is true of it."""
+"""View of the Simulated stand screen: options, faults on demand, true values."""
 
-from PySide6.QtWidgets import (
-    QFrame,
-    QGridLayout,
-    QHBoxLayout,
-    QLineEdit,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from app.presenters.stand_screen import StandForm, StandPresenter, StandState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, plain_text, show_chip
+from app.qt.widgets.text import label, plain_text, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _FIELDS = {
@@ -24,17 +16,11 @@ _FIELDS = {
         N_("Friction f<sub>d</sub>"),
         N_("Coefficient of dynamic friction; empty: that of the series"),
     ),
-    "tilt_mrad": (
-        N_("Tilt, mrad"),
-        N_("Of the stand, so that the plate slides more easily to one side"),
-    ),
+    "tilt_mrad": (N_("Tilt, mrad"), N_("Of the stand, so that the plate slides more easily to one side")),
     "noise_um": (N_("Noise, µm"), N_("Standard deviation of both gauges")),
     "rate_hz": (N_("Rate, Hz"), N_("Samples a second")),
     "drop_percent": (N_("Lost bytes, %"), N_("Of the frames, as many lose a byte")),
-    "flip_percent": (
-        N_("Wrong bits, %"),
-        N_("Of the frames, as many have a bit flipped"),
-    ),
+    "flip_percent": (N_("Wrong bits, %"), N_("Of the frames, as many have a bit flipped")),
 }
 _FAULTS = {
     "stall": (N_("Stall"), N_("The device sends nothing, and goes on afterwards")),
@@ -47,7 +33,7 @@ _NOT_RUNNING = N_("Faults can be asked for while the simulated stand is connecte
 
 
 class StandScreen(QWidget):
-    """Draws `StandState`."""
+    """Shows `StandState`."""
 
     def __init__(self, presenter: StandPresenter) -> None:
         super().__init__()
@@ -61,14 +47,12 @@ class StandScreen(QWidget):
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
         self._truth = ValueGrid()
-        self._no_truth = label(
-            gettext("They appear here while the simulated stand runs."), muted=True, wrap=True
-        )
+        hint = gettext("They appear here while the simulated stand runs.")
+        self._no_truth = label(hint, muted=True, wrap=True)
         self._lay_out()
         self._connect()
 
     def show_state(self, state: StandState) -> None:
-        """Draw the screen."""
         if self._series.count() != len(state.all_series):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.form.series)
@@ -82,8 +66,7 @@ class StandScreen(QWidget):
         show_chip(self._message, state.message)
         for button in self._faults.values():
             button.setEnabled(state.is_running)
-        self._words.setText("" if state.is_running else gettext(_NOT_RUNNING))
-        self._words.setVisible(not state.is_running)
+        set_text_or_hide(self._words, "" if state.is_running else gettext(_NOT_RUNNING))
         self._happened.setText("\n".join(state.disturbances))
         self._truth.show_values(state.truth)
         self._no_truth.setVisible(not state.truth)
@@ -105,67 +88,42 @@ class StandScreen(QWidget):
         return StandForm(self._series.currentText(), **texts)
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
-        row.setContentsMargins(8, 8, 8, 8)
-        row.setSpacing(8)
-        for make in (self._settings_card, self._faults_card, self._truth_card):
-            row.addWidget(make(), 1)
+        cards = [(make(), 1) for make in (self._settings_card, self._faults_card, self._truth_card)]
+        make_row(*cards, spacing=8, margins=(8, 8), of=self)
 
     def _settings_card(self) -> QFrame:
-        card, layout = _card(gettext("Set up the stand"), gettext("An empty field means the value in grey."))
         grid = QGridLayout()
         grid.setVerticalSpacing(8)
         grid.setHorizontalSpacing(12)
         _add(grid, 0, gettext("Series"), self._series, gettext("Brings pullback, masses, period and damping"))
         for line, (name, field) in enumerate(self._fields.items(), start=1):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
-        layout.addLayout(grid)
-        layout.addWidget(self._start)
-        layout.addWidget(self._message)
-        layout.addStretch(1)
-        return card
+        hint = gettext("An empty field means the value in grey.")
+        return _card(gettext("Set up the stand"), hint, grid, self._start, self._message)
 
     def _faults_card(self) -> QFrame:
-        card, layout = _card(gettext("Faults to try"), gettext("See what the app does when something fails."))
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
-        _add(
-            grid,
-            0,
-            gettext("Duration, s"),
-            self._seconds,
-            gettext("Seconds; a leap of the clock may go back: -5"),
-        )
-        layout.addLayout(grid)
-        for button in self._faults.values():
-            layout.addWidget(button)
-        layout.addWidget(self._words)
-        layout.addWidget(self._happened)
-        layout.addStretch(1)
-        return card
+        seconds = gettext("Seconds; a leap of the clock may go back: -5")
+        _add(grid, 0, gettext("Duration, s"), self._seconds, seconds)
+        hint = gettext("See what the app does when something fails.")
+        parts = (grid, *self._faults.values(), self._words, self._happened)
+        return _card(gettext("Faults to try"), hint, *parts)
 
     def _truth_card(self) -> QFrame:
         title = gettext("True values")
-        card, layout = _card(title, gettext("To compare with what is found."), name=title)
-        layout.addWidget(self._no_truth)
-        layout.addWidget(self._truth)
-        layout.addStretch(1)
-        return card
+        hint = gettext("To compare with what is found.")
+        return _card(title, hint, self._no_truth, self._truth, name=title)
 
 
-def _card(title: str, words: str, name: str = "") -> tuple[QFrame, QVBoxLayout]:
-    """A card whose content scrolls where the window is low; with a name, by keyboard."""
+def _card(title: str, hint: str, *parts: Item, name: str = "") -> QFrame:
+    """Make a card whose content scrolls in a low window; with a name, by keyboard."""
     card, inside = QFrame(), QWidget()
     card.setProperty("role", "card")
-    outside = QVBoxLayout(card)
-    outside.setContentsMargins(1, 1, 1, 1)
-    outside.addWidget(make_scroll_area(inside, name=name))
-    layout = QVBoxLayout(inside)
-    layout.setContentsMargins(16, 12, 16, 12)
-    layout.setSpacing(12)
-    layout.addWidget(label(title, TextRole.HEADING))
-    layout.addWidget(label(words, muted=True, wrap=True))
-    return card, layout
+    heading = (label(title, TextRole.HEADING), label(hint, muted=True, wrap=True))
+    make_column(*heading, *parts, STRETCH, spacing=12, margins=(16, 12), of=inside)
+    make_column(make_scroll_area(inside, name=name), margins=(1, 1), of=card)
+    return card
 
 
 def _add(grid: QGridLayout, line: int, name: str, field: QWidget, hint: str) -> None:

@@ -1,26 +1,25 @@
-"""The start page: three ways in, side by side."""
+"""View of the Start screen: simulated stand, amplifier and recordings side by side."""
 
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import (
-    QComboBox,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QLineEdit, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
 from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
-from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
+from app.qt.widgets.layouts import (
+    STRETCH,
+    Item,
+    make_card,
+    make_column,
+    make_form_grid,
+    make_row,
+    make_scroll_area,
+)
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import N_, gettext
@@ -30,14 +29,7 @@ _PARITIES = {"N": N_("none"), "E": N_("even"), "O": N_("odd")}
 
 
 class StartScreen(QWidget):
-    """Draws `StartState`.
-
-    Parameters
-    ----------
-    presenter : StartPresenter
-    ask_for_run : callable
-        Lets the operator choose a recording.
-    """
+    """Shows `StartState`; `ask_for_run` lets the operator choose a run file."""
 
     def __init__(self, presenter: StartPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
@@ -63,7 +55,6 @@ class StartScreen(QWidget):
         self._open.setToolTip(gettext("Open a recording") + " (Ctrl+O)")
 
     def show_state(self, state: StartState) -> None:
-        """Draw the page."""
         if self._series.count() != len(state.all_series):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.series)
@@ -72,88 +63,58 @@ class StartScreen(QWidget):
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
         self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))
-        self._status.setText(
-            state.busy or (gettext("Connected: {device}", device=state.connected) if state.connected else "")
-        )
+        connected = gettext("Connected: {device}", device=state.connected) if state.connected else ""
+        self._status.setText(state.busy or connected)
         self._disconnect.setVisible(bool(state.connected))
         for button in (self._try, self._connect):
             button.setEnabled(not state.busy)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Ports may have come and gone since the page was last seen."""
+        """List the ports again: they may have come and gone."""
         super().showEvent(event)
         self._presenter.refresh_ports()
         self._try.setFocus()
 
     def _lay_out(self) -> None:
-        cards = QHBoxLayout()
-        cards.setSpacing(16)
-        cards.addStrut(_CARD_HEIGHT)
-        cards.addStretch(1)
-        for card in (self._simulated_card(), self._amplifier_card(), self._recording_card()):
-            cards.addWidget(card, 100)
-        cards.addStretch(1)
-        page = QWidget()
-        outside = QVBoxLayout(self)
-        outside.setContentsMargins(0, 0, 0, 0)
-        outside.addWidget(make_scroll_area(page, is_column=False))
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(24, 24, 24, 24)
-        layout.setSpacing(16)
-        layout.addStretch(1)
-        layout.addWidget(_centred("Slipstand", TextRole.INSTRUCTION))
-        layout.addWidget(
-            _centred(gettext("Pull the table back, let go, read the friction coefficient."), TextRole.HEADING)
+        cards = make_row(
+            STRETCH,
+            (self._simulated_card(), 100),
+            (self._amplifier_card(), 100),
+            (self._recording_card(), 100),
+            STRETCH,
+            spacing=16,
         )
+        cards.addStrut(_CARD_HEIGHT)
+        motto = gettext("Pull the table back, let go, read the friction coefficient.")
+        title = _centred("Slipstand", TextRole.INSTRUCTION)
+        status = make_row(STRETCH, self._status, self._disconnect, STRETCH, spacing=12)
+        page = QWidget()
+        layout = make_column(STRETCH, title, spacing=16, margins=(24, 24), of=page)
+        layout.addWidget(_centred(motto, TextRole.HEADING))
         layout.addSpacing(16)
         layout.addLayout(cards)
-        layout.addLayout(self._status_line())
+        layout.addLayout(status)
         layout.addStretch(2)
-
-    def _status_line(self) -> QHBoxLayout:
-        line = QHBoxLayout()
-        line.setSpacing(12)
-        line.addStretch(1)
-        line.addWidget(self._status)
-        line.addWidget(self._disconnect)
-        line.addStretch(1)
-        return line
+        make_column(make_scroll_area(page, is_column=False), of=self)
 
     def _simulated_card(self) -> QFrame:
-        card, layout = _card(
-            gettext("Simulated stand"),
-            gettext("No amplifier needed: a stand is simulated and read through a port like a real one."),
-        )
-        layout.addLayout(make_form_grid([(gettext("Series"), self._series)]))
+        hint = gettext("No amplifier needed: a stand is simulated and read through a port like a real one.")
+        series = make_form_grid([(gettext("Series"), self._series)])
         self._series.setAccessibleName(gettext("Series of the simulated stand"))
-        layout.addStretch(1)
-        layout.addWidget(self._try)
-        return card
+        return _card(gettext("Simulated stand"), hint, series, STRETCH, self._try)
 
     def _amplifier_card(self) -> QFrame:
-        card, layout = _card(
-            gettext("My amplifier"), gettext("Both gauges, read through a serial port or the network.")
-        )
-        layout.addWidget(self._form)
-        layout.addWidget(self._verified)
-        layout.addWidget(self._error)
-        layout.addStretch(1)
-        layout.addWidget(self._connect)
-        return card
+        hint = gettext("Both gauges, read through a serial port or the network.")
+        parts = (self._form, self._verified, self._error, STRETCH, self._connect)
+        return _card(gettext("My amplifier"), hint, *parts)
 
     def _recording_card(self) -> QFrame:
-        card, layout = _card(
-            gettext("Recordings"),
-            gettext("Look at a run again: record against simulation, and what was found."),
-        )
-        layout.addWidget(self._folder)
-        layout.addStretch(1)
-        layout.addWidget(self._open)
-        return card
+        hint = gettext("Look at a run again: record against simulation, and what was found.")
+        return _card(gettext("Recordings"), hint, self._folder, STRETCH, self._open)
 
 
 class _Form(QWidget):
-    """Port, protocol, baud, rate; folded away what few devices need: parity, own settings, a second port."""
+    """Port, protocol, baud, rate; parity, settings of the device and a second port are folded away."""
 
     def __init__(self, presenter: StartPresenter) -> None:
         super().__init__()
@@ -183,7 +144,6 @@ class _Form(QWidget):
             field.textEdited.connect(lambda _: presenter.set_form(self._read()))
 
     def show_form(self, state: StartState) -> None:
-        """Draw choices and what is filled in."""
         self._port.blockSignals(True)
         _refill(self._port, [(port.url, port.description) for port in state.ports])
         self._port.setCurrentText(state.form.port)
@@ -237,18 +197,12 @@ class _Form(QWidget):
             ]
         )
         self._relative.setAccessibleName(gettext("Port of gauge 2"))
-        self._relative.setToolTip(
-            gettext("Port of gauge 2, where each gauge has a device and a port of its own")
-        )
+        hint = gettext("Port of gauge 2, where each gauge has a device and a port of its own")
+        self._relative.setToolTip(hint)
         rare.setContentsMargins(0, 0, 0, 0)
         self._rare.setLayout(rare)
         self._rare.hide()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        layout.addLayout(usual)
-        layout.addWidget(self._rare)
-        layout.addWidget(self._more, 0, Qt.AlignmentFlag.AlignLeft)
+        make_column(usual, self._rare, make_row(self._more, STRETCH), spacing=8, of=self)
 
 
 def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
@@ -260,11 +214,11 @@ def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
         box.setItemData(index, hint, Qt.ItemDataRole.ToolTipRole)
 
 
-def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
-    card, layout = make_card(title, words)
+def _card(title: str, hint: str, *parts: Item) -> QFrame:
+    card, _ = make_card(title, hint, *parts)
     card.setMinimumWidth(_CARD_WIDTHS[0])
     card.setMaximumWidth(_CARD_WIDTHS[1])
-    return card, layout
+    return card
 
 
 def _button(text: str, act: Callable[[], None]) -> QPushButton:

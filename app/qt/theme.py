@@ -1,4 +1,4 @@
-"""How everything looks: the tokens of both themes, the typeface, and the one palette and style sheet."""
+"""Theme: colours of both schemes, typeface, palette and style sheet."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -13,7 +13,7 @@ FAMILY = "IBM Plex Sans"
 
 @dataclass(frozen=True, slots=True)
 class Tokens:
-    """Colours by what they mean. Text reaches 4.5:1 on its ground, curves and marks 3:1."""
+    """Colours by role. The contrast of text is at least 4.5:1, of curves and marks 3:1 (WCAG 2.1, AA)."""
 
     bg: str
     surface: str
@@ -106,7 +106,7 @@ def colour(token: str, alpha: float = 1.0) -> QColor:
 
 
 def set_property(widget: QWidget, name: str, value: object) -> None:
-    """Set a property that the style sheet looks at, and let it look again."""
+    """Set a property that the style sheet uses, and apply the style again."""
     if widget.property(name) == value:
         return
     widget.setProperty(name, value)
@@ -115,14 +115,7 @@ def set_property(widget: QWidget, name: str, value: object) -> None:
 
 
 class Theme(QObject):
-    """The theme in use. Follows the system unless told otherwise; `changed` when it has.
-
-    Parameters
-    ----------
-    app : QApplication
-    scheme : Qt.ColorScheme
-        Light or Dark to fix it, Unknown to follow the system.
-    """
+    """Theme in use; emits `changed`. The scheme Unknown follows the system, Light and Dark are fixed."""
 
     changed = Signal()
 
@@ -139,7 +132,6 @@ class Theme(QObject):
         app.styleHints().colorSchemeChanged.connect(self._follow)
 
     def fix(self, scheme: Qt.ColorScheme) -> None:
-        """Use this scheme from now on; Unknown follows the system."""
         self._fixed = scheme
         self._apply()
 

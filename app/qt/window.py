@@ -7,13 +7,11 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QMainWindow,
     QPlainTextEdit,
     QPushButton,
     QStackedWidget,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -21,7 +19,8 @@ from app.presenters.base import Notice
 from app.presenters.window import Screen, WindowPresenter, WindowState
 from app.qt.screens import build_screen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
-from app.qt.widgets.shortcuts import add_shortcut, bind_button, list_shortcuts
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
+from app.qt.widgets.shortcuts import HelpDialog, add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label
 from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowLayout
@@ -43,19 +42,10 @@ _AT_FOOT = (Screen.SETTINGS,)
 
 
 class MainWindow(QMainWindow):
-    """Draws `WindowState`, owns the timer that makes the presenters look for news.
-
-    Parameters
-    ----------
-    theme : Theme
-    presenter : WindowPresenter
-        Closed with the window.
-    place : WindowPlace, optional
-        How the window was left the last time.
-    """
+    """Shows `WindowState`; a timer calls the presenter's `tick`. The presenter is closed with the window."""
 
     closed = Signal(WindowLayout)
-    """The window closes, and was left like this."""
+    """Layout of the window when it closes."""
 
     def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowLayout | None = None) -> None:
         super().__init__()
@@ -86,7 +76,6 @@ class MainWindow(QMainWindow):
         self._timer.start(TICK_MS)
 
     def show_state(self, state: WindowState) -> None:
-        """Show the screen that is wanted, and the notice."""
         old, self._shown = self._shown, state
         if state.theme != old.theme:
             self._theme.fix(SCHEMES[state.theme])
@@ -95,13 +84,13 @@ class MainWindow(QMainWindow):
         self._notice.show_notice(state.notice)
 
     def show_last_screen(self) -> None:
-        """Show the screen on which the window was left, unless something else is shown by now."""
+        """Show the screen of the last session, unless another one is shown by now."""
         known = [screen for screen in Screen if screen.value == self._geometry.screen]
         if known and self._shown.screen is Screen.START:
             self._presenter.show_screen(known[0])
 
     def ask_for_run(self) -> None:
-        """Let the operator choose a recording. The dialog waits for nobody: recording goes on."""
+        """Let the operator choose a run file; the dialog does not block a recording."""
         dialog = QFileDialog(self, gettext("Open a recording"), self._presenter.start.state.recordings)
         dialog.setNameFilters([gettext("Runs (*.h5)"), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
@@ -110,7 +99,7 @@ class MainWindow(QMainWindow):
         dialog.open()
 
     def ask_for_export(self) -> None:
-        """Let the operator choose what becomes of the selected runs, beside the window."""
+        """Show the dialog to export the selected runs; it does not block the window."""
         from app.qt.runs.export_dialog import ExportDialog
 
         if not self._presenter.runs.open_export():
@@ -122,7 +111,7 @@ class MainWindow(QMainWindow):
         self._export.raise_()
 
     def show_import(self) -> None:
-        """Show the dialog of the files that wait to be imported, beside the window."""
+        """Show the dialog to import files; it does not block the window."""
         from app.qt.runs.import_dialog import ImportDialog
 
         if self._import is None:
@@ -132,9 +121,6 @@ class MainWindow(QMainWindow):
         self._import.raise_()
 
     def show_help(self) -> None:
-        """List the keys of the screen that is shown, and of the window."""
-        from app.qt.widgets.shortcuts import HelpDialog
-
         if self._help is not None:
             self._help.close()
         screen = self._shown.screen
@@ -144,19 +130,16 @@ class MainWindow(QMainWindow):
             (gettext("Everywhere"), list_shortcuts(self, own=True)),
         ]
         self._help = HelpDialog([(title, keys) for title, keys in groups if keys], self)
-        self._help.destroyed.connect(self._forget_help)
+        self._help.destroyed.connect(lambda: setattr(self, "_help", None))
         self._help.show()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Disappear at once, then finish what is being recorded and end all processes."""
+        """Hide at once, then finish a run that is being recorded and end all processes."""
         self._timer.stop()
         self.closed.emit(self._geometry.capture(self, self._shown.screen.value))
         self.hide()
         self._presenter.close()
         super().closeEvent(event)
-
-    def _forget_help(self) -> None:
-        self._help = None
 
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
@@ -194,25 +177,13 @@ class MainWindow(QMainWindow):
             button.setIcon(icon(_SIDE_BAR[screen][1], tokens.muted, active=tokens.accent))
 
     def _lay_out(self) -> None:
-        rail = QFrame()
+        rail, middle = QFrame(), QWidget()
         rail.setProperty("role", "rail")
-        buttons = QVBoxLayout(rail)
-        buttons.setContentsMargins(8, 8, 8, 8)
-        buttons.setSpacing(4)
-        for screen, button in self._rail.items():
-            if screen is _AT_FOOT[0]:
-                buttons.addStretch(1)
-            buttons.addWidget(button)
-        content = QVBoxLayout()
-        content.setSpacing(0)
-        content.addWidget(self._notice)
-        content.addWidget(self._stack, 1)
-        middle = QWidget()
-        layout = QHBoxLayout(middle)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(rail)
-        layout.addLayout(content, 1)
+        at_top = [button for screen, button in self._rail.items() if screen not in _AT_FOOT]
+        at_foot = [self._rail[screen] for screen in _AT_FOOT]
+        make_column(*at_top, STRETCH, *at_foot, spacing=4, margins=(8, 8), of=rail)
+        content = make_column(self._notice, (self._stack, 1))
+        make_row(rail, (content, 1), of=middle)
         self.setCentralWidget(middle)
 
 
@@ -230,7 +201,7 @@ _DETAILS_HEIGHT = 168
 
 
 class NoticeBar(QFrame):
-    """Shows one notice, or nothing; what is known beyond its words is folded away."""
+    """Shows one notice, or nothing; its details are folded away."""
 
     acted = Signal()
     dismissed = Signal()
@@ -254,7 +225,6 @@ class NoticeBar(QFrame):
         self.hide()
 
     def show_notice(self, notice: Notice | None) -> None:
-        """Show a notice; None hides the strip."""
         if notice is not None and notice != self._shown:
             self._write(notice)
         self._shown = notice
@@ -284,17 +254,10 @@ class NoticeBar(QFrame):
         QGuiApplication.clipboard().setText(f"{self._text.text()}\n{self._details.toPlainText()}")
 
     def _lay_out(self) -> None:
-        line = QHBoxLayout()
-        line.setSpacing(12)
-        line.addWidget(self._kind)
-        line.addWidget(self._text, 1)
-        for button in (self._action, self._fold, self._copy, self._dismiss):
-            line.addWidget(button)
-        layout = QVBoxLayout(self)
+        buttons = (self._action, self._fold, self._copy, self._dismiss)
+        line = make_row(self._kind, (self._text, 1), *buttons, spacing=12)
+        layout = make_column(line, self._details, spacing=8, of=self)
         layout.setContentsMargins(12, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addLayout(line)
-        layout.addWidget(self._details)
 
 
 def _details_field() -> QPlainTextEdit:

@@ -17,28 +17,22 @@ _GRIP = QSize(160, 40)
 
 
 def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
-    """Let the widths in a table or splitter be kept under a name, and by which column a table is sorted."""
+    """Store the widths in a table or splitter, and the sort order of a table, under a name."""
     part.setProperty(_NAME, name)
 
 
 class WindowGeometry:
-    """What is known of how the window was left.
-
-    Parameters
-    ----------
-    place : WindowPlace
-    """
+    """Layout of the window: restores the stored one, and captures the current one."""
 
     def __init__(self, place: WindowLayout) -> None:
         self._place = place
 
     @property
     def screen(self) -> str:
-        """The screen that was shown last."""
         return self._place.screen
 
     def restore_window(self, window: QMainWindow) -> None:
-        """Put the window where it was; where that is no screen any more, into the middle of the first."""
+        """Restore size and place; a place that is on no screen any more becomes the middle of the first."""
         place = self._place
         wanted = QRect(place.x, place.y, place.width or _USUAL.width(), place.height or _USUAL.height())
         room = _room_for(wanted) if place.width else None
@@ -50,12 +44,12 @@ class WindowGeometry:
             window.setWindowState(Qt.WindowState.WindowMaximized)
 
     def within_screen(self, smallest: QSize) -> QSize:
-        """No more than the screen has: a scale of 200 % leaves 960 x 540 of 1920 x 1080."""
+        """Limit a size to that of the screen: a scale of 200 % leaves 960 x 540 of 1920 x 1080."""
         free = QGuiApplication.primaryScreen().availableSize()
         return smallest.boundedTo(free).expandedTo(_LEAST)
 
     def restore_parts(self, screen: QWidget) -> None:
-        """Give the tables and splitters of a screen the widths, and the tables the order, that they had."""
+        """Restore widths of tables and splitters, and the sort order of tables."""
         for name, part in _parts(screen):
             widths = self._place.widths.get(name, ())
             if len(widths) == part.count():
@@ -65,7 +59,7 @@ class WindowGeometry:
                 _sort(part, column, descending=descending)
 
     def capture(self, window: QMainWindow, screen: str) -> WindowLayout:
-        """How the window is left now; parts that were not seen this time keep their widths."""
+        """Current layout; parts that were not shown keep their stored widths."""
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
         parts = dict(_parts(window))
         widths = {name: found for name, part in parts.items() if any(found := _widths(part))}
@@ -82,10 +76,8 @@ class WindowGeometry:
 
 
 def _parts(within: QWidget) -> Iterator[tuple[str, QHeaderView | QSplitter]]:
-    parts: list[QHeaderView | QSplitter] = [
-        *within.findChildren(QHeaderView),
-        *within.findChildren(QSplitter),
-    ]
+    parts: list[QHeaderView | QSplitter] = [*within.findChildren(QHeaderView)]
+    parts += within.findChildren(QSplitter)
     for part in parts:
         if name := part.property(_NAME):
             yield name, part
@@ -100,14 +92,13 @@ def _set_widths(part: QHeaderView | QSplitter, widths: tuple[int, ...]) -> None:
 
 
 def _sort(titles: QHeaderView, column: int, *, descending: bool) -> None:
-    """As if the operator had clicked there; a column that is no more is left aside."""
     if 0 <= column < titles.count():
         order = Qt.SortOrder.DescendingOrder if descending else Qt.SortOrder.AscendingOrder
         titles.setSortIndicator(column, order)
 
 
 def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, bool]]:
-    """Column, and whether descending, of the tables that can be sorted."""
+    """Sort column of each sortable table, and whether it is descending."""
     return {
         name: (part.sortIndicatorSection(), part.sortIndicatorOrder() is Qt.SortOrder.DescendingOrder)
         for name, part in parts.items()
@@ -116,7 +107,7 @@ def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, b
 
 
 def _widths(part: QHeaderView | QSplitter) -> tuple[int, ...]:
-    """Nothing but zeros of a splitter that was not shown yet."""
+    """Widths of a part; zeros of a splitter that was not shown yet."""
     if isinstance(part, QSplitter):
         return tuple(part.sizes())
     return tuple(part.sectionSize(number) for number in range(part.count()))

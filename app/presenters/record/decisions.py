@@ -24,17 +24,11 @@ class LoadPlan:
 
 @dataclass(frozen=True, slots=True)
 class LoadedPlan:
-    """Answer to `LoadPlan`.
-
-    Attributes
-    ----------
-    tests : NextTests
-    completed : tuple of (str, str)
-        Path and series of each completed run.
-    """
+    """Answer to `LoadPlan`."""
 
     tests: NextTests
     completed: tuple[tuple[str, str], ...] = ()
+    """Path and series of each completed run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,31 +80,22 @@ RecordTask = LoadPlan | CountCompletedRuns | SavePlan | KeepRun | MoveToTrash | 
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """A run that is or was decided about.
-
-    Attributes
-    ----------
-    note : str or None
-        As stored; None where that is uncertain.
-    edited_note : str
-    results_text : str
-        Main result in words, for messages.
-    """
+    """A run that is or was decided about."""
 
     path: str
     note: str | None
+    """As stored; None where that is uncertain."""
     edited_note: str
     results_text: str = ""
+    """Main result in words, for messages."""
     has_results: bool = False
 
     @classmethod
     def of(cls, run: AnalysedRun) -> "RecordedRun":
-        """Describe an identified run."""
         return cls(str(run.path), run.note, run.note, _results_text(run), has_results=True)
 
     @property
     def name(self) -> str:
-        """File name without suffix."""
         return Path(self.path).stem
 
     @property
@@ -119,56 +104,40 @@ class RecordedRun:
         return None if self.edited_note.strip() == self.note else self.edited_note.strip()
 
     def keeping(self, author: str) -> KeepRun:
-        """Task that keeps the run."""
         return KeepRun(self.path, author, self.note_to_store, self.has_results)
 
     @property
     def storing_message(self) -> Chip:
-        """Message while the run is being kept."""
         return Chip(f"{self.results_text} {gettext('Keeping {name}', name=self.name)}".strip())
 
     @property
     def stored_message(self) -> Chip:
-        """Message once the run is kept."""
         return Chip(f"{self.results_text} {gettext('Kept {name}', name=self.name)}".strip(), Tone.OK)
 
 
 @dataclass(frozen=True, slots=True)
 class RunDecisions:
-    """Decisions about recorded runs, one after another; the last one can be undone. No file is deleted.
-
-    Attributes
-    ----------
-    pending : RecordedRun or None
-        Waits for the decision.
-    message : Chip
-        Outcome of the last decision.
-    last : RecordedRun or None
-        Decided about last.
-    trash_path : str
-        Where `last` lies in the trash; empty if it does not.
-    is_moving : bool
-        `last` is being moved to the trash.
-    restoring : RecordedRun or None
-        Is being moved out of the trash.
-    to_keep : frozenset of str
-        Paths of runs to keep once they are identified: the operator went on before.
-    storing : mapping of str to RecordedRun
-        Runs that are being kept, by path.
-    """
+    """Decisions about recorded runs, one after another; the last one can be undone. No file is deleted."""
 
     pending: RecordedRun | None = None
+    """Waits for the decision."""
     message: Chip = EMPTY_CHIP
+    """Outcome of the last decision."""
     last: RecordedRun | None = None
+    """Decided about last."""
     trash_path: str = ""
+    """Where `last` lies in the trash; empty if it does not."""
     is_moving: bool = False
+    """`last` is being moved to the trash."""
     restoring: RecordedRun | None = None
+    """Is being moved out of the trash."""
     to_keep: frozenset[str] = frozenset()
+    """Paths of runs to keep once they are identified: the operator went on before."""
     storing: Mapping[str, RecordedRun] = field(default_factory=dict)
+    """Runs that are being kept, by path."""
 
     @property
     def shown(self) -> PendingDecision | None:
-        """The decision as the view shows it."""
         return None if self.pending is None else PendingDecision(self.pending.edited_note)
 
     def undo_text(self, *, is_free: bool) -> str:
@@ -180,7 +149,6 @@ class RunDecisions:
         return gettext("Decide again about {name}", name=self.last.name) if is_free else ""
 
     def with_note(self, note: str) -> "RunDecisions":
-        """Edit the note of the pending run."""
         if self.pending is None:
             return self
         return replace(self, pending=replace(self.pending, edited_note=note))
@@ -196,16 +164,13 @@ class RunDecisions:
         return replace(self, pending=None, last=self.pending, trash_path="")
 
     def moving(self, run: RecordedRun) -> "RunDecisions":
-        """Show that a run is being moved to the trash."""
         message = Chip(gettext("Moving {name} to the trash", name=run.name))
         return replace(self, is_moving=True, message=message)
 
     def keeping(self, run: RecordedRun) -> "RunDecisions":
-        """Show that a run is being kept."""
         return replace(self, storing={**self.storing, run.path: run}, message=run.storing_message)
 
     def undone(self) -> "RunDecisions":
-        """Forget the last decision."""
         return replace(self, last=None, trash_path="")
 
     def again(self, run: RecordedRun) -> "RunDecisions":
@@ -220,7 +185,6 @@ class RunDecisions:
         return replace(self, storing=storing, message=message)
 
     def after_moving(self, task: MoveToTrash, trash_path: str) -> "RunDecisions":
-        """A run lies in the trash."""
         is_last = self.last is not None and self.last.path == task.path
         name = Path(task.path).stem
         return replace(

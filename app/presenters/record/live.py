@@ -66,46 +66,34 @@ class LiveTraces:
     Until release the last `ROLLING_S` are drawn. From release on, the time axis starts
     `BEFORE_RELEASE_S` before it and grows in steps. After the end of the run the traces stand still
     until `restarted`. All methods return a changed copy; only `samples` grows in place.
-
-    Attributes
-    ----------
-    ranges_m : (float or None, float or None)
-        Ranges of both gauges.
-    samples : DecimatedHistory
-        Table and relative displacement (m).
-    tare_m, zero_m : (2,) float64
-        Shown readings count from `zero_m`: the zero of a run, else the tare. Neither is stored.
-    tolerance_m : float
-        Allowed deviation from the pullback.
-    release_s, slip_s, end_s
-        On the time axis of the samples; None as long as they have not happened.
-    is_pulled : bool
-        The table is being pulled or held.
-    is_held : bool
-        The traces of an earlier run are shown.
-    read_s : float
-        Time of the sample that the readings were taken at.
     """
 
     ranges_m: tuple[float | None, float | None] = (None, None)
+    """Ranges of both gauges."""
     width_px: int = 800
     samples: DecimatedHistory = field(default_factory=DecimatedHistory)
+    """Table and relative displacement (m)."""
     tare_m: Floats = field(default_factory=lambda: np.zeros(2))
     zero_m: Floats = field(default_factory=lambda: np.zeros(2))
+    """Shown readings count from `zero_m`: the zero of a run, else the tare. Neither is stored."""
     tolerance_m: float = 0.0
+    """Allowed deviation from the pullback."""
     state: PullbackState | None = None
     release_s: float | None = None
     slip_s: Span | None = None
     end_s: float | None = None
+    """release_s/slip_s/end_s: On the time axis of the samples; None as long as they have not happened."""
     is_pulled: bool = False
+    """The table is being pulled or held."""
     is_held: bool = False
+    """The traces of an earlier run are shown."""
     read_s: float = float("-inf")
+    """Time of the sample that the readings were taken at."""
     traces: Traces = field(default_factory=Traces)
     readings: LiveReadings = NO_READINGS
 
     @classmethod
     def of_gauges(cls, gauges: Gauges) -> "LiveTraces":
-        """Begin without samples."""
         return cls((gauges.table.range_m, gauges.relative.range_m))
 
     @property
@@ -121,7 +109,6 @@ class LiveTraces:
     # --- changes ---
 
     def with_width(self, width_px: int) -> "LiveTraces":
-        """Draw for this width."""
         return replace(self, width_px=max(width_px, _PIXELS_MIN))
 
     def reconnected(self, gauges: Gauges) -> "LiveTraces":
@@ -393,27 +380,19 @@ def device_chip(name: str, loss_reason: str = "", silent_s: float = 0.0) -> Chip
 
 @dataclass(frozen=True, slots=True)
 class GaugeMonitor:
-    """Status of one gauge: overload, nearness of its limit, age of its calibration.
-
-    Attributes
-    ----------
-    channel : int
-        0 table, 1 relative.
-    overload_s : float
-        Time of the last overloaded sample.
-    """
+    """Status of one gauge: overload, nearness of its limit, age of its calibration."""
 
     channel: int
+    """0 table, 1 relative."""
     gauge: Gauge
     overload_s: float = float("-inf")
+    """Time of the last overloaded sample."""
 
     @property
     def name(self) -> str:
-        """`Gauge 1`."""
         return (gettext("Gauge 1"), gettext("Gauge 2"))[self.channel]
 
     def with_rows(self, rows: RingRows) -> "GaugeMonitor":
-        """Note overloaded samples."""
         flag = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)[self.channel]
         flagged_s = rows.time_s[(rows.status & flag) != 0]
         return replace(self, overload_s=float(flagged_s[-1])) if len(flagged_s) else self

@@ -40,85 +40,58 @@ RECORDING_STATES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Engine and current run.
-
-    Attributes
-    ----------
-    engine : PullbackState or None
-        State that the engine reported last; None without an engine.
-    is_command_pending : bool
-        The engine has not yet answered a command.
-    note : str
-        Note of the engine with its state.
-    loss_reason : str
-        Why the device is lost; empty while it is there.
-    waiting_for : str
-        Process that is started before the engine reports.
-    simulated : bool
-    true_friction : float or None
-        f_d of a simulated stand.
-    device : str
-    heard_s : float
-        Time of the last event of the engine.
-    series, run_name, run_note : str
-        Of the run that was armed last: series, name of its file, note.
-    remaining_runs : int
-        Runs that follow without a command.
-    live_estimate : LiveEstimate
-    """
+    """Engine and current run."""
 
     engine: PullbackState | None = None
+    """State that the engine reported last; None without an engine."""
     is_command_pending: bool = False
+    """The engine has not yet answered a command."""
     position: StandPosition = UNKNOWN_POSITION
     note: str = ""
+    """Note of the engine with its state."""
     loss_reason: str = ""
+    """Why the device is lost; empty while it is there."""
     waiting_for: str = ""
+    """Process that is started before the engine reports."""
     simulated: bool = False
     true_friction: float | None = None
+    """f_d of a simulated stand."""
     device: str = ""
     heard_s: float = 0.0
+    """Time of the last event of the engine."""
     series: str = ""
     run_name: str = ""
     run_note: str = ""
+    """series/run_name/run_note: Of the run that was armed last: series, name of its file, note."""
     remaining_runs: int = 0
+    """Runs that follow without a command."""
     live_estimate: LiveEstimate = NO_ESTIMATE
 
     @property
     def is_recording(self) -> bool:
-        """Tell whether samples go into a run."""
         return self.engine in RECORDING_STATES
 
     @property
     def is_idle(self) -> bool:
-        """Tell whether the engine can arm a run."""
         return self.engine is PullbackState.IDLE
 
 
 @dataclass(frozen=True, slots=True)
 class EndedRun:
-    """A run from its end until the operator goes on.
-
-    Attributes
-    ----------
-    event : RunEnded
-    series, name, note : str
-        Series, name of the file, and note that it was armed with.
-    result : Result or None
-        None while the run is being identified.
-    progress : Progress or None
-        Of the identification.
-    """
+    """A run from its end until the operator goes on."""
 
     event: RunEnded
     series: str
     name: str
     note: str
+    """series/name/note: Series, name of the file, and note that it was armed with."""
     result: Result | None = None
+    """None while the run is being identified."""
     progress: Progress | None = None
+    """Of the identification."""
 
     @property
     def is_awaited(self) -> bool:
-        """Tell whether its result is awaited."""
         return self.result is None
 
 
@@ -133,35 +106,26 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordModel:
-    """Everything that the Record screen is made of.
-
-    Attributes
-    ----------
-    author : str
-        Who decides about runs, for their history.
-    ended : EndedRun or None
-        Run that is shown; None while the next one is prepared or recorded.
-    snapshot : Snapshot or None
-        Of the run that was shown before.
-    sounds : bool
-        States are played.
-    """
+    """Everything that the Record screen is made of."""
 
     stand: StandContext
     author: str
+    """Who decides about runs, for their history."""
     next_runs: NextRuns
     live: LiveTraces
     monitors: tuple[GaugeMonitor, GaugeMonitor]
     session: Session = field(default_factory=Session)
     ended: EndedRun | None = None
+    """Run that is shown; None while the next one is prepared or recorded."""
     snapshot: Snapshot | None = None
+    """Of the run that was shown before."""
     decisions: RunDecisions = field(default_factory=RunDecisions)
     status_bar: StatusBar = NO_STATUS
     sounds: bool = False
+    """States are played."""
 
     @classmethod
     def of_stand(cls, stand: StandContext, author: str) -> "RecordModel":
-        """Begin without a device."""
         return cls(
             stand,
             author,
@@ -172,19 +136,16 @@ class RecordModel:
 
     @property
     def pullback_m(self) -> float:
-        """Nominal pullback of the next run."""
         return self.stand.pullback_m(self.next_runs.series)
 
     @property
     def is_run_shown(self) -> bool:
-        """Tell whether a run is armed, recorded, stored or shown."""
         session = self.session
         is_active = session.is_recording or session.engine is PullbackState.CLOSING
         return is_active or self.ended is not None or session.is_command_pending
 
     @property
     def allowed(self) -> frozenset[Action]:
-        """Actions that are possible now."""
         session = self.session
         if session.is_command_pending:
             return frozenset()
@@ -213,7 +174,6 @@ class RecordModel:
         return self.stand.allowed_plate_range(self.next_runs.series)
 
     def situation(self, state: PullbackState) -> PullbackSituation:
-        """What the guidance in an engine state depends on."""
         session = self.session
         table_m, relative_m = (float(value) for value in self.live.newest_m())
         is_on_base = self.stand.gauges.relative.measures == "plate"

@@ -39,58 +39,41 @@ CompletedRuns = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class NextRuns:
-    """Choices for the next runs, the series plan and its progress.
-
-    Attributes
-    ----------
-    choices : RunChoices
-    plan : PlanState
-    tests : NextTests
-        Plan, series, operator and conditions, as they are stored in the folder of runs.
-    saved : NextTests
-        As stored last.
-    is_requested, is_loaded : bool
-        The stored plan was asked for; was read.
-    is_edited : bool
-        The operator has changed form or plan before the stored ones were read.
-    completed : tuple of (str, str)
-        Path and series of each completed run.
-    undecided_path : str
-        Run that waits for a decision, and does not count until then; empty without one.
-    suggested_operator : str
-        Operator of the person's settings.
-    """
+    """Choices for the next runs, the series plan and its progress."""
 
     choices: RunChoices
     plan: PlanState = NO_PLAN
     tests: NextTests = field(default_factory=NextTests)
+    """Plan, series, operator and conditions, as they are stored in the folder of runs."""
     saved: NextTests = field(default_factory=NextTests)
+    """As stored last."""
     is_requested: bool = False
     is_loaded: bool = False
+    """is_requested/is_loaded: The stored plan was asked for; was read."""
     is_edited: bool = False
+    """The operator has changed form or plan before the stored ones were read."""
     completed: CompletedRuns = ()
+    """Path and series of each completed run."""
     undecided_path: str = ""
+    """Run that waits for a decision, and does not count until then; empty without one."""
     suggested_operator: str = ""
+    """Operator of the person's settings."""
 
     @classmethod
     def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
-        """Begin with the first series and no plan."""
         return cls(RunChoices(series=all_series[0], all_series=all_series))
 
     # --- choices ---
 
     @property
     def series(self) -> str:
-        """Series of the next run."""
         return self.choices.series
 
     @property
     def can_choose_series(self) -> bool:
-        """Tell whether the series can be changed now."""
         return self.choices.editable and not self.choices.series_fixed
 
     def with_choices(self, **changes: Any) -> "NextRuns":
-        """Change fields of `choices`."""
         choices = replace(self.choices, **changes)
         return replace(self, choices=replace(choices, summary=form_summary(choices.form)))
 
@@ -141,7 +124,6 @@ class NextRuns:
         return changed.with_completed(loaded.completed).with_next_series()
 
     def with_completed(self, completed: CompletedRuns) -> "NextRuns":
-        """Take the completed runs of the folder."""
         return replace(self, completed=completed)._counted()
 
     def with_kept_run(self, path: str, series: str) -> "NextRuns":

@@ -66,12 +66,10 @@ class RecordPresenter(Presenter[RecordState]):
 
     @property
     def is_recording(self) -> bool:
-        """Tell whether a run is being recorded or stored."""
         session = self._model.session
         return session.is_recording or session.engine is PullbackState.CLOSING
 
     def dispatch(self, event: RecordEvent) -> None:
-        """Apply an event, carry out its effects and show the new state."""
         if isinstance(event, TaskDone | TaskFailed) and event.argument in self._unfinished:
             self._unfinished.remove(event.argument)
         before = self._model

@@ -125,7 +125,6 @@ class _Reduction:
                 self._on_engine(event)
 
     def finish(self) -> None:
-        """Update what follows from everything else."""
         model, session = self.model, self.model.session
         editable = not session.is_recording and not session.is_command_pending
         if editable is not model.next_runs.choices.editable:

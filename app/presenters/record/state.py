@@ -26,29 +26,20 @@ _DOTS_MAX = 6
 
 @dataclass(frozen=True, slots=True)
 class StandContext:
-    """Settings of the stand and the folder of its runs.
-
-    Attributes
-    ----------
-    all_series : tuple of str
-        Series codes.
-    directory : Path
-        Folder that runs are stored in.
-    today : callable
-        Current date, for the validity of calibrations.
-    clock : callable
-        Monotonic time (s).
-    """
+    """Settings of the stand and the folder of its runs."""
 
     stand: Stand
     gauges: Gauges
     all_series: tuple[str, ...]
+    """Series codes."""
     directory: Path
+    """Folder that runs are stored in."""
     today: Callable[[], datetime.date] = datetime.date.today
+    """Current date, for the validity of calibrations."""
     clock: Callable[[], float] = time.monotonic
+    """Monotonic time (s)."""
 
     def pullback_m(self, series: str) -> float:
-        """Nominal pullback of a series (m)."""
         return self.stand.series(series).pullback_m
 
     def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
@@ -108,7 +99,6 @@ class PullbackTarget:
 
     @property
     def is_reached(self) -> bool:
-        """Tell whether the pullback is within its tolerance."""
         return abs(self.now_mm - self.target_mm) <= self.tolerance_mm
 
 
@@ -219,7 +209,6 @@ class SeriesProgress:
 
     @property
     def is_full(self) -> bool:
-        """Tell whether all planned runs are completed."""
         return self.done >= self.planned
 
     @property
@@ -251,7 +240,6 @@ class PlanState:
 
     @property
     def planned(self) -> int:
-        """Number of planned runs."""
         return sum(one.planned for one in self.progress)
 
     @property

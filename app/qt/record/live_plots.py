@@ -50,7 +50,6 @@ class LivePlots(QWidget):
         self._restyle()
 
     def show_traces(self, traces: Traces) -> None:
-        """Show traces."""
         if traces is self._traces:
             return
         old, self._traces = self._traces, traces
@@ -96,7 +95,6 @@ class LivePlots(QWidget):
         self._read_out()
 
     def _read_out(self) -> None:
-        """Time and value under the pointer."""
         for row, line in enumerate((self._traces.table, self._traces.relative)):
             value = value_at(line.time_s, line.value, self._pointed_s)
             shown = "" if math.isnan(value) else _readout(self._pointed_s, value)

@@ -87,7 +87,6 @@ class GuidancePanel(QWidget):
         )
 
     def show_guidance(self, guidance: GuidanceState) -> None:
-        """Show the instruction."""
         self._instruction.setText(guidance.instruction)
         self._detail.setText(guidance.detail)
         for widget in (self._instruction, self._detail):
@@ -98,11 +97,9 @@ class GuidancePanel(QWidget):
         self._stepper.show_steps(guidance.steps)
 
     def show_connected(self, connected: bool) -> None:
-        """Offer to connect a device while none is connected."""
         self._connect.setVisible(not connected)
 
     def show_progress(self, progress: Progress | None) -> None:
-        """Show the progress of the identification; None hides it."""
         self._progress_text.setVisible(progress is not None)
         self._progress.setVisible(progress is not None)
         if progress is None:
@@ -112,13 +109,11 @@ class GuidancePanel(QWidget):
         self._progress.setValue(round(100 * (progress.fraction or 0.0)))
 
     def show_live_estimate(self, estimate: LiveEstimate) -> None:
-        """Show the live estimate; without rows it is hidden."""
         for target, row in zip(self._estimates, padded(estimate.rows, _ESTIMATES_MAX, None), strict=True):
             target.show_row(row)
         set_text_or_hide(self._note, estimate.note)
 
     def show_readings(self, readings: LiveReadings) -> None:
-        """Show the current readings."""
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.value.setText(text)
         self._origin.setText(readings.origin)
@@ -151,7 +146,6 @@ class Stepper(QWidget):
         self._layout = make_row(spacing=4, of=self)
 
     def show_steps(self, steps: tuple[Step, ...]) -> None:
-        """Show steps."""
         if steps == self._steps:
             return
         self._steps = steps
@@ -183,11 +177,9 @@ class TargetBar(QWidget):
         theme.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:  # noqa: N802
-        """Preferred size."""
         return QSize(240, _BAR_HEIGHT)
 
     def show_target(self, target: PullbackTarget | None) -> None:
-        """Show current and nominal pullback; None hides the bar."""
         self.setVisible(target is not None)
         if target == self._target:
             return
@@ -199,7 +191,6 @@ class TargetBar(QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw backbackground, fill and target mark."""
         if self._target is None:
             return
         tokens = self._theme.tokens
@@ -250,7 +241,6 @@ class ResultPanel(QWidget):
         )
 
     def show_result(self, result: Result) -> None:
-        """Show a result."""
         self._name.setText(f"{result.headline.symbol} {result.headline.name}".strip())
         self._headline.show_row(result.headline)
         set_text_or_hide(self._comparison, result.comparison)
@@ -303,7 +293,6 @@ class DecisionPanel(QFrame):
         make_column(self._note, buttons, spacing=8, margins=(16, 8), of=self)
 
     def show_decision(self, decision: PendingDecision | None, allowed: frozenset[Action]) -> None:
-        """Show a pending decision; None hides the panel."""
         self.setVisible(decision is not None)
         if decision is not None and self._note.text() != decision.note:
             self._note.setText(decision.note)

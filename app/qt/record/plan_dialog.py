@@ -50,7 +50,6 @@ class PlanDialog(QDialog):
         self.resize(560, 520)
 
     def open_with(self, plan: PlanState) -> None:
-        """Open the dialog with a plan to edit."""
         self._text.setPlainText(plan.text.replace(" x", "\u00a0x"))  # no repeats on a line of their own
         self.show_plan(plan)
         self.show()
@@ -58,7 +57,6 @@ class PlanDialog(QDialog):
         self._text.setFocus()
 
     def show_plan(self, plan: PlanState) -> None:
-        """Show the progress, or what is wrong with the text."""
         words = gettext("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
         if plan.error:
             show_chip(self._message, Chip(plan.error, Tone.BAD))

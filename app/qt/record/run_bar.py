@@ -78,7 +78,6 @@ class RunBar(QFrame):
         self._connect()
 
     def show_choices(self, choices: RunChoices, plan: PlanState) -> None:
-        """Show the choices for the next runs."""
         self._shown = choices
         if self._series.count() != len(choices.all_series):
             self._series.addItems(choices.all_series)
@@ -108,7 +107,6 @@ class RunBar(QFrame):
         set_button_hint(self._buttons[Action.NEXT], gettext(description))
 
     def take_focus(self) -> None:
-        """Focus the primary button, or else the first enabled one."""
         usable = [button for button in self._buttons.values() if button.isEnabled()]
         usable.sort(key=lambda button: button.property("primary") != "true")
         (usable[0] if usable else self).setFocus()
@@ -171,7 +169,6 @@ class _Elided(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def set_line(self, text: str, *, is_error: bool) -> None:
-        """Set the text."""
         self._text = text
         self.setToolTip(text)
         set_property(self, "tone", "bad" if is_error else "plain")
@@ -179,7 +176,6 @@ class _Elided(QLabel):
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Show as much as fits."""
         super().resizeEvent(event)
         self._fit()
 
@@ -204,7 +200,6 @@ class PlanStrip(QWidget):
         self.setAccessibleName(gettext("Series plan"))
 
     def show_plan(self, plan: PlanState, series: str, *, choosable: bool) -> None:
-        """Show a plan and the chosen series."""
         self._progress, self._series = plan.progress, series
         while len(self._buttons) < len(plan.progress):
             self._add_button()
@@ -217,7 +212,6 @@ class PlanStrip(QWidget):
         self._arrange()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Show as many series as fit."""
         super().resizeEvent(event)
         self._arrange()
 
@@ -297,7 +291,6 @@ class RunFormFields(QWidget):
             grid.setColumnStretch(column, 1)
 
     def show_form(self, form: RunForm, *, editable: bool) -> None:
-        """Show a form."""
         for name, text in asdict(form).items():
             field = self._fields[name]
             field.setEnabled(editable)
@@ -305,7 +298,6 @@ class RunFormFields(QWidget):
                 field.setText(text)
 
     def take_focus(self) -> None:
-        """Focus the first field."""
         next(iter(self._fields.values())).setFocus()
 
     def _emit_form(self) -> None:

@@ -70,7 +70,6 @@ class RecordScreen(QWidget):
         self._connect(connect_device)
 
     def show_state(self, state: RecordState) -> None:
-        """Show the parts of a state that differ from the state shown."""
         old, self._shown = self._shown, state
         focused = QApplication.focusWidget()
         if old is None or state.status_bar != old.status_bar:
@@ -103,18 +102,15 @@ class RecordScreen(QWidget):
             self._sound.play(state.cue)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Focus the buttons."""
         super().showEvent(event)
         self._take_focus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Give the column its share of the width."""
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
     def _take_focus(self) -> None:
-        """Focus the usual next action: the decision about a run if one is pending."""
         decides = self._shown is not None and self._shown.decision is not None
         (self._decision if decides else self._bar).take_focus()
 
@@ -207,7 +203,6 @@ class StatusBarWidget(QFrame):
             widget.setAccessibleName(name)
 
     def show_status(self, status: StatusBar) -> None:
-        """Show a status."""
         show_chip(self._device, replace(status.device, text=gettext(status.device.text)))  # "no device"
         set_text_or_hide(self._rate, status.rate)
         show_chip(self._run, status.run)
@@ -219,7 +214,6 @@ class StatusBarWidget(QFrame):
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Show as much of the names as fits."""
         super().resizeEvent(event)
         self._fit()
 
@@ -255,7 +249,6 @@ class StatusLine(QFrame):
         make_row((self._message, 1), self._undo, spacing=8, margins=(16, 8), of=self)
 
     def show_status(self, message: Chip, undo: str) -> None:
-        """Show a message; `undo` describes what the button takes back."""
         self.setVisible(bool(message.text or undo))
         show_chip(self._message, message)
         self._undo.setVisible(bool(undo))

@@ -37,7 +37,6 @@ class CuePlayer:
         self._written: set[Cue] = set()
 
     def play(self, cue: Cue) -> None:
-        """Start playing a cue."""
         try:
             is_played = _play(self._file(cue))
         except OSError:

@@ -1,6 +1,7 @@
 """The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
@@ -21,13 +22,15 @@ from app.qt.runs.action_bar import ActionBar
 from app.qt.runs.metadata_editor import MetadataEditor
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
-from app.qt.screens import WindowDialogs
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext, ngettext
+
+if TYPE_CHECKING:
+    from app.qt.window import MainWindow
 
 _COLUMN_SHARE = 0.34
 _COLUMN_WIDTHS = (360, 620)
@@ -46,7 +49,7 @@ class RunsScreen(QWidget):
         Opens those for export and import.
     """
 
-    def __init__(self, theme: Theme, presenter: RunsPresenter, dialogs: WindowDialogs) -> None:
+    def __init__(self, theme: Theme, presenter: RunsPresenter, dialogs: "MainWindow") -> None:
         super().__init__()
         self._presenter = presenter
         self._dialogs = dialogs

@@ -1,4 +1,4 @@
-"""A box to tick, whose state shows by a drawn mark (a style sheet can only take one from a file)."""
+"""Check box, combo box and line edit. Their marks are drawn: a style sheet takes them only from files."""
 
 from collections.abc import Collection
 
@@ -11,10 +11,9 @@ _MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))
 
 
 class CheckBox(QCheckBox):
-    """A `QCheckBox` with a check mark in it when ticked: colour alone would say nothing to many."""
+    """A `QCheckBox` with a drawn check mark: colour alone is not accessible."""
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the box and its words, then the mark over it."""
         super().paintEvent(event)
         if not self.isChecked():
             return
@@ -37,7 +36,6 @@ class ComboBox(QComboBox):
     """A `QComboBox` with a drawn arrow."""
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the box, then the arrow over it."""
         super().paintEvent(event)
         group = QPalette.ColorGroup.Active if self.isEnabled() else QPalette.ColorGroup.Disabled
         painter = QPainter(self)
@@ -53,12 +51,7 @@ ESCAPE_AND_ENTER = ESCAPE | {Qt.Key.Key_Return, Qt.Key.Key_Enter}
 
 
 class ShortcutSafeEdit(QLineEdit):
-    """A line that some keys leave, whatever else they do on the screen.
-
-    Parameters
-    ----------
-    leaves : collection of Qt.Key
-    """
+    """Line edit that some keys leave, even if they are shortcuts of the screen."""
 
     left = Signal()
 
@@ -67,7 +60,6 @@ class ShortcutSafeEdit(QLineEdit):
         self._leaves = leaves
 
     def event(self, event: QEvent) -> bool:
-        """Keep the keys that leave from being taken as shortcuts."""
         leaves = isinstance(event, QKeyEvent) and event.key() in self._leaves
         if leaves and event.type() == QEvent.Type.ShortcutOverride:
             event.accept()

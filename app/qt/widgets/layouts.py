@@ -28,17 +28,9 @@ _Box = TypeVar("_Box", bound=QBoxLayout)
 def make_row(
     *items: Item, spacing: int = 0, margins: tuple[int, int] = (0, 0), of: QWidget | None = None
 ) -> QHBoxLayout:
-    """Place items beside one another.
+    """Place items beside one another; `of` gets the layout.
 
-    Parameters
-    ----------
-    *items : QWidget, QLayout, (QWidget or QLayout, int), or STRETCH
-    spacing : int
-        Pixels between items.
-    margins : tuple of int
-        Pixels at left and right, and at top and bottom.
-    of : QWidget, optional
-        Widget that gets the layout.
+    `margins` are the pixels at left and right, and at top and bottom.
     """
     return _fill(QHBoxLayout(of) if of is not None else QHBoxLayout(), items, spacing, margins)
 
@@ -70,13 +62,8 @@ def make_form_grid(
 ) -> QGridLayout:
     """Place fields below one another, their names at the left; names are accessible names too.
 
-    Parameters
-    ----------
-    fields : iterable of (str, QWidget)
-    wide : bool
-        Fields take all the width; else the width that they need.
-    below : sequence of QWidget
-        A widget below each field; hidden ones take no room.
+    Fields take all the width, unless `wide` is False. `below` has a widget for each field, placed below it;
+    hidden ones take no room.
     """
     grid = QGridLayout()
     grid.setVerticalSpacing(8)
@@ -86,24 +73,20 @@ def make_form_grid(
         title.setBuddy(field)
         field.setAccessibleName(name)
         grid.addWidget(title, 2 * number, 0)
-        if wide:
-            grid.addWidget(field, 2 * number, 1)
-        else:
-            grid.addWidget(field, 2 * number, 1, Qt.AlignmentFlag.AlignLeft)
+        grid.addWidget(field, 2 * number, 1, Qt.AlignmentFlag(0) if wide else Qt.AlignmentFlag.AlignLeft)
         if below:
             grid.addWidget(below[number], 2 * number + 1, 1)
     grid.setColumnStretch(1, 1)
     return grid
 
 
-def make_card(title: str, text: str = "") -> tuple[QFrame, QVBoxLayout]:
-    """Make a card with a heading and an optional text below it; the layout takes further widgets."""
+def make_card(title: str, text: str = "", *parts: Item) -> tuple[QFrame, QVBoxLayout]:
+    """Make a card with a heading, an optional text and items below it; the layout takes further items."""
     card = QFrame()
     card.setProperty("role", "card")
-    layout = make_column(label(title, TextRole.HEADING), spacing=12, margins=(16, 16), of=card)
-    if text:
-        layout.addWidget(label(text, muted=True, wrap=True))
-    return card, layout
+    texts = [label(text, muted=True, wrap=True)] if text else []
+    heading = label(title, TextRole.HEADING)
+    return card, make_column(heading, *texts, *parts, spacing=12, margins=(16, 16), of=card)
 
 
 def make_scroll_area(
@@ -111,15 +94,8 @@ def make_scroll_area(
 ) -> QScrollArea:
     """Make a frameless area that scrolls vertically.
 
-    Parameters
-    ----------
-    content : QWidget, optional
-        May be set later.
-    is_column : bool
-        The area has the background of a card.
-    name : str
-        Accessible name. An area with a name takes the keyboard focus, so that it can be scrolled by keys;
-        content with focusable widgets needs none.
+    With `is_column` it has the background of a card. An area with an accessible name takes the keyboard
+    focus, so that it can be scrolled by keys; content with focusable widgets needs none.
     """
     area = QScrollArea()
     area.setAccessibleName(name)

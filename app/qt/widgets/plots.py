@@ -1,4 +1,4 @@
-"""Plots under one another with one time axis: drawing only, no knowledge of what is drawn."""
+"""Plots below one another with one time axis."""
 
 import math
 from collections.abc import Sequence
@@ -9,16 +9,18 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QBrush, QPainter, QPixmapCache, QResizeEvent
-from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from analysis.formatting import typeset
 from app.qt.theme import TextRole, Theme, Tokens, colour, font
+from app.qt.widgets.layouts import make_column
 
 Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
 _ENDLESS = 16_777_215.0
 """Qt's own largest height."""
+_BEHIND = -10
 _GRID_ALPHA = 51
 """20 % of 255."""
 _CACHE_KB = 128 * 1024
@@ -28,14 +30,7 @@ _CACHE_KB = 128 * 1024
 class Plot:
     """One plot in a row of a `PlotStack`: title and readout above, axes at the left and below.
 
-    Built of pyqtgraph's view and axes; its `PlotItem` would bring seven menus along with each plot.
-
-    Parameters
-    ----------
-    canvas : GraphicsLayoutWidget
-    row : int
-    interactive : bool
-        The mouse zooms and pans in time.
+    It is built of pyqtgraph's view and axes: a `PlotItem` would create seven menus for each plot.
     """
 
     def __init__(self, canvas: Any, row: int, *, interactive: bool) -> None:
@@ -52,20 +47,16 @@ class Plot:
         canvas.addItem(self.bottom, row=3 * row + 2, col=1, colspan=2)
 
     def curve(self, **options: Any) -> Any:
-        """Add an empty line."""
         return self.add(pg.PlotDataItem(antialias=True, **options))
 
     def add(self, item: Any) -> Any:
-        """Add an item."""
         self.view.addItem(item, ignoreBounds=True)
         return item
 
     def set_value_range(self, low: float, high: float) -> None:
-        """Show these values, from the lower edge to the upper."""
         self.view.setYRange(low, high, padding=0.0)
 
     def restyle(self, tokens: Tokens) -> None:
-        """Take these colours."""
         for axis in (self.left, self.bottom):
             axis.setPen(pg.mkPen(tokens.line, width=1))
             axis.setTickPen(pg.mkPen(tokens.muted, width=1))
@@ -84,15 +75,7 @@ class Plot:
 class PlotStack(QWidget):
     """Several plots, linked in time, each with a title at its top left and a readout at its top right.
 
-    Parameters
-    ----------
-    theme : Theme
-    titles : sequence of (str, str)
-        Rich text and colour token of each plot's title, first plot on top.
-    interactive : bool
-        Mouse zooms and pans.
-    heights : sequence of int, optional
-        Heights of the plots against one another; alike if absent.
+    `titles` are rich text and colour token of each plot, from the top. `heights` are relative.
     """
 
     hovered = Signal(float)
@@ -117,14 +100,11 @@ class PlotStack(QWidget):
             part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot, if for anything
         self.plots = [Plot(self._canvas, row, interactive=interactive) for row in range(len(titles))]
         self._arrange(heights or [1] * len(titles))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._canvas)
+        make_column(self._canvas, of=self)
         self._canvas.scene().sigMouseMoved.connect(self._on_mouse)
         self.setMinimumHeight(_SMALLEST_HEIGHT * len(titles))
 
     def restyle(self) -> None:
-        """Take the colours of the theme."""
         tokens = self._theme.tokens
         self._canvas.setBackground(tokens.surface)
         for plot, (text, token) in zip(self.plots, self._titles, strict=True):
@@ -133,36 +113,31 @@ class PlotStack(QWidget):
         self.set_time_title(self.plots[-1].bottom.labelText)
 
     def set_title(self, row: int, text: str) -> None:
-        """Write rich text at a plot's top left."""
         _, token = self._titles[row]
         self._titles[row] = text, token
         _write(self.plots[row].title, text, getattr(self._theme.tokens, token))
 
     def set_plot_visible(self, row: int, *, shown: bool) -> None:
-        """Leave a plot out but for its title (and the time axis of the last), or show it again."""
+        """Show a plot, or only its title (and the time axis, of the last)."""
         for item in (self.plots[row].view, self.plots[row].left):
             item.setVisible(shown)
         self._canvas.ci.layout.setRowMaximumHeight(3 * row + 1, _ENDLESS if shown else 0.0)
 
     def set_time_title(self, text: str) -> None:
-        """Name the time axis."""
         self.plots[-1].bottom.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
 
     def set_time_range(self, start_s: float, end_s: float) -> None:
-        """Show this span of time in all plots."""
         self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
 
     def time_range(self) -> tuple[float, float]:
-        """Which span of time is shown (s)."""
+        """Shown span of time (s)."""
         (start_s, end_s), _ = self.plots[0].view.viewRange()
         return float(start_s), float(end_s)
 
     def set_readout(self, row: int, text: str) -> None:
-        """Write at a plot's top right."""
         _write(self.plots[row].readout, text, self._theme.tokens.text)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Tell the new width of the plots."""
         super().resizeEvent(event)
         self.resized.emit(max(64, self.width() - AXIS_WIDTH - 20))
 
@@ -188,14 +163,14 @@ class PlotStack(QWidget):
 
 
 class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """An axis whose numbers carry a true minus."""
+    """Axis whose numbers have a true minus sign."""
 
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
 
 
 def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
-    """One pixel wide: two cost five times as much."""
+    """Pen of one pixel: two pixels take five times as long to draw."""
     return pg.mkPen(colour(token_colour, alpha), width=1, dash=list(dashes) or None)
 
 
@@ -205,27 +180,27 @@ def shade(token_colour: str, alpha: float) -> Any:
 
 
 def value_at(time_s: Floats, values: Floats, at_s: float) -> float:
-    """Value of a drawn line at a time; NaN beside it."""
+    """Value of a drawn line at a time; NaN outside it."""
     if not len(time_s) or not time_s[0] <= at_s <= time_s[-1]:
         return math.nan
     return float(values[min(int(np.searchsorted(time_s, at_s)), len(values) - 1)])
 
 
 def shaded_region(plot: Plot, orientation: str = "vertical") -> Any:
-    """A hidden shaded span behind the curves of a plot; `place_region` shows it."""
+    """Add a hidden shaded span behind the curves of a plot; `place_region` shows it."""
     item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
-    item.setZValue(-10)
+    item.setZValue(_BEHIND)
     item.hide()
     return plot.add(item)
 
 
 def vertical_line(plot: Plot) -> Any:
-    """A line from the lower edge to the upper, at a value that `setValue` sets."""
+    """Add a vertical line; `setValue` places it."""
     return plot.add(pg.InfiniteLine(angle=90, movable=False))
 
 
 def draggable_line(plot: Plot) -> Any:
-    """An upright line that the mouse can draw along, with a grip."""
+    """Add a vertical line with a grip that the mouse can drag."""
     line = pg.InfiniteLine(angle=90, movable=True)
     line.addMarker("o", position=0.5, size=14.0)
     line.setZValue(20)
@@ -233,23 +208,20 @@ def draggable_line(plot: Plot) -> Any:
 
 
 def place_region(item: Any, span: tuple[float, float] | None) -> None:
-    """Show a span where it belongs; None hides it."""
+    """Show a span; None hides it."""
     item.setVisible(span is not None)
     if span is not None:
         item.setRegion(span)
 
 
 def _write(item: Any, text: str, text_colour: str) -> None:
-    """Write into a label; where it is wider than its place it is cut, rather than the plot pushed aside."""
+    """Set the text of a label; a wide one is cut instead of moving the plot."""
     item.setText(f'<span style="color: {text_colour}; font-size: 12px">{text}</span>')
     item.setMinimumWidth(0.0)
 
 
-_BEHIND = -10
-
-
 class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
-    """Spans as high as the plot. `show_spans` and `set_brush` change them."""
+    """Shaded spans as high as the plot."""
 
     def __init__(self, plot: Plot) -> None:
         super().__init__()
@@ -261,30 +233,24 @@ class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no 
 
     @property
     def spans(self) -> tuple[tuple[float, float], ...]:
-        """What is shaded, from and to, in the unit of the plot's axis."""
         return self._spans
 
     def show_spans(self, spans: tuple[tuple[float, float], ...]) -> None:
-        """Shade these."""
         self._spans = spans
         self.update()
 
     def set_brush(self, brush: Any) -> None:
-        """Shade with this."""
         self._brush = brush
         self.update()
 
     def viewTransformChanged(self) -> None:  # noqa: N802
-        """The plot shows another stretch."""
         super().viewTransformChanged()
         self.prepareGeometryChange()
 
     def boundingRect(self) -> QRectF:  # noqa: N802
-        """All that the plot shows."""
         return QRectF(self.viewRect())
 
     def paint(self, painter: QPainter, *_: Any) -> None:
-        """Fill the spans that can be seen."""
         seen = self.viewRect()
         for start, end in self._spans:
             left, right = max(start, seen.left()), min(end, seen.right())

@@ -1,14 +1,14 @@
-"""Keys: what a key does is said once, and told by the tool tip of its button and on F1."""
+"""Keyboard shortcuts: their description is in the tool tip of the button and in the help dialog."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QAbstractButton, QDialog, QGridLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QDialog, QGridLayout, QPushButton, QWidget
 
 from app.qt.theme import TextRole
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.text import label
 from messages.i18n import gettext
 
@@ -18,7 +18,7 @@ _SHOWN = "shown_key"
 
 @dataclass(frozen=True, slots=True)
 class ShortcutHelp:
-    """A key and what it does, as shown."""
+    """A key and its description, as shown."""
 
     key: str
     description: str
@@ -27,18 +27,9 @@ class ShortcutHelp:
 def add_shortcut(
     owner: QWidget, keys: str | Sequence[str], words: str, act: Callable[[], object], *, focused: bool = False
 ) -> None:
-    """Let a key do something as long as `owner` is shown.
+    """Let keys, as in `Ctrl+E`, call `act` while `owner` is shown; help and tool tips name the first.
 
-    Parameters
-    ----------
-    owner : QWidget
-    keys : str or sequence of str
-        As in `Ctrl+E`; several do the same, and the first is the one that is told.
-    words : str
-        What it does, for people.
-    act : callable
-    focused : bool
-        Only while `owner` has the focus: in a field the key is a letter.
+    With `focused` they act only while `owner` has the focus: in a field the key is a letter.
     """
     for number, key in enumerate([keys] if isinstance(keys, str) else keys):
         shortcut = QShortcut(QKeySequence(key), owner)
@@ -51,25 +42,25 @@ def add_shortcut(
 def bind_button(
     button: QAbstractButton, keys: str | Sequence[str], words: str, owner: QWidget, *, focused: bool = False
 ) -> None:
-    """Let a key press a button as `add_key` lets it do something; the button's tool tip says both."""
+    """Let keys press a button; its tool tip has the description and the first key."""
     add_shortcut(owner, keys, words, button.click, focused=focused)
     button.setProperty(_SHOWN, _native(keys if isinstance(keys, str) else keys[0]))
     set_button_hint(button, words)
 
 
 def set_button_hint(button: QAbstractButton, words: str) -> None:
-    """Say in a tool tip what a button does just now; its key stays in it."""
+    """Set the description in the tool tip of a button; its key stays in it."""
     key = button.property(_SHOWN)
     button.setToolTip(f"{words} ({key})" if key else words)
 
 
 def describe_shortcut(widget: QWidget, key: str, words: str) -> None:
-    """Tell on F1 of keys that the widget takes itself, such as arrows."""
+    """List keys in the help that the widget handles itself, such as arrows."""
     widget.setProperty(_DESCRIBED, (key, words))
 
 
 def list_shortcuts(widget: QWidget, *, own: bool = False) -> list[ShortcutHelp]:
-    """All keys of a widget and its parts, or only its own, in the order in which they were added."""
+    """Shortcuts of a widget and its parts, or only its own, in the order in which they were added."""
     depth = Qt.FindChildOption.FindDirectChildrenOnly if own else Qt.FindChildOption.FindChildrenRecursively
     shortcuts = [key for key in widget.findChildren(QShortcut, "", depth) if key.whatsThis()]
     parts = [widget] if own else [widget, *widget.findChildren(QWidget)]
@@ -84,14 +75,7 @@ def _native(keys: str) -> str:
 
 
 class HelpDialog(QDialog):
-    """Lists keys. It stays beside the window and stops nothing.
-
-    Parameters
-    ----------
-    groups : list of (str, list of Key)
-        A title and the keys under it.
-    parent : QWidget
-    """
+    """Lists shortcuts by group. It does not block the window."""
 
     def __init__(self, groups: list[tuple[str, list[ShortcutHelp]]], parent: QWidget) -> None:
         super().__init__(parent)
@@ -100,11 +84,7 @@ class HelpDialog(QDialog):
         close = QPushButton(gettext("Close"))
         close.clicked.connect(self.close)
         area = make_scroll_area(_page(groups), is_column=False, name=gettext("Keys"))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(12)
-        layout.addWidget(area, 1)
-        layout.addWidget(close, 0, Qt.AlignmentFlag.AlignRight)
+        make_column((area, 1), make_row(STRETCH, close), spacing=12, margins=(16, 16), of=self)
         self.resize(560, min(640, 120 + 30 * sum(len(keys) + 2 for _, keys in groups)))
 
 

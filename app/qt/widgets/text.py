@@ -86,7 +86,6 @@ class ValueLabel(QWidget):
         self._value = label(role=value)
         self._spread = label(role=spread)
         numbers = QHBoxLayout()
-        numbers.setContentsMargins(0, 0, 0, 0)
         numbers.setSpacing(8)
         numbers.addWidget(self._value, 0, Qt.AlignmentFlag.AlignBaseline)
         numbers.addWidget(self._spread, 1, Qt.AlignmentFlag.AlignBaseline)
@@ -98,7 +97,6 @@ class ValueLabel(QWidget):
         self._name.setVisible(named)
 
     def show_row(self, row: ResultRow | None) -> None:
-        """Write a row; None hides it."""
         self.setVisible(row is not None)
         if row is None:
             return
