@@ -37,20 +37,10 @@ def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> 
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
     Steps of up to 1.5 times the median, or up to the median and the step of the clock, are one period each;
-    the rate is that of their mean. Longer steps span a gap, negative ones a restart of the device; either
-    may be a damaged digit. They are left out.
-
-    Parameters
-    ----------
-    steps_s : (n,) float64
-        Differences of consecutive device times (s).
-    resolution_s : float
-        Step of the device's clock (s).
-
-    Returns
-    -------
-    float or None
-        None while there are fewer than 5 such steps or 0.5 s of them.
+    the rate is that of their mean. Longer steps span a gap, negative ones a restart of the device; either may
+    be a damaged digit. They are left out. `steps_s` (n,) are differences of consecutive device times (s),
+    `resolution_s` is the step of the device's clock. Returns None while there are fewer than 5 single periods
+    or 0.5 s of them.
     """
     if len(steps_s) < MIN_STEPS:
         return None
@@ -86,10 +76,7 @@ class ClockFit:
     as a whole. Neighbouring windows of a busy host are late alike, so the uncertainty allows for their
     correlation. Windows grow with the stream, which bounds the memory.
 
-    Parameters
-    ----------
-    nominal_rate_hz : float
-        Rate that index and time are compared by, > 0; good to 1 % or so.
+    `nominal_rate_hz` is the rate that index and time are compared by, > 0; good to 1 % or so.
     """
 
     def __init__(self, nominal_rate_hz: float) -> None:
@@ -106,12 +93,8 @@ class ClockFit:
     def add(self, index: int, arrival_ns: int) -> None:
         """Add the last sample of a block.
 
-        Parameters
-        ----------
-        index : int
-            From the first sample of the stream, gaps included.
-        arrival_ns : int
-            Host's monotonic time (ns) after the read that brought it.
+        `index` counts from the first sample of the stream, gaps included; `arrival_ns` is the host's
+        monotonic time after the read that brought it.
         """
         if self._start_ns is None:
             self._start_ns = arrival_ns
@@ -271,13 +254,7 @@ class TimeBase(msgspec.Struct, frozen=True):
 
 
 class SkewStatistics:
-    """Lags of rows, averaged over windows of 0.25 s; the latest 4 hours are kept.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Rows a second.
-    """
+    """Lags of rows, averaged over windows of 0.25 s; the latest 4 hours are kept."""
 
     def __init__(self, rate_hz: float) -> None:
         self._rows = max(1, round(_SKEW_WINDOW_S * rate_hz))

@@ -37,16 +37,8 @@ class StampedRead:
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
     """Envelope of a read; several of them where it is longer than 65,535 bytes.
 
+    `port` is 0 to 255, `arrival_ns` the host's monotonic time after the read; b"" marks a broken connection.
     Raises ValueError if the number of the port is out of range.
-
-    Parameters
-    ----------
-    port : int
-        0 to 255.
-    arrival_ns : int
-        Host's monotonic time (ns) after the read.
-    data : bytes
-        b"" for a broken connection.
     """
     if not 0 <= port <= _MAX_PORT:
         raise ValueError(f"port {port} has no place in an envelope: give 0 to {_MAX_PORT}")

@@ -36,10 +36,7 @@ def suspended_ns() -> int:
 class ActiveTimer:
     """Time during which this process was running; time in which it stood still is left out.
 
-    Parameters
-    ----------
-    longest_step_s : float
-        A longer time between two calls means that the process stood still (s).
+    More than `longest_step_s` between two calls means that the process stood still.
     """
 
     def __init__(self, longest_step_s: float) -> None:

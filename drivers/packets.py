@@ -256,11 +256,6 @@ class LossEstimator:
 
     A busy computer reads samples late and makes up for it; lost samples stay lost. So the lag is the least of
     the last one to two seconds, minus the least of the whole stream.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate, > 0.
     """
 
     def __init__(self, rate_hz: float) -> None:

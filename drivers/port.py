@@ -159,20 +159,10 @@ def find_replugged(lost: PortInfo) -> str | None:
 def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
     """Open a port for this program alone.
 
-    Raises PortUnavailableError if it does not exist, is busy, or may not be opened. Raises SettingsError if
-    the port cannot be set so.
-
-    Parameters
-    ----------
-    url : str
-        A device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
-        (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`).
-    baud : int
-        Bits a second; 8 data bits.
-    parity : str
-        "N", "E" or "O".
-    stop_bits : int
-        1 or 2.
+    `url` is a device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
+    (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`); `parity` N, E or O; bytes have 8
+    data bits and one stop bit. Raises PortUnavailableError if the port does not exist, is busy, or may not be
+    opened, SettingsError if it cannot be set so.
     """
     if parity not in PARITIES:
         raise SettingsError(

@@ -135,17 +135,9 @@ def listen(
 ) -> ListenResult:
     """Listen until what comes is recognised; nothing is sent.
 
-    A device that is silent at the first settings is silent at all. Raises DeviceLostError if the port is
-    gone.
-
-    Parameters
-    ----------
-    link : ConfigurableLink
-        Open, set to the first of `candidates`.
-    candidates : sequence of LineSettings
-        To be tried in this order.
-    clock : callable
-        Seconds, as of `time.monotonic`.
+    `link` is open and set to the first of `candidates`, which are tried in order; `clock` gives seconds as
+    `time.monotonic` does. A device that is silent at the first settings is silent at all. Raises
+    DeviceLostError if the port is gone.
     """
     best = ListenResult(None, None, b"")
     for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):

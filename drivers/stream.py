@@ -48,14 +48,7 @@ class Decoder(Protocol):
 class StreamSource(SampleSource):
     """A `SampleSource` around a decoder that needs to know the rate.
 
-    Parameters
-    ----------
-    identity : DeviceIdentity
-        Until the device reports its own.
-    baud : int
-        The device's usual baud rate, for messages.
-    rate_hz : float or None
-        Samples a second where it is known beforehand.
+    `identity` holds until the device reports its own; `rate_hz` is None where it is not known beforehand.
     """
 
     timeout_s = 3.0

@@ -33,18 +33,8 @@ def serve(
     """Be a simulated stand in this process until `has_ended()`.
 
     Raises ConfigError, DriverError, AnalysisError if it cannot be set up as asked; `on_ready` was not called
-    then.
-
-    Parameters
-    ----------
-    on_ready : callable
-        Receives what a reader must know, once the port can be opened.
-    has_ended : callable
-        Asked every few milliseconds.
-    on_truth : callable, optional
-        Receives the truth at the start, at each change, and at the end, as the truth file does.
-    next_disturbance : callable
-        Returns the next disturbance, None if there is none; asked every few milliseconds.
+    then. `on_ready` receives what a reader must know, `on_truth` the truth at the start, at each change and
+    at the end. `has_ended` and `next_disturbance` (None for none) are asked every few milliseconds.
     """
 
     def tell_all(truth: Truth) -> None:
@@ -95,10 +85,7 @@ def main() -> int:
 def read_disturbances(on_invalid: Callable[[Exception], None] = lambda _: None) -> CommandReader[Disturbance]:
     """Read disturbances as lines on standard input.
 
-    Parameters
-    ----------
-    on_invalid : callable, optional
-        Receives what is wrong with a line.
+    `on_invalid` receives what is wrong with a line.
     """
     return CommandReader(0, LineDecoder(_decode_disturbance, on_invalid))
 

@@ -17,13 +17,7 @@ _RELATIVE = np.uint8(SampleStatus.OVERLOAD_RELATIVE)
 
 
 class SwappedChannels:
-    """Counts of a device whose only channel has gauge 2; its second one has gauge 1.
-
-    Parameters
-    ----------
-    signal : Signal
-        Of both gauges in their order.
-    """
+    """Counts of a device whose only channel has gauge 2; its second one has gauge 1."""
 
     def __init__(self, signal: Signal) -> None:
         self._signal = signal
@@ -39,15 +33,9 @@ class SwappedChannels:
 class StandSignal:
     """Counts of both gauges of one stream; a `drivers.simulated.stream_sender.Signal`.
 
-    Samples are made a tenth of a second ahead, since short arrays cost as much as long ones; always
-    equally many, so that a seed gives the same noise however they are taken.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Samples a second of the stand's own time.
-    started_s : float
-        When the first sample is taken, on the stand's own time (s).
+    Samples are made a tenth of a second ahead, since short arrays cost as much as long ones; always equally
+    many, so that a seed gives the same noise however they are taken. `rate_hz` are samples a second of the
+    stand's own time, `started_s` is the time of the first one (s).
     """
 
     _AHEAD_S = 0.1
@@ -117,15 +105,7 @@ class GaugeFaults:
 
 
 class SimulatedGauge:
-    """One gauge with its 24-bit converter.
-
-    Parameters
-    ----------
-    gauge : Gauge
-        Calibration that the counts follow.
-    random : Generator
-        Source of the noise.
-    """
+    """One gauge with its 24-bit converter."""
 
     def __init__(self, gauge: Gauge, faults: GaugeFaults, random: np.random.Generator) -> None:
         self._gauge = gauge

@@ -21,14 +21,9 @@ from drivers.simulated.transport import Transport
 class SimulatedStandDevice:
     """A simulated stand on a transport. The caller runs `step` as often as it asks for.
 
-    Raises ConfigError, DriverError, MotionError if options, stand and gauges contradict each other.
-
-    Parameters
-    ----------
-    transport : Transport
-        Open; closed by the caller.
-    on_truth : callable (Truth)
-        Called at each start and end of a stream and at each release.
+    Raises ConfigError, DriverError, MotionError if options, stand and gauges contradict each other. The
+    transport is closed by the caller. `on_truth` is called at each start and end of a stream and at each
+    release.
     """
 
     def __init__(

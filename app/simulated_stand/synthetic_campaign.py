@@ -120,10 +120,7 @@ def plan_tests(
 ) -> list[SyntheticTest]:
     """The tests of a campaign in the order of the paper's table, one series after the other.
 
-    Raises
-    ------
-    ConfigError
-        A series is not one of the stand, or not in Table 1.
+    Raises ConfigError where a series is not one of the stand, or not in Table 1.
     """
     errors = draw_errors(stand, gauges, options.seed)
     drawn = {

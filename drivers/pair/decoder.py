@@ -36,14 +36,8 @@ class PairDecoder:
     """Decodes each device by its own source, converts its times to the host's, and makes rows of both.
 
     The clocks are compared over the last seconds only, so a replay that begins within a stream soon makes the
-    same rows as the live decoder.
-
-    Parameters
-    ----------
-    channels : tuple of PairedChannel
-        Devices of gauge 1 and gauge 2.
-    rates_hz : tuple of float
-        Their nominal rates.
+    same rows as the live decoder. `channels` are the devices of gauge 1 and gauge 2, `rates_hz` their nominal
+    rates.
     """
 
     def __init__(self, channels: tuple[PairedChannel, PairedChannel], rates_hz: tuple[float, float]) -> None:

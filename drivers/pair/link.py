@@ -31,16 +31,8 @@ class PairLink:
     """Reads of both ports in envelopes, in order of arrival; made by `open_pair`.
 
     A device that is gone or silent is reconnected while the other one is read; an empty envelope marks where
-    its connection broke.
-
-    Parameters
-    ----------
-    ports : pair of OpenPort
-        Open, of gauge 1 and gauge 2; closed here.
-    sources : pair of SampleSource
-        Called from the thread of their port.
-    is_resumed : bool
-        Whether the devices were started before.
+    its connection broke. The ports are those of gauge 1 and gauge 2; they are closed here. Each source is
+    called from the thread of its port. `is_resumed` tells that the devices were started before.
     """
 
     def __init__(
@@ -115,12 +107,10 @@ def open_pair(
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
-    """Open both ports and start both devices. Raises DriverError if one of them cannot be opened.
+    """Open both ports and start both devices.
 
-    Parameters
-    ----------
-    lost : pair of PortInfo, optional
-        What the ports were before the link was lost.
+    `lost` is what the ports were before the link was lost. Raises DriverError if one of them cannot be
+    opened.
     """
     ports: list[OpenPort] = []
     try:

@@ -82,14 +82,9 @@ class Merger:
     """Pairs each reading of one gauge with the nearest one of the other.
 
     A row is ready as soon as the other gauge has a reading that is not earlier, or has had none for 0.25 s.
-    Rows depend on readings and times of arrival alone, so the same reads give the same rows in any cut.
-
-    Parameters
-    ----------
-    base : int
-        Gauge whose readings make the rows: 0 for gauge 1, 1 for gauge 2.
-    other_period_s : float
-        Nominal time between two readings of the other gauge (s).
+    Rows depend on readings and times of arrival alone, so the same reads give the same rows in any cut. Rows
+    are the readings of gauge `base` (0 or 1); `other_period_s` is the nominal time between two readings of
+    the other gauge.
     """
 
     def __init__(self, base: int, other_period_s: float) -> None:

@@ -39,11 +39,6 @@ class PairSource(SampleSource):
     """Rows of both gauges, from enveloped reads of two ports (`drivers.pair.link.PairLink`).
 
     The threads of the ports collect bytes, not this source. The link starts and stops the devices.
-
-    Parameters
-    ----------
-    channel_sources : tuple of PairedChannel
-        Devices of gauge 1 and gauge 2.
     """
 
     timeout_s = 8.0
@@ -169,16 +164,10 @@ def make_pair(
 ) -> PairSource:
     """Source of two devices of one driver.
 
-    Raises SettingsError for a device that has both gauges on one port, or a setting or rate that cannot be.
-
-    Parameters
-    ----------
-    settings : mapping
-        Of both devices; those with the prefix `relative.` are of gauge 2's alone, `relative.rate` its rate.
-    rate_hz : float or None
-        Samples a second to ask of both.
-    recorded_settings : mapping, optional
-        `identity.settings` of an earlier recording, to decode it again: they hold its rates.
+    Settings with the prefix `relative.` are of gauge 2's device alone, `relative.rate` its rate; `rate_hz` is
+    asked of both. `recorded_settings` are `identity.settings` of an earlier recording, whose rates decode it
+    again. Raises SettingsError for a device that has both gauges on one port, or a setting or rate that
+    cannot be.
     """
     recorded = recorded_settings or {}
     own = {

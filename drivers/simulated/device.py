@@ -87,11 +87,6 @@ class SimulatedDevice:
     started after the last one was interrupted (cable, power, or a reader that left without a command)
     continues the session, because the stand does not wait. A stream that resumed by itself may be stopped and
     started once within the session.
-
-    Parameters
-    ----------
-    signal_at : callable (rate_hz, started_s)
-        See `SignalFactory`.
     """
 
     _NO_STREAM_S = 0.02
@@ -289,12 +284,7 @@ class PolledDevice(SimulatedDevice):
 class RegisterUpdater:
     """Takes samples at their rate into the registers of a polled device; its `Stream`.
 
-    Parameters
-    ----------
-    log : TransmissionLog
-        Its samples are counted here, its answers as frames by the device.
-    started_ns : int
-        Host's monotonic time of sample 0.
+    The log counts its samples; its answers are counted as frames by the device.
     """
 
     _INTERVAL_S = 0.02

@@ -190,10 +190,7 @@ def parse_disturbance(text: str) -> Disturbance:
 class DisturbanceSchedule:
     """All disturbances of a device, on the stand's own time.
 
-    Parameters
-    ----------
-    planned : sequence of Disturbance
-        Happen in each session; at its start where they have no time. None before the first session.
+    What is planned happens in each session, at its start where it has no time.
     """
 
     def __init__(self, planned: Sequence[Disturbance] = ()) -> None:

@@ -85,14 +85,9 @@ class SimulatedProtocol(ABC):
     ) -> list[bytes]:
         """Whole frames.
 
-        Parameters
-        ----------
-        first_sequence : int
-            Number of the very first sample; the protocol limits its width.
-        status : (frames * n,) uint8
-            `SampleStatus` of each sample.
-        times_s : (frames,) float64
-            Device time of the first sample of each frame (s).
+        `counts` (frames * n, 2) and `status` (frames * n,) are samples with their `SampleStatus`, `times_s`
+        (frames,) the device time of the first sample of each frame, `first_sequence` the number of the very
+        first sample; the protocol limits its width.
         """
 
 

@@ -128,12 +128,7 @@ class DeviceClock:
 class StreamSender:
     """Sends the samples of one stream at their time.
 
-    Parameters
-    ----------
-    log : TransmissionLog
-        Updated with every frame.
-    started_ns : int
-        Host's monotonic time of sample 0.
+    The log is updated with every frame. `started_ns` is the host's monotonic time of sample 0.
     """
 
     _STEP_S = 0.001

@@ -60,11 +60,6 @@ class TcpPort:
     """A TCP port for one reader at a time (a `Transport`), see `open_tcp_port`.
 
     While a reader is connected the port does not listen, so the system refuses a second one.
-
-    Parameters
-    ----------
-    listener : socket
-        Listening, not blocking.
     """
 
     resets_device = False
@@ -193,14 +188,8 @@ class PseudoTerminal:
     """The device's end of a POSIX pseudo-terminal (a `Transport`), see `open_pseudo_terminal`.
 
     Readers open a link to it, because a terminal that is opened again has another name. While no reader has
-    the other end open, reading here fails or ends: this shows when a reader comes or leaves.
-
-    Parameters
-    ----------
-    descriptor : int
-        The device's end.
-    link : Path
-        To the reader's end; alone in a folder that is removed with it.
+    the other end open, reading here fails or ends: this shows when a reader comes or leaves. `link` leads to
+    the reader's end, alone in a folder that is removed with it.
     """
 
     resets_device = True

@@ -24,16 +24,9 @@ _LINES_EXAMINED = 200
 def encode_line(layout: LineFormat, time_s: float, table: float, relative: float, sequence: int = 0) -> bytes:
     r"""One line, ended by `\r\n` as Arduino's `println` does.
 
-    Parameters
-    ----------
-    layout : LineFormat
-        `ignore` columns become 0, units "kg" where none is given.
-    time_s : float
-        Device time (s); us and ms columns are whole numbers that wrap.
-    table, relative : float
-        Readings; whole numbers have no decimal point. A `value` column has that of `table`.
-    sequence : int
-        Index of the sample; wraps too.
+    `time_s` is the device's time; us and ms columns are whole numbers that wrap, as `sequence` does. Whole
+    readings have no decimal point; a `value` column has that of `table`. `ignore` columns become 0, units
+    "kg" where none is given.
     """
     fields = [
         _field(layout, column, time_s, table, relative, sequence)
@@ -110,18 +103,10 @@ class LineDecoder(PacketDecoder):
     from the host's clock.
 
     The first line is left out, because it may be cut; lines before the first good one are a banner. Without a
-    checksum a damaged digit in a value is not noticed.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate, > 0; with a time column the rate of its times (`rate_from_lines`).
-    clock_step_s : float
-        Step of the device's clock (`clock_step_from_lines`).
-    overload_count : float
-        Readings of this size and more are marked as overloaded.
-    max_gap_s : float
-        Longest gap that is believed.
+    checksum a damaged digit in a value is not noticed. `rate_hz` is the nominal rate, > 0, with a time column
+    that of its times (`rate_from_lines`); `clock_step_s` the step of the device's clock
+    (`clock_step_from_lines`). Readings of `overload_count` and more are marked. `max_gap_s` is the longest
+    gap that is believed.
     """
 
     def __init__(

@@ -77,14 +77,8 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class CsvLinesSource(StreamSource):
     """The device sends by itself and takes no commands.
 
-    Parameters
-    ----------
-    layout : LineFormat or None
-        None for a device whose lines show it (`find_layout`).
-    rate_hz : float or None
-        Nominal samples a second; needed where no column holds the time.
-    overload_count : float
-        Readings of this size and more are marked as overloaded.
+    `layout` is None for a device whose lines show it (`find_layout`). `rate_hz` is needed where no column
+    holds the time. Readings of `overload_count` and more are marked as overloaded.
     """
 
     name = "CSV lines"

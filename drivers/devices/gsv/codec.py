@@ -122,17 +122,9 @@ def encode_frames(
 ) -> NDArray[np.uint8]:
     """Frames as a device without faults sends them; channels without a gauge are 0.
 
-    Parameters
-    ----------
-    counts : (n, 2)
-        Table and relative; whole numbers are limited to the range of their kind.
-    flags : int or (n,) uint8
-        Low bits of the status: 1 overload, 2 six-axis error.
-
-    Returns
-    -------
-    (n, layout.length) uint8
-        A frame a row; `.tobytes()` is what is sent.
+    `counts` (n, 2) are table and relative; whole numbers are limited to the range of their kind. `flags`, of
+    all or (n,), are the low bits of the status: 1 overload, 2 six-axis error. Returns (n, layout.length)
+    uint8, a frame a row.
     """
     wire = np.zeros((len(counts), layout.length), dtype=np.uint8)
     wire[:, :2] = SYNC, layout.header
@@ -161,13 +153,6 @@ class FrameDecoder(PacketDecoder):
     the next frame has begun. After a broken connection, rows stand for the time until the next frame.
 
     An overload is marked on both gauges, because the device does not say on which input it is.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate, > 0.
-    max_gap_s : float
-        Longest time that rows stand for.
     """
 
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:

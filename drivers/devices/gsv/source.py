@@ -62,10 +62,7 @@ class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class GsvSource(StreamSource):
     """Conversation: stop, identify, set format, input and rate, start.
 
-    Parameters
-    ----------
-    rate_hz : float or None
-        Samples a second to set; None accepts those of the device.
+    `rate_hz` None accepts the rate of the device.
     """
 
     stop_command = encode_request(Code.STOP)

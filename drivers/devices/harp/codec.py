@@ -274,19 +274,8 @@ def encode_events(
 ) -> NDArray[np.uint8]:
     """Events as a device without faults sends them; channels without a gauge are 0.
 
-    Parameters
-    ----------
-    times_s : (n,)
-        Device time (s), sent in steps of 32 us.
-    counts : (n, 2)
-        Table and relative, limited to 16 bits.
-    table, relative : int
-        Channels of the gauges, 0 to 7.
-
-    Returns
-    -------
-    (n, 28) uint8
-        An event a row; `.tobytes()` is what is sent.
+    `times_s` (n,) is device time, sent in steps of 32 us; `counts` (n, 2) table and relative, limited to 16
+    bits and sent on channels `table` and `relative`, 0 to 7. Returns (n, 28) uint8, an event a row.
     """
     wire = np.zeros((len(counts), EVENT_BYTES), dtype=np.uint8)
     wire[:, :5] = EVENT, EVENT_BYTES - 2, Register.LOAD_CELLS, PORT, S16 | HAS_TIMESTAMP
@@ -303,21 +292,11 @@ def encode_events(
 class EventDecoder(PacketDecoder):
     """Bytes to sample blocks; the device's times tell lost samples.
 
-    An event that comes k periods after the one before says that k - 1 are lost (`missing_estimated`); as
-    many of them as the bytes between can have held are damaged. Other messages are skipped. A time out of
-    sequence is believed only if the next event confirms it, because a checksum of eight bits passes one in
-    256 damaged events.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate, > 0.
-    table, relative : int
-        Channels of the gauges, 0 to 7.
-    overload_count : float
-        Readings of this size and more are marked as overloaded.
-    max_gap_s : float
-        Longest gap that is believed.
+    An event that comes k periods after the one before says that k - 1 are lost (`missing_estimated`); as many
+    of them as the bytes between can have held are damaged. Other messages are skipped. A time out of sequence
+    is believed only if the next event confirms it, because a checksum of eight bits passes one in 256 damaged
+    events. `table` and `relative` are the channels of the gauges, 0 to 7. Readings of `overload_count` and
+    more are marked as overloaded. `max_gap_s` is the longest gap that is believed.
     """
 
     def __init__(

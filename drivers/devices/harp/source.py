@@ -55,13 +55,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class HarpSource(StreamSource):
-    """Conversation: stop, identify, enable events, start. The rate is fixed and shown by the device's times.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Samples a second that are expected.
-    """
+    """Conversation: stop, identify, enable events, start. The rate is fixed and shown by the device's times."""
 
     stop_command = encode_stop()
 

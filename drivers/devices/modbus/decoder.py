@@ -35,14 +35,8 @@ class ResponseDecoder:
     The row of a response that is damaged, has a fault bit, or has no known time is damaged; the row of a
     Modbus exception is missing.
 
-    `device_time_s` of the blocks is the time of measurement, `arrival_ns` that of the last row.
-
-    Parameters
-    ----------
-    columns : tuple of int
-        Column of each of its channels: 0 is table, 1 relative.
-    max_gap_s : float
-        Longest gap that is believed.
+    `device_time_s` of the blocks is the time of measurement, `arrival_ns` that of the last row. `columns` are
+    those of the channels of `poll`: 0 is table, 1 relative. `max_gap_s` is the longest gap that is believed.
     """
 
     def __init__(

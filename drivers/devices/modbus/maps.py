@@ -59,16 +59,8 @@ def is_map_key(key: str) -> bool:
 def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUGES) -> RegisterMap:
     """Read a shipped map or a file, changed by given values.
 
-    Raises SettingsError names file, key, value and remedy.
-
-    Parameters
-    ----------
-    name : str
-        Of a shipped map, or a file that ends in `.toml`.
-    given : mapping
-        Values by key: `register` for both gauges, `table_register` for one.
-    gauges : tuple of str
-        Those to read: `table`, `relative` or both.
+    `name` is that of a shipped map, or a file that ends in `.toml`; `given` holds values by key: `register`
+    for both gauges, `table_register` for one. Raises SettingsError, which names file, key, value and remedy.
     """
     where, content = _content(name)
     _check_keys(where, content)

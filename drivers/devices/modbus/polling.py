@@ -91,13 +91,7 @@ def drain(link: Link) -> bytes:
 
 
 class PollSchedule:
-    """Schedule of polls: one at the beginning of each cell of the host's time, or none.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Cells a second.
-    """
+    """Schedule of polls: one at the beginning of each cell of the host's time, or none."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_ns = sample_period_ns(rate_hz)
@@ -144,10 +138,7 @@ class PollSchedule:
 class ResponseTiming:
     """How quickly a device answers the requests of a poll, measured in trials and during the stream.
 
-    Parameters
-    ----------
-    trials : sequence of sequence of Transaction
-        Polls in immediate succession.
+    `trials` are polls in immediate succession.
     """
 
     def __init__(self, trials: Sequence[Sequence[Transaction]]) -> None:

@@ -53,13 +53,7 @@ def _request_bytes(data: bytes, at: int) -> int:
 
 
 class SimulatedModbus(PolledProtocol):
-    """Registers with the latest sample, of one unit or two, on a line of 115200 baud.
-
-    Parameters
-    ----------
-    register_map : RegisterMap
-        Its channels alone exist.
-    """
+    """Registers with the latest sample, of one unit or two, on a line of 115200 baud."""
 
     max_rate_hz = MAX_RATE_HZ
     find_commands = staticmethod(find_commands)

@@ -67,12 +67,7 @@ class ModbusSource(StreamSource):
     """Conversation: ask until there is a response, measure the response time, then poll at the rate.
 
     Rows lie on a grid of the host's clock (`drivers.devices.modbus.decoder`). A poll is made at the beginning
-    of its cell, or not at all.
-
-    Parameters
-    ----------
-    rate_hz : float or None
-        Polls a second; None polls as often as the device answers.
+    of its cell, or not at all. `rate_hz` are polls a second; None polls as often as the device answers.
     """
 
     def __init__(

@@ -129,23 +129,11 @@ def encode_frames(
 ) -> NDArray[np.uint8]:
     """Many frames of equal length, as a device without faults sends them.
 
-    Raises ValueError if the samples do not fill the frames.
-
-    Parameters
-    ----------
-    first_index : int
-        Index of the very first sample, sent modulo 2**32; each sample has the next index.
-    times_us : (frames,) int
-        Device time (us) of the first sample of each frame, sent modulo 2**32.
-    counts : (frames * n, 2) int32
-        Readings of both channels, n of them a frame, 1 <= n <= 32.
-    flags : int or (frames,) uint8
-        `FrameFlags` of all or of each frame.
-
-    Returns
-    -------
-    (frames, 15 + 8 n) uint8
-        A frame a row; `.tobytes()` is what is sent.
+    `first_index` is that of the very first sample, sent modulo 2**32; each sample has the next one.
+    `times_us` (frames,) is the device time of the first sample of each frame (us), sent modulo 2**32.
+    `counts` (frames * n, 2) int32 are readings of both channels, n of them a frame, 1 <= n <= 32; `flags` the
+    `FrameFlags` of all or of each frame. Returns (frames, 15 + 8 n) uint8, a frame a row. Raises ValueError
+    if the samples do not fill the frames.
     """
     frames = len(times_us)
     n, rest = divmod(len(counts), max(frames, 1))
@@ -189,13 +177,6 @@ class FrameDecoder(PacketDecoder):
     `max_gap_s`, or contradicts the host's clock after a broken connection is a restart of the device: the
     rows until it are estimated from the host's clock (`missing_estimated`), and the index goes on. A frame
     that comes twice counts once. Losses before the first and after the last good frame cannot be known.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate, > 0.
-    max_gap_s : float
-        Longest gap that a sequence number is believed to prove.
     """
 
     _piece_bytes = 1 << 18
