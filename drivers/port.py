@@ -17,6 +17,7 @@ from serial.tools import list_ports as serial_list_ports
 
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
 from drivers.source import LineSettings, Link
+from messages.i18n import N_
 
 _log = logging.getLogger(__name__)
 
@@ -67,11 +68,8 @@ class PortInfo:
 
     def is_same_device(self, other: "PortInfo") -> bool:
         """Whether both are one USB device, whatever the names of their ports."""
-        return self.vendor_id is not None and self._usb_numbers == other._usb_numbers
-
-    @property
-    def _usb_numbers(self) -> tuple[int | None, int | None, str]:
-        return self.vendor_id, self.product_id, self.serial_number
+        own = (self.vendor_id, self.product_id, self.serial_number)
+        return self.vendor_id is not None and own == (other.vendor_id, other.product_id, other.serial_number)
 
 
 class OpenPort(Link, Protocol):
@@ -117,17 +115,10 @@ def list_ports() -> list[PortInfo]:
         ports = list(serial_list_ports.comports())
     except PLATFORM_ERRORS:  # Windows raises while a device is being unplugged
         return []
-    found = (
-        PortInfo(
-            port.device,
-            port.description or "",
-            port.vid,
-            port.pid,
-            port.serial_number or "",
-            port.location or "",
-        )
-        for port in ports
-    )
+    found = [
+        PortInfo(p.device, p.description or "", p.vid, p.pid, p.serial_number or "", p.location or "")
+        for p in ports
+    ]
     return sorted(found, key=lambda port: port.device)
 
 
@@ -156,7 +147,7 @@ def find_replugged(lost: PortInfo) -> str | None:
     return None
 
 
-def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
+def open_port(url: str, baud: int, parity: str = "N") -> "Port":
     """Open a port for this program alone.
 
     `url` is a device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
@@ -180,24 +171,19 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
             url,
             baudrate=baud,
             parity=parity,
-            stopbits=stop_bits,
             timeout=_READ_TIMEOUT_S,
             write_timeout=_WRITE_TIMEOUT_S,
             exclusive=True,
         )
     except PLATFORM_ERRORS as error:
         raise port_unavailable_error(url, baud, error, [port.device for port in list_ports()]) from error
-    _minimise_latency(wire)
-    _log.info("opened %s at %d baud, parity %s", url, baud, parity)
-    return Port(wire, url)
-
-
-def _minimise_latency(wire: Any) -> None:
-    """Ask for low latency and a large buffer where the platform has them."""
+    # Low latency and a large buffer where the platform has them.
     with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
         wire.set_low_latency_mode(True)
     with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
+    _log.info("opened %s at %d baud, parity %s", url, baud, parity)
+    return Port(wire, url)
 
 
 class Port:
@@ -209,7 +195,9 @@ class Port:
     def __init__(self, wire: Any, url: str) -> None:
         self._wire = wire
         self._is_socket = url.lower().startswith("socket://")
-        self._terminal = _terminal_of(wire)
+        # Direct reads of a POSIX terminal cost a third of pyserial's.
+        is_terminal = sys.platform != "win32" and type(wire) is serial.Serial
+        self._terminal: int | None = wire.fileno() if is_terminal else None
         self.url = url
         self.info = port_info(url)
 
@@ -302,12 +290,6 @@ class Port:
         return lost
 
 
-def _terminal_of(wire: Any) -> int | None:
-    """Descriptor of a POSIX terminal, whose direct reads cost a third of pyserial's."""
-    is_terminal = sys.platform != "win32" and type(wire) is serial.Serial
-    return int(wire.fileno()) if is_terminal else None
-
-
 def _read_terminal(descriptor: int) -> bytes:
     """All that is there, or comes first within 50 ms. Raises an error of `PLATFORM_ERRORS`."""
     parts = [_read_available(descriptor)]
@@ -383,24 +365,19 @@ def _leads_to(target: str, file: Path) -> bool:
 
 def device_lost_error(url: str, error: Exception) -> DeviceLostError:
     """Error to raise for `error` of an open port."""
+    template = N_("port {port} is gone: plug its cable in again, and check the power of the device")
     if "://" in url:
-        return DeviceLostError(
-            "the connection to {port} was closed by the other end: check its power and the network", port=url
-        )
-    if "timeout" in str(error).lower():
-        return DeviceLostError(
-            "port {port} takes nothing of what is sent: check the device, and reset it if it hangs", port=url
-        )
-    return DeviceLostError(
-        "port {port} is gone: plug its cable in again, and check the power of the device", port=url
-    )
+        template = N_("the connection to {port} was closed by the other end: check its power and the network")
+    elif "timeout" in str(error).lower():
+        template = N_("port {port} takes nothing of what is sent: check the device, and reset it if it hangs")
+    return DeviceLostError(template, port=url)
 
 
 def port_unavailable_error(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
     """Error to raise for `error` of opening `url`, while the ports `present` exist."""
+    number, fault = getattr(error, "errno", None), str(error)
     if "://" in url:
-        return _unreachable_error(url, str(error))
-    number, text = getattr(error, "errno", None), str(error)
+        return PortUnavailableError(_unreachable_template(fault), port=url)
     if number in _DENIED:
         return PortUnavailableError(
             "port {port} may not be opened by this user: add the user to the group that owns it "
@@ -408,9 +385,9 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
             port=url,
         )
     # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
-    if number in _BUSY or "PermissionError" in text:
+    if number in _BUSY or "PermissionError" in fault:
         return port_busy_error(url, port_users(url))
-    if number in _ABSENT or "FileNotFoundError" in text:
+    if number in _ABSENT or "FileNotFoundError" in fault:
         if present:
             return PortUnavailableError(
                 "there is no port {port}: plug the device in or give its name; ports here: {present}",
@@ -442,22 +419,14 @@ def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
     return PortUnavailableError("port {port} is busy: close the program that has it open", port=url)
 
 
-def _unreachable_error(url: str, fault: str) -> DriverError:
+def _unreachable_template(fault: str) -> str:
     if "not known" in fault:
-        return PortUnavailableError(
-            "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port",
-            port=url,
+        return N_(
+            "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
         )
     fault = fault.lower()
     if "refused" in fault:
-        return PortUnavailableError(
-            "{port} refuses: nothing listens there, start the device's server or check the port number",
-            port=url,
-        )
+        return N_("{port} refuses: nothing listens there, start the device's server or check the port number")
     if "name or service" in fault or "getaddrinfo" in fault or "nodename" in fault:
-        return PortUnavailableError(
-            "{port} is not known in this network: check how the address is written", port=url
-        )
-    return PortUnavailableError(
-        "{port} does not answer: check address, port number, network and power of the device", port=url
-    )
+        return N_("{port} is not known in this network: check how the address is written")
+    return N_("{port} does not answer: check address, port number, network and power of the device")

@@ -8,7 +8,14 @@ from enum import StrEnum
 from drivers.errors import DriverError, SettingsError
 from drivers.host_checks import PortHint, port_hints, usb_chip_name
 from drivers.port import Port, PortInfo, PortUser, open_port, other_port_users
-from drivers.recognition import IdentityQuery, Recognition, describe_unrecognised, is_text, recognise
+from drivers.recognition import (
+    IdentityQuery,
+    Recognition,
+    describe_unrecognised,
+    is_text,
+    printable_share,
+    recognise,
+)
 from drivers.registry import AVAILABLE
 from drivers.source import ConfigurableLink, LineSettings, Link
 from messages.message import EMPTY, Message, message
@@ -74,16 +81,8 @@ class ListenResult:
     """What the bytes are, if a device folder knows them."""
     line_settings: LineSettings | None
     """None where they have no effect."""
-    received: bytes
+    received: bytes = b""
     """What came at the settings that were recognised, else at those that looked most like text."""
-
-
-@dataclass(frozen=True, slots=True)
-class IdentifiedDevice:
-    """A device that answered a question."""
-
-    recognition: Recognition
-    line_settings: LineSettings | None
 
 
 def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], None]) -> PortReport:
@@ -100,31 +99,31 @@ def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], Non
     try:
         first = COMMON_LINE_SETTINGS[0]
         with open_port(port.device, first.baud, first.parity) as link:
-            outcome, what, recognition, line_settings = _probe_link(link, write, on_progress)
+            outcome, what, found = _probe_link(link, write, on_progress)
     except DriverError as error:
         return PortReport(port, chip, ProbeOutcome.UNAVAILABLE, error.message, hints=hints)
-    return PortReport(port, chip, outcome, what, (), recognition, line_settings, hints)
+    return PortReport(port, chip, outcome, what, (), found.recognition, found.line_settings, hints)
 
 
 def _probe_link(
     link: Port, write: bool, on_progress: Callable[[Message], None]
-) -> tuple[ProbeOutcome, Message, Recognition | None, LineSettings | None]:
+) -> tuple[ProbeOutcome, Message, ListenResult]:
     heard = listen(link, on_progress)
     if heard.recognition is not None:
-        return ProbeOutcome.RECOGNISED, EMPTY, heard.recognition, heard.line_settings
+        return ProbeOutcome.RECOGNISED, EMPTY, heard
     if heard.received:
         what = describe_unrecognised(heard.received, has_baud=link.has_baud)
-        return ProbeOutcome.UNREADABLE, what, None, heard.line_settings
+        return ProbeOutcome.UNREADABLE, what, heard
     if not write:
         what = message("nothing sends by itself: try --write, which asks the device who it is")
-        return ProbeOutcome.SILENT, what, None, None
+        return ProbeOutcome.SILENT, what, heard
     answered = query_identity(link, on_progress)
     if answered is not None:
-        return ProbeOutcome.RECOGNISED, EMPTY, answered.recognition, answered.line_settings
+        return ProbeOutcome.RECOGNISED, EMPTY, answered
     what = message(
         "nothing is sent and nothing answers: check cable and power, and that the device is switched on"
     )
-    return ProbeOutcome.SILENT, what, None, None
+    return ProbeOutcome.SILENT, what, heard
 
 
 def listen(
@@ -139,7 +138,7 @@ def listen(
     `time.monotonic` does. A device that is silent at the first settings is silent at all. Raises
     DeviceLostError if the port is gone.
     """
-    best = ListenResult(None, None, b"")
+    best = ListenResult(None, None)
     for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
         if link.has_baud:
             on_progress(message("listening at {line_settings}", line_settings=settings))
@@ -153,11 +152,8 @@ def listen(
         received, recognition = _listen_once(link, _SLOW_WINDOW_S if number else FIRST_WAIT_S, clock)
         if not received and not number:
             break
-        best = max(
-            best,
-            ListenResult(recognition, settings if link.has_baud else None, received),
-            key=_informativeness,
-        )
+        result = ListenResult(recognition, settings if link.has_baud else None, received)
+        best = max(best, result, key=_informativeness)
         if best.recognition is not None and best.recognition.share >= _SURE_SHARE:
             break
     return best
@@ -168,7 +164,7 @@ def query_identity(
     on_progress: Callable[[Message], None],
     queries: Iterable[tuple[str, IdentityQuery]] | None = None,
     clock: Callable[[], float] = time.monotonic,
-) -> IdentifiedDevice | None:
+) -> ListenResult | None:
     """Ask the question of one device after the other, by default of all, until one is answered.
 
     Raises DeviceLostError if the port is gone.
@@ -186,7 +182,7 @@ def query_identity(
             remark = _query_once(link, query, settings, clock)
             if remark is not None:
                 found = Recognition(protocol, 1.0, 1, remark=remark)
-                return IdentifiedDevice(found, settings if link.has_baud else None)
+                return ListenResult(found, settings if link.has_baud else None)
     return None
 
 
@@ -224,8 +220,7 @@ def _is_enough(received: bytes, duration_s: float) -> bool:
 
 def _informativeness(result: ListenResult) -> tuple[float, bool, float]:
     share = result.recognition.share if result.recognition else 0.0
-    printable = sum(0x20 <= byte < 0x7F or byte in b"\r\n\t" for byte in result.received)
-    return share, bool(result.received), printable / max(len(result.received), 1)
+    return share, bool(result.received), printable_share(result.received)
 
 
 def _query_once(

@@ -115,9 +115,14 @@ def describe_unrecognised(received: bytes, *, has_baud: bool) -> Message:
     )
 
 
+def printable_share(data: bytes) -> float:
+    """Share of `data` that can be printed; 0 without data."""
+    return sum(byte in _TEXT for byte in data) / max(len(data), 1)
+
+
 def is_text(data: bytes) -> bool:
     """Whether nearly all of `data` can be printed."""
-    return bool(data) and sum(byte in _TEXT for byte in data) >= _TEXT_SHARE * len(data)
+    return printable_share(data) >= _TEXT_SHARE
 
 
 def has_parity_errors(data: bytes) -> bool:

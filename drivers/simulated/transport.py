@@ -9,44 +9,48 @@ import socket
 import sys
 import tempfile
 import time
+from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Protocol
 
 from drivers.errors import PortUnavailableError
 
 
-class Transport(Protocol):
+class Transport(ABC):
     """The device's end of a wire. It never blocks."""
 
     @property
+    @abstractmethod
     def url(self) -> str:
         """Address that a reader opens; it does not change when the port is unplugged and comes back."""
 
-    @property
-    def resets_device(self) -> bool:
-        """Whether a reader that closes the port resets the device, as the DTR line of an Arduino does."""
+    resets_device: bool
+    """Whether a reader that closes the port resets the device, as the DTR line of an Arduino does."""
+    burst_s: float
+    """How much of a late stream may be sent at once (s), so that a reader keeps up."""
 
-    @property
-    def burst_s(self) -> float:
-        """How much of a late stream may be sent at once (s), so that a reader keeps up."""
-
+    @abstractmethod
     def wait(self, timeout_s: float) -> None:
         """Sleep until the reader has sent something or `timeout_s` is over."""
 
+    @abstractmethod
     def receive(self) -> bytes | None:
         """What the reader has sent, b"" if nothing; None while no reader has the port open."""
 
+    @abstractmethod
     def send(self, data: bytes) -> int:
         """Send what there is room for; returns the number of bytes. The rest is lost, as on a UART."""
 
+    @abstractmethod
     def unplug(self) -> None:
         """Remove the port, even while it is open."""
 
+    @abstractmethod
     def plug_in(self) -> None:
         """Open the port again under its old address."""
 
     def close(self) -> None:
         """Close the port for good."""
+        self.unplug()
 
 
 HOST = "127.0.0.1"
@@ -56,7 +60,7 @@ _SEND_BUFFER_BYTES = 1 << 16
 """64 KiB hold 80 ms at 100 kHz: a reader that stands still for longer loses samples, as on a UART."""
 
 
-class TcpPort:
+class _TcpPort(Transport):
     """A TCP port for one reader at a time (a `Transport`), see `open_tcp_port`.
 
     While a reader is connected the port does not listen, so the system refuses a second one.
@@ -73,11 +77,9 @@ class TcpPort:
 
     @property
     def url(self) -> str:
-        """Address that a reader opens: `socket://127.0.0.1:PORT`."""
         return f"socket://{HOST}:{self._number}"
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until a reader connects or sends something, or `timeout_s` is over."""
         watched = self._reader or self._listener
         if watched is None:  # select without sockets fails on Windows
             time.sleep(max(0.0, timeout_s))
@@ -85,7 +87,6 @@ class TcpPort:
             select.select([watched], [], [], max(0.0, timeout_s))
 
     def receive(self) -> bytes | None:
-        """See `Transport`."""
         if self._reader is None and not self._accept():
             return None
         try:
@@ -100,7 +101,6 @@ class TcpPort:
         return data or None
 
     def send(self, data: bytes) -> int:
-        """See `Transport`."""
         if self._reader is None:
             return 0
         try:
@@ -109,19 +109,13 @@ class TcpPort:
             return 0
 
     def unplug(self) -> None:
-        """Close the connection and refuse others."""
         self._is_plugged_in = False
         self._drop_reader()
         self._deafen()
 
     def plug_in(self) -> None:
-        """Listen again on the same port."""
         self._is_plugged_in = True
         self._listen()
-
-    def close(self) -> None:
-        """Close the connection and the port."""
-        self.unplug()
 
     def _accept(self) -> bool:
         self._listen()
@@ -153,10 +147,10 @@ class TcpPort:
             self._reader = None
 
 
-def open_tcp_port(number: int = 0) -> TcpPort:
+def open_tcp_port(number: int = 0) -> Transport:
     """Listen on a TCP port of this computer, 0 being any free one. Raises PortUnavailableError."""
     try:
-        return TcpPort(_listener(number))
+        return _TcpPort(_listener(number))
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise PortUnavailableError(
@@ -184,7 +178,7 @@ def _listener(number: int) -> socket.socket:
     return listener
 
 
-class PseudoTerminal:
+class _PseudoTerminal(Transport):
     """The device's end of a POSIX pseudo-terminal (a `Transport`), see `open_pseudo_terminal`.
 
     Readers open a link to it, because a terminal that is opened again has another name. While no reader has
@@ -205,18 +199,15 @@ class PseudoTerminal:
 
     @property
     def url(self) -> str:
-        """Path of the link that a reader opens."""
         return str(self._link)
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until the reader sends something or `timeout_s` is over; 5 ms while there is no reader."""
         if self._reader_is_there and self._descriptor is not None:
             select.select([self._descriptor], [], [], max(0.0, timeout_s))
         else:  # a terminal without a reader is readable all the time
             select.select([], [], [], min(self._LOOK_FOR_READER_S, max(0.0, timeout_s)))
 
     def receive(self) -> bytes | None:
-        """See `Transport`."""
         if self._descriptor is None:
             return None
         try:
@@ -230,7 +221,6 @@ class PseudoTerminal:
         return data or None
 
     def send(self, data: bytes) -> int:
-        """See `Transport`."""
         if self._descriptor is None:
             return 0
         try:
@@ -239,7 +229,6 @@ class PseudoTerminal:
             return 0
 
     def unplug(self) -> None:
-        """Close the terminal and remove the link."""
         self._link.unlink(missing_ok=True)
         if self._descriptor is not None:
             os.close(self._descriptor)
@@ -247,12 +236,10 @@ class PseudoTerminal:
         self._reader_is_there = False
 
     def plug_in(self) -> None:
-        """Open a new terminal behind the old link."""
         if self._descriptor is None:
             self._descriptor = _open_device_end(self._link)
 
     def close(self) -> None:
-        """Close the device's end and remove the link with its folder."""
         self.unplug()
         shutil.rmtree(self._link.parent, ignore_errors=True)
 
@@ -262,7 +249,7 @@ def has_pseudo_terminals() -> bool:
     return sys.platform != "win32"
 
 
-def open_pseudo_terminal() -> PseudoTerminal:
+def open_pseudo_terminal() -> Transport:
     """Open a pseudo-terminal in raw mode. Raises PortUnavailableError where there are none."""
     if not has_pseudo_terminals():
         raise PortUnavailableError(
@@ -270,7 +257,7 @@ def open_pseudo_terminal() -> PseudoTerminal:
         )
     folder = Path(tempfile.mkdtemp(prefix="slipstand-stand-"))
     try:
-        return PseudoTerminal(_open_device_end(folder / "port"), folder / "port")
+        return _PseudoTerminal(_open_device_end(folder / "port"), folder / "port")
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise

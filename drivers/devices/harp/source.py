@@ -55,7 +55,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class HarpSource(StreamSource):
-    """Conversation: stop, identify, enable events, start. The rate is fixed and shown by the device's times."""
+    """Conversation: stop, identify, enable events, start. The device's times show its fixed rate."""
 
     stop_command = encode_stop()
 
