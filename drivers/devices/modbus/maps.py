@@ -1,19 +1,22 @@
 """Register maps: registers of the gauges, read from TOML and checked key by key."""
 
+import contextlib
+import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from drivers.devices.modbus.frames import MAX_UNIT, READ_FUNCTIONS, WRITE_FUNCTIONS, Function
-from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, Status, ValueType, ZeroCommand
+from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, ValueType
 from drivers.driver import GAUGES
 from drivers.errors import SettingsError
 from messages.message import Message, message
 
-_LAST_REGISTER = 0xFFFF
 _TEXTS = ("title", "source", "caution")
 _PACKAGE = "drivers.devices.modbus"
 
@@ -32,14 +35,6 @@ class RegisterMap:
     """Of the gauges `table` and `relative`, or of one of them."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Value:
-    """A given value, and where it was given."""
-
-    value: Any
-    where: str
-
-
 def shipped_maps() -> list[str]:
     """Names of the maps in the driver's folder."""
     folder = files(_PACKAGE).joinpath("maps")
@@ -48,12 +43,12 @@ def shipped_maps() -> list[str]:
 
 def map_keys() -> list[str]:
     """Keys of a map that `--set` may give for both gauges, or with `table_` or `relative_` for one."""
-    return list(_PARSERS)
+    return list(_ALLOWED)
 
 
 def is_map_key(key: str) -> bool:
     """Whether a setting is one of a map."""
-    return any(key.removeprefix(f"{gauge}_") in _PARSERS for gauge in GAUGES)
+    return any(key.removeprefix(f"{gauge}_") in _ALLOWED for gauge in GAUGES)
 
 
 def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUGES) -> RegisterMap:
@@ -65,7 +60,7 @@ def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUG
     where, content = _content(name)
     _check_keys(where, content)
     texts = {key: _text(where, key, content.get(key, "")) for key in _TEXTS}
-    channels = {gauge: _channel(gauge, _values(where, content, given, gauge), where) for gauge in gauges}
+    channels = {gauge: _channel(gauge, _given(where, content, given, gauge), where) for gauge in gauges}
     return RegisterMap(name, texts["title"] or name, texts["caution"], channels)
 
 
@@ -96,8 +91,8 @@ def _check_keys(where: str, content: dict[str, Any]) -> None:
     for key, value in content.items():
         if key in GAUGES:
             _check_gauge(where, key, value)
-        elif key not in _TEXTS and key not in _PARSERS:
-            raise _unknown(where, key, value, [*_TEXTS, *GAUGES, *_PARSERS])
+        elif key not in _TEXTS and key not in _ALLOWED:
+            raise _unknown(where, key, value, [*_TEXTS, *GAUGES, *_ALLOWED])
 
 
 def _check_gauge(where: str, gauge: str, content: Any) -> None:
@@ -109,8 +104,8 @@ def _check_gauge(where: str, gauge: str, content: Any) -> None:
             content=repr(content),
         )
     for key, value in content.items():
-        if key not in _PARSERS:
-            raise _unknown(where, f"{gauge}.{key}", value, list(_PARSERS))
+        if key not in _ALLOWED:
+            raise _unknown(where, f"{gauge}.{key}", value, list(_ALLOWED))
 
 
 def _unknown(where: str, key: str, value: Any, allowed: list[str]) -> SettingsError:
@@ -134,20 +129,30 @@ def _text(where: str, key: str, value: Any) -> str:
     return value
 
 
-def _values(where: str, content: dict[str, Any], given: Mapping[str, str], gauge: str) -> dict[str, _Value]:
-    """Values for a gauge: those of the file, its own before the common ones, and then the given ones."""
-    values = {key: _Value(value, f"{where}: {key}") for key, value in content.items() if key in _PARSERS}
-    own = content.get(gauge, {}).items()
-    values |= {key: _Value(value, f"{where}: {gauge}.{key}") for key, value in own}
-    values |= {key: _Value(value, f"--set {key}") for key, value in given.items() if key in _PARSERS}
+def _given(
+    where: str, content: dict[str, Any], given: Mapping[str, str], gauge: str
+) -> Iterator[tuple[str, Any, str]]:
+    """Key, value and place of what applies to a gauge, later ones before earlier ones.
+
+    Values of the map for both gauges come first, then its own, then those of `--set`.
+    """
+    for key, value in content.items():
+        if key in _ALLOWED:
+            yield key, value, f"{where}: {key}"
+    for key, value in content.get(gauge, {}).items():
+        yield key, value, f"{where}: {gauge}.{key}"
+    for key, value in given.items():
+        if key in _ALLOWED:
+            yield key, value, f"--set {key}"
     for key, value in given.items():
         if key.startswith(f"{gauge}_"):
-            values[key.removeprefix(f"{gauge}_")] = _Value(value, f"--set {key}")
-    return values
+            yield key.removeprefix(f"{gauge}_"), value, f"--set {key}"
 
 
-def _channel(gauge: str, values: dict[str, _Value], where: str) -> Channel:
-    read = dict(_read(values))
+def _channel(gauge: str, given: Iterable[tuple[str, Any, str]], where: str) -> Channel:
+    latest = {key: (value, place) for key, value, place in given}
+    read: dict[str, Any] = {"function": Function.READ_HOLDING}
+    read |= {key: _parse(key, value, place) for key, (value, place) in latest.items()}
     for key in ("unit", "register"):
         if key not in read:
             raise SettingsError(
@@ -156,112 +161,62 @@ def _channel(gauge: str, values: dict[str, _Value], where: str) -> Channel:
                 gauge=gauge,
                 key=key,
             )
-    return Channel(
-        unit=read["unit"],
-        function=read.get("function", Function.READ_HOLDING),
-        register=read["register"],
-        kind=read.get("type", ValueType.INT32),
-        order=read.get("order", ByteOrder.ABCD),
-        scale=read.get("scale", 1.0),
-        status=_status(read),
-        zero_command=_zeroing(gauge, read, where),
-    )
-
-
-def _read(values: dict[str, _Value]) -> Iterator[tuple[str, Any]]:
-    for key, given in values.items():
-        parser = _PARSERS[key]
-        try:
-            yield key, parser.read(given.value)
-        except (ValueError, TypeError, KeyError):
-            raise SettingsError(
-                "{where} = {value} cannot be: give {allowed}",
-                where=given.where,
-                value=repr(given.value),
-                allowed=parser.allowed,
-            ) from None
-
-
-def _status(read: dict[str, Any]) -> Status | None:
-    if "status_register" not in read:
-        return None
-    return Status(
-        read["status_register"],
-        read.get("overload_bits", ()),
-        read.get("fault_bits", ()),
-        read.get("sign_bit"),
-    )
-
-
-def _zeroing(gauge: str, read: dict[str, Any], where: str) -> ZeroCommand | None:
-    if "zero_register" not in read:
-        return None
-    if "zero_value" not in read:
+    if "zero_register" in read and "zero_value" not in read:
         raise SettingsError(
             "{where}: {gauge}.zero_value is missing: give what zero_register takes as the command",
             where=where,
             gauge=gauge,
         )
-    function = read.get("zero_function", Function.WRITE_SINGLE)
-    return ZeroCommand(read["zero_register"], read["zero_value"], function)
+    if "status_register" not in read:
+        read = {key: value for key, value in read.items() if not key.endswith(("_bits", "_bit"))}
+    return msgspec.convert(read, Channel)
 
 
-@dataclass(frozen=True, slots=True)
-class _Parser:
-    """How a value is parsed, from TOML or text, and what is allowed."""
-
-    read: Callable[[Any], Any]
-    allowed: Message
-
-
-def _whole(low: int, high: int) -> _Parser:
-    def read(value: Any) -> int:
-        number = int(value, 0) if isinstance(value, str) else value
-        if isinstance(number, bool) or not isinstance(number, int) or not low <= number <= high:
-            raise ValueError
-        return number
-
-    return _Parser(read, message("a whole number from {low} to {high}", low=low, high=high))
-
-
-def _function(*allowed: Function) -> _Parser:
-    def read(value: Any) -> Function:
-        function = Function(int(value))
-        if function not in allowed:
-            raise ValueError
-        return function
-
-    first, second = allowed
-    return _Parser(read, message("{first} or {second}", first=int(first), second=int(second)))
+def _parse(key: str, value: Any, place: str) -> Any:
+    """Value as its field takes it, from TOML or from the text of `--set`: `0x10`, `2,3`."""
+    parsed = value
+    if isinstance(value, str) and key.endswith("_bits"):
+        parsed = [part for part in value.split(",") if part]
+    elif isinstance(value, str):
+        with contextlib.suppress(ValueError):
+            parsed = int(value, 0)
+    try:
+        parsed = msgspec.convert(parsed, _TYPES[key], strict=False)
+        is_possible = (
+            parsed in _FUNCTIONS.get(key, (parsed,)) if key != "scale" else 0 < abs(parsed) < math.inf
+        )
+    except msgspec.ValidationError:
+        is_possible = False
+    if not is_possible:
+        raise SettingsError(
+            "{where} = {value} cannot be: give {allowed}",
+            where=place,
+            value=repr(value),
+            allowed=_ALLOWED[key],
+        )
+    return parsed
 
 
-def _scale(value: Any) -> float:
-    number = float(value)
-    if isinstance(value, bool) or not 0.0 < abs(number) < float("inf"):
-        raise ValueError
-    return number
+def _whole(low: int, high: int) -> Message:
+    return message("a whole number from {low} to {high}", low=low, high=high)
 
 
-def _bits(value: Any) -> tuple[int, ...]:
-    parts = value.split(",") if isinstance(value, str) else value
-    one = _whole(0, WORD_BITS - 1)
-    return tuple(one.read(part) for part in parts if part != "")
-
-
-_REGISTER = _whole(0, _LAST_REGISTER)
-_BITS = _Parser(_bits, message("bits from 0 to {last}, such as [2, 3] (--set: 2,3)", last=WORD_BITS - 1))
-_PARSERS = {
+_TYPES = {one.encode_name: one.type for one in msgspec.structs.fields(Channel)}
+_FUNCTIONS = {"function": READ_FUNCTIONS, "zero_function": WRITE_FUNCTIONS}
+_BITS = message("bits from 0 to {last}, such as [2, 3] (--set: 2,3)", last=WORD_BITS - 1)
+_ALLOWED = {
     "unit": _whole(1, MAX_UNIT),
-    "function": _function(*READ_FUNCTIONS),
-    "register": _REGISTER,
-    "type": _Parser(ValueType, message("one of {names}", names=list(ValueType))),
-    "order": _Parser(ByteOrder, message("one of {names}", names=list(ByteOrder))),
-    "scale": _Parser(_scale, message("a number that is not 0")),
-    "status_register": _REGISTER,
+    "function": message("{first} or {second}", first=3, second=4),
+    "register": _whole(0, 0xFFFF),
+    "type": message("one of {names}", names=list(ValueType)),
+    "order": message("one of {names}", names=list(ByteOrder)),
+    "scale": message("a number that is not 0"),
+    "status_register": _whole(0, 0xFFFF),
     "overload_bits": _BITS,
     "fault_bits": _BITS,
     "sign_bit": _whole(0, WORD_BITS - 1),
-    "zero_register": _REGISTER,
+    "zero_register": _whole(0, 0xFFFF),
     "zero_value": _whole(0, 0xFFFF),
-    "zero_function": _function(*WRITE_FUNCTIONS),
+    "zero_function": message("{first} or {second}", first=6, second=16),
 }
+"""What messages say is allowed, by the keys of a map."""

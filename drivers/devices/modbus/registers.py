@@ -3,8 +3,11 @@
 import struct
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
-from drivers.devices.modbus.frames import MAX_REGISTERS, Function, Request
+from msgspec import Meta, Struct, field
+
+from drivers.devices.modbus.frames import MAX_REGISTERS, MAX_UNIT, Function, Request
 
 WORD_BITS = 16
 
@@ -37,44 +40,35 @@ _CODES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ZeroCommand:
-    """The command that sets the value to zero."""
-
-    register: int
-    value: int
-    function: Function = Function.WRITE_SINGLE
+_Register = Annotated[int, Meta(ge=0, le=0xFFFF)]
+_Bit = Annotated[int, Meta(ge=0, le=WORD_BITS - 1)]
 
 
-@dataclass(frozen=True, slots=True)
-class Status:
-    """The register with the state of a value."""
+class Channel(Struct, frozen=True):
+    """Registers of one gauge; the names on the wire are the keys of a register map."""
 
-    register: int
-    overload_bits: tuple[int, ...] = ()
-    """From 0, the least significant. One of the first marks an overload, one of the second an invalid
-    value."""
-    fault_bits: tuple[int, ...] = ()
-    sign_bit: int | None = None
-    """Marks a negative value, whose own sign is then ignored."""
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """One gauge."""
-
-    unit: int
-    """Address of the transmitter, 1 to 247."""
+    unit: Annotated[int, Meta(ge=1, le=MAX_UNIT)]
+    """Address of the transmitter."""
     function: Function
     """Function that reads it, 3 or 4."""
-    register: int
+    register: _Register
     """First register, counted from 0."""
-    kind: ValueType = ValueType.INT32
+    kind: ValueType = field(default=ValueType.INT32, name="type")
     order: ByteOrder = ByteOrder.ABCD
     scale: float = 1.0
     """Counts for one step of the value."""
-    status: Status | None = None
-    zero_command: ZeroCommand | None = None
+    status_register: _Register | None = None
+    """Register with the state of the value, whose bits are counted from 0, the least significant."""
+    overload_bits: tuple[_Bit, ...] = ()
+    """One of these marks an overload."""
+    fault_bits: tuple[_Bit, ...] = ()
+    """One of these marks an invalid value."""
+    sign_bit: _Bit | None = None
+    """Marks a negative value, whose own sign is then ignored."""
+    zero_register: _Register | None = None
+    """Register that takes the command which sets the value to zero."""
+    zero_value: Annotated[int, Meta(ge=0, le=0xFFFF)] | None = None
+    zero_function: Function = Function.WRITE_SINGLE
 
     @property
     def registers(self) -> int:
@@ -94,29 +88,28 @@ class ChannelValue:
 def decode_channel(channel: Channel, value: bytes, status_word: int) -> ChannelValue:
     """Value in the bytes of its registers and its status register (0 where there is none)."""
     (raw,) = struct.unpack(_CODES[channel.kind], reorder_bytes(value, channel.order))
-    status = channel.status or Status(0)
-    if status.sign_bit is not None and status_word >> status.sign_bit & 1:
+    if channel.sign_bit is not None and status_word >> channel.sign_bit & 1:
         raw = -abs(raw)
     return ChannelValue(
         counts=raw * channel.scale,
-        is_overloaded=_any(status_word, status.overload_bits) or raw in _limits(channel.kind),
-        is_faulty=_any(status_word, status.fault_bits) or raw - raw != 0,  # neither nan nor infinite
+        is_overloaded=_any(status_word, channel.overload_bits) or raw in _limits(channel.kind),
+        is_faulty=_any(status_word, channel.fault_bits) or raw - raw != 0,  # neither nan nor infinite
     )
 
 
 def encode_channel(channel: Channel, reading: ChannelValue) -> tuple[bytes, int]:
     """Bytes of the registers and status register for a value, limited to their range."""
     raw = reading.counts / channel.scale
-    status, word = channel.status or Status(0), 0
-    if status.sign_bit is not None and raw < 0:
-        raw, word = -raw, 1 << status.sign_bit
+    word = 0
+    if channel.sign_bit is not None and raw < 0:
+        raw, word = -raw, 1 << channel.sign_bit
     if channel.kind is not ValueType.FLOAT32:
         low, high = _limits(channel.kind)
         raw = min(max(round(raw), low), high)
     if reading.is_overloaded:
-        word |= _mask(status.overload_bits)
+        word |= _mask(channel.overload_bits)
     if reading.is_faulty:
-        word |= _mask(status.fault_bits)
+        word |= _mask(channel.fault_bits)
     return reorder_bytes(struct.pack(_CODES[channel.kind], raw), channel.order), word
 
 
@@ -200,7 +193,7 @@ def plan_poll(channels: tuple[Channel, ...]) -> Poll:
         channels=channels,
         values=tuple(_find(requests, channel, channel.register) for channel in channels),
         states=tuple(
-            None if channel.status is None else _find(requests, channel, channel.status.register)
+            None if channel.status_register is None else _find(requests, channel, channel.status_register)
             for channel in channels
         ),
     )
@@ -209,8 +202,8 @@ def plan_poll(channels: tuple[Channel, ...]) -> Poll:
 def _spans(channel: Channel) -> list[tuple[int, int]]:
     """Registers of a channel, as (first, end)."""
     spans = [(channel.register, channel.register + channel.registers)]
-    if channel.status is not None:
-        spans.append((channel.status.register, channel.status.register + 1))
+    if channel.status_register is not None:
+        spans.append((channel.status_register, channel.status_register + 1))
     return spans
 
 

@@ -96,8 +96,8 @@ class SimulatedModbus(PolledProtocol):
         held = self._registers.setdefault((channel.unit, channel.function), {})
         value, status = encode_channel(channel, reading)
         held.update(enumerate(struct.unpack(f">{channel.registers}H", value), channel.register))
-        if channel.status is not None:
-            place = (channel.unit, channel.function, channel.status.register)
+        if channel.status_register is not None:
+            place = (channel.unit, channel.function, channel.status_register)
             states[place] = states.get(place, 0) | status  # two channels may share it
 
     def _read(self, unit: int, function: int, asked: bytes) -> bytes:
@@ -115,14 +115,14 @@ class SimulatedModbus(PolledProtocol):
     def _write(self, unit: int, function: int, asked: bytes) -> bytes:
         (register,) = struct.unpack_from(">H", asked, 1)
         (value,) = struct.unpack_from(">H", asked, 6 if function == Function.WRITE_MULTIPLE else 3)
-        known = [
-            (gauge, channel.zero_command)
+        known = {
+            gauge: channel.zero_value
             for gauge, channel in self._channels.items()
-            if channel.unit == unit and channel.zero_command and channel.zero_command.register == register
-        ]
+            if channel.unit == unit and channel.zero_register == register
+        }
         if not known:
             return encode_exception(unit, function, _ILLEGAL_ADDRESS)
-        zeroed = [gauge for gauge, zeroing in known if zeroing and zeroing.value == value]
+        zeroed = [gauge for gauge, zero_value in known.items() if zero_value == value]
         if not zeroed:
             return encode_exception(unit, function, _ILLEGAL_VALUE)
         for gauge in zeroed:

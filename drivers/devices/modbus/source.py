@@ -268,10 +268,10 @@ class ModbusSource(StreamSource):
 
     def _zero(self, link: Link) -> None:
         for gauge, channel in self._map.channels.items():
-            command = channel.zero_command
-            if command is None:
+            if channel.zero_register is None or channel.zero_value is None:
                 continue
-            request = Request(channel.unit, command.function, command.register, 1, (command.value,))
+            function, values = channel.zero_function, (channel.zero_value,)
+            request = Request(channel.unit, function, channel.zero_register, 1, values)
             response = parse_response(request, transact(link, request, self._settings.timeout_s).data)
             if not isinstance(response, RegisterResponse):
                 raise ProtocolError(
@@ -344,7 +344,9 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
     parsed = parse_settings(ModbusSettings, own, DRIVER.name)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(parsed.map, given, parsed.gauges)
-    if parsed.zero and not any(channel.zero_command for channel in register_map.channels.values()):
+    if parsed.zero and not any(
+        channel.zero_register is not None for channel in register_map.channels.values()
+    ):
         raise SettingsError(
             "zero is asked for, but map {map} has no zero command: leave zero out, or give"
             " zero_register and zero_value from the device's manual",

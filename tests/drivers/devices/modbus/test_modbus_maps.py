@@ -9,7 +9,6 @@ from drivers.devices.modbus.registers import (
     ByteOrder,
     Channel,
     ChannelValue,
-    Status,
     ValueType,
     decode_channel,
     encode_channel,
@@ -68,7 +67,7 @@ def test_what_is_given_stands_above_the_map():
     ).channels  # fmt: skip
     assert (channel["table"].unit, channel["relative"].unit) == (9, 10)
     assert channel["table"].scale == 0.5
-    assert channel["table"].status == Status(8, (2, 3))
+    assert (channel["table"].status_register, channel["table"].overload_bits) == (8, (2, 3))
 
 
 @pytest.mark.parametrize(
