@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
@@ -33,7 +33,7 @@ DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
 """Standard uncertainty of the difference of two evenly distributed delays (s)."""
 
 
-def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
+def rate_from_steps(steps_s: Floats, resolution_s: float = 0.0) -> float | None:
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
     Steps of up to 1.5 times the median, or up to the median and the step of the clock, are one period each;
@@ -144,12 +144,12 @@ class RobustLine:
     span: float
     """From the first to the last point."""
 
-    def at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, x: Floats) -> Floats:
         """Values of the line, (n,)."""
         return self.level + self.slope * (x - self.centre)
 
 
-def fit_robust_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> RobustLine:
+def fit_robust_line(x: Floats, y: Floats) -> RobustLine:
     """Line by least squares through points (n,), n >= 3, repeated without outliers until none is left."""
     for _ in range(_MAX_REJECTIONS):
         slope, uncertainty, residual = _fit_line(x, y)
@@ -162,7 +162,7 @@ def fit_robust_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> RobustLin
     return RobustLine(float(x.mean()), float(y.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
 
 
-def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
+def _fit_line(x: Floats, y: Floats) -> tuple[float, float, Floats]:
     """Slope by least squares, its standard uncertainty, and the residuals."""
     dx = x - x.mean()
     sxx = float(dx @ dx)
@@ -172,7 +172,7 @@ def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, fl
     return slope, math.sqrt(variance / sxx * _variance_inflation(residual)), residual
 
 
-def _variance_inflation(residual: NDArray[np.float64]) -> float:
+def _variance_inflation(residual: Floats) -> float:
     """Variance of the slope relative to independent residuals, for first-order autoregressive ones.
 
     Residuals within the steps of delivery count as independent: their effect is added separately.
@@ -260,7 +260,7 @@ class SkewStatistics:
         self._rows = max(1, round(_SKEW_WINDOW_S * rate_hz))
         self._windows: deque[_Window] = deque(maxlen=_MAX_SKEW_WINDOWS)
 
-    def add(self, first_index: int, lag_s: NDArray[np.float64], scatter_s: float) -> None:
+    def add(self, first_index: int, lag_s: Floats, scatter_s: float) -> None:
         """Add the lags of consecutive rows (n,), NaN where a reading is missing.
 
         `scatter_s` is the scatter of the arrivals of both devices (s).

@@ -5,6 +5,7 @@ import binascii
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import UInt8s
 from drivers.compiled import compiled
 
 CRC_START = 0xFFFF
@@ -42,7 +43,7 @@ _T = _tables()
 
 
 @compiled
-def crc16_slice(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
+def crc16_slice(buffer: UInt8s, start: int, end: int) -> np.uint64:
     """CRC-16/CCITT-FALSE of `buffer[start:end]`, eight and four bytes a step, for other compiled code."""
     crc = _START
     at = start

@@ -7,10 +7,10 @@ time, sequence, table and relative.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats, Record, Records
 from drivers.compiled import compiled, inlined
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, Record, count_packet, is_plausible_gap
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, count_packet, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -63,7 +63,7 @@ def make_rules(
     sequence_wrap: float = 0.0,
     overload_count: float = math.inf,
     max_gap_s: float = MAX_GAP_S,
-) -> NDArray[np.void]:
+) -> Records:
     """(1,) RULES; `place` is one of BY_SEQUENCE, BY_TIME and BY_COUNT, the gap in seconds."""
     rules = np.zeros(1, dtype=RULES)
     max_gap = max_gap_s * rate_hz
@@ -73,12 +73,7 @@ def make_rules(
 
 @compiled
 def count_lines(
-    lines: NDArray[np.void],
-    hold_from: int,
-    state: NDArray[np.void],
-    rules: NDArray[np.void],
-    packets: NDArray[np.void],
-    counts: NDArray[np.float64],
+    lines: Records, hold_from: int, state: Records, rules: Records, packets: Records, counts: Floats
 ) -> tuple[int, int]:
     """Fill packets (lines,) and counts (lines, 2) of good lines; returns numbers of good and used lines.
 

@@ -7,11 +7,10 @@ reduces its bytes to packets; how packets become rows is the same for all device
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Floats, Record, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
@@ -46,9 +45,6 @@ CURSOR = np.dtype(
 LOSS_FIELDS = [(field.name, np.int64) for field in fields(Losses)]
 """Members that a decoder's state shares with `Losses`."""
 
-Record: TypeAlias = Any
-"""One element of a structured array inside compiled code, its fields as attributes."""
-
 _SLACK_S = 1.0
 _SLACK = 0.02
 """How far a device's count may be from the host's estimate of a gap: a busy computer reads bytes late by up
@@ -57,9 +53,6 @@ unless it was unplugged within its first second."""
 
 _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)
-
-
-Counts: TypeAlias = NDArray[np.int32] | NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +79,7 @@ class PacketDecoder(ABC):
     _has_time = True
     """Whether the device sends its time."""
 
-    def __init__(self, state: NDArray[np.void], rate_hz: float, max_gap_s: float) -> None:
+    def __init__(self, state: Records, rate_hz: float, max_gap_s: float) -> None:
         self._state = state
         self._rate_hz = rate_hz
         self._max_gap = round(max_gap_s * rate_hz)
@@ -125,7 +118,7 @@ class PacketDecoder(ABC):
             yield from sample_blocks(packets, counts, rows, position, arrival_ns, has_time=self._has_time)
 
     @abstractmethod
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         """Packets (p,) in `data`, which begin with the unfinished bytes, and their samples (s, 2).
 
         Keeps the new unfinished bytes, and counts the packets in the state.
@@ -140,7 +133,7 @@ class PacketDecoder(ABC):
 
 
 def sample_blocks(
-    packets: NDArray[np.void],
+    packets: Records,
     samples: Counts,
     rows: int,
     position: Position,
@@ -191,13 +184,13 @@ def is_plausible_gap(state: Record, gap: int) -> bool:
 
 @compiled
 def fill_rows(
-    packets: NDArray[np.void],
-    samples: NDArray[np.int32] | NDArray[np.float64],
+    packets: Records,
+    samples: Counts,
     period_s: float,
-    cursor: NDArray[np.void],
-    counts: NDArray[np.int32] | NDArray[np.float64],
-    status: NDArray[np.uint8],
-    times_s: NDArray[np.float64],
+    cursor: Records,
+    counts: Counts,
+    status: UInt8s,
+    times_s: Floats,
 ) -> int:
     """Fill one block (counts, status, times) from `cursor` on; returns the number of rows."""
     place = cursor[0]
@@ -222,12 +215,7 @@ def fill_rows(
 
 @inlined
 def _fill_gap(
-    packet: Record,
-    place: Record,
-    row: int,
-    counts: NDArray[np.int32] | NDArray[np.float64],
-    status: NDArray[np.uint8],
-    times_s: NDArray[np.float64],
+    packet: Record, place: Record, row: int, counts: Counts, status: UInt8s, times_s: Floats
 ) -> int:
     """Rows lost before a packet, as far as the block has room; their times are interpolated."""
     left = packet.damaged + packet.missing - place.lost

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from enum import IntFlag
 
-import numpy as np
-from numpy.typing import NDArray
+from drivers.arrays import Counts, Floats, UInt8s
 
 
 class SampleStatus(IntFlag):
@@ -42,14 +41,14 @@ class SampleBlock:
 
     first_index: int
     """Index of the first row, counted from the first good sample of the stream (0)."""
-    counts: NDArray[np.int32] | NDArray[np.float64]
+    counts: Counts
     """(n, 2) int32 or float64: readings of table gauge and relative gauge in the device's own unit; 0 where
     absent."""
-    status: NDArray[np.uint8]
+    status: UInt8s
     """(n,) uint8: `SampleStatus` flags of each row."""
     arrival_ns: int
     """Host's monotonic time (ns) after the read that brought the last byte of the block."""
-    device_time_s: NDArray[np.float64] | None = None
+    device_time_s: Floats | None = None
     """(n,) float64: the device's own time of each row, unwrapped, from 0 at index 0; None if it sends
     none."""
 

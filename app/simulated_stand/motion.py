@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.motion.two_mass import Motion, simulate, stiffness_and_damping
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.truth import StandTruth
 from config.files import published_row
 from config.schema import Stand
-
-FloatArray = NDArray[np.float64]
+from drivers.arrays import Flags, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +28,7 @@ class RepeatedPullback:
     plate_offset_m: float = 0.0
     """Position of the plate on the table before the first test (m)."""
 
-    def displacements(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def displacements(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Table against base and plate against table (m), each (n,), at times since the first test began."""
         test, within_s = self._locate(time_s)
         table = self.pullback_m * _smooth((within_s - self.timetable.rest_s) / self.timetable.pull_s)
@@ -45,19 +43,19 @@ class RepeatedPullback:
             relative[free] = (relative[free] + relative_m) * np.where(self._puts_back(test[free]), left, 1.0)
         return table, relative
 
-    def drift_time_s(self, time_s: FloatArray) -> FloatArray:
+    def drift_time_s(self, time_s: Floats) -> Floats:
         """Time (s) since the zero was last set, while the table was stilled."""
         _, within_s = self._locate(time_s)
         return within_s * self._remaining(within_s - self.timetable.release_s)
 
-    def initial_offset_m(self, test: FloatArray) -> FloatArray:
+    def initial_offset_m(self, test: Floats) -> Floats:
         """Position of the plate (m), (n,), at the beginning of tests counted from 0."""
         every = self.timetable.recentre_every
         since_put_back = np.mod(test, every) if every else test
         first = np.where(test < every, self.plate_offset_m, 0.0) if every else self.plate_offset_m
         return first + since_put_back * self.released.residual_displacement_m
 
-    def _locate(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _locate(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Number of the test and time (s) within it; after the last one, the rest before one more."""
         test = np.floor(time_s / self.timetable.cycle_s)
         within_s = time_s - test * self.timetable.cycle_s
@@ -67,11 +65,11 @@ class RepeatedPullback:
             test = np.minimum(test, count)
         return test, within_s
 
-    def _puts_back(self, test: FloatArray) -> NDArray[np.bool_]:
+    def _puts_back(self, test: Floats) -> Flags:
         every = self.timetable.recentre_every
         return np.mod(test + 1.0, every) == 0.0 if every else np.zeros(len(test), dtype=np.bool_)
 
-    def _remaining(self, since_release_s: FloatArray) -> FloatArray:
+    def _remaining(self, since_release_s: Floats) -> Floats:
         """Share of the displacement while the table is stilled: 1 during the decay, then down to 0."""
         return 1.0 - _smooth((since_release_s - self.timetable.decay_s) / self.timetable.recentre_s)
 
@@ -92,7 +90,7 @@ def released_motion(true: StandTruth, timetable: Timetable) -> Motion:
     )
 
 
-def _smooth(x: FloatArray) -> FloatArray:
+def _smooth(x: Floats) -> Floats:
     """Step from 0 (x <= 0) to 1 (x >= 1) with continuous velocity and acceleration."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 + x * (6.0 * x - 15.0))

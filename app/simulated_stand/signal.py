@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.simulated_stand.motion import RepeatedPullback
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauge, Gauges
+from drivers.arrays import Flags, Floats, Int32s, UInt8s
 from drivers.samples import SampleStatus
 from drivers.simulated.stream_sender import Signal
 
@@ -22,7 +22,7 @@ class SwappedChannels:
     def __init__(self, signal: Signal) -> None:
         self._signal = signal
 
-    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    def take(self, count: int) -> tuple[Int32s, UInt8s]:
         """Counts (count, 2) of the next samples and their overload flags (count,)."""
         counts, status = self._signal.take(count)
         clipped = [(status & flag) != 0 for flag in (_RELATIVE, _TABLE)]
@@ -60,10 +60,10 @@ class StandSignal:
         self._rate_hz = rate_hz
         self._started_s = started_s
         self._next = 0
-        self._counts: NDArray[np.int32] = np.empty((0, 2), dtype=np.int32)
-        self._status: NDArray[np.uint8] = np.empty(0, dtype=np.uint8)
+        self._counts: Int32s = np.empty((0, 2), dtype=np.int32)
+        self._status: UInt8s = np.empty(0, dtype=np.uint8)
 
-    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    def take(self, count: int) -> tuple[Int32s, UInt8s]:
         """Counts (count, 2) of the next samples and their overload flags (count,)."""
         while count > len(self._status):
             self._make(max(self._AHEAD_LEAST, int(self._AHEAD_S * self._rate_hz)))
@@ -115,9 +115,7 @@ class SimulatedGauge:
         self._range_m = min(gauge.range_m or math.inf, float(np.abs(ends).min()))
         self._limit_m = min(self._range_m, faults.clip_m or math.inf)
 
-    def read(
-        self, displacement_m: NDArray[np.float64], drifting_s: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def read(self, displacement_m: Floats, drifting_s: Floats) -> tuple[Int32s, Flags]:
         """Counts (n,) for true displacements (n,), and where the gauge is overloaded.
 
         `drifting_s` is for how long the zero has crept (s).

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.campaign.rows import SeriesRow
 from analysis.catalogue import table_columns
@@ -22,6 +21,7 @@ from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauge, Gauges, Stand
+from drivers.arrays import Flags, Floats, Int32s
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
@@ -245,7 +245,6 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
                 )
 
 
-Floats = NDArray[np.float64]
 _HELD_S = 1.0
 _PLACES_M = (2e-4, 2e-3)
 """Standard deviations of where table and plate stand at rest, as the gauges read them."""
@@ -328,7 +327,7 @@ def _displacements(motion: Motion, since_s: Floats, lag_s: float, *, of_plate: b
 
 def _converted(
     gauge: Gauge, gain: float, bend_m: float, displacement_m: Floats, noise_m: float, rng: np.random.Generator
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+) -> tuple[Int32s, Flags]:
     """Counts (n,) of a gauge that reads too much by the share `gain`, and where it is overloaded."""
     true = gauge.replace(gain_m_per_count=gauge.gain_m_per_count / (1.0 + gain))
     return SimulatedGauge(true, GaugeFaults(noise_m, nonlinearity_m=bend_m), rng).read(

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats
 from drivers.clock import Skew, SkewStatistics
 from drivers.envelope import StampedRead, Unwrapper
 from drivers.packets import MAX_BLOCK_ROWS
@@ -137,7 +137,7 @@ class PairDecoder:
         # After a forward leap of the device's clock, rows would else wait until the host's clock follows.
         return ChannelSamples(np.minimum(host_ns, arrival_ns), block.counts[:, column], status)
 
-    def _device_time_s(self, gauge: int, block: SampleBlock) -> NDArray[np.float64]:
+    def _device_time_s(self, gauge: int, block: SampleBlock) -> Floats:
         """The device's own time of each row (s): its clock, or index over rate."""
         if block.device_time_s is not None:
             return block.device_time_s

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Flags, Floats, Ints, UInt8s
 from drivers.clock import RobustLine, fit_robust_line
 from drivers.packets import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT, SampleStatus
-
-Counts = NDArray[np.int32] | NDArray[np.float64]
 
 MAX_WAIT_NS = 250_000_000
 """How long a reading waits for its counterpart, by times of arrival; a balance of delay on the screen against
@@ -32,17 +30,17 @@ _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
 class ChannelSamples:
     """Consecutive readings of one device, lost ones included."""
 
-    host_ns: NDArray[np.int64]
+    host_ns: Ints
     """(n,) int64: host's time of each reading (ns), never decreasing."""
     counts: Counts
     """(n,) int32 or float64."""
-    status: NDArray[np.uint8]
+    status: UInt8s
     """(n,) uint8: `SampleStatus`, flags as of gauge 1."""
 
     def __len__(self) -> int:
         return len(self.status)
 
-    def take(self, which: slice | NDArray[np.int64]) -> "ChannelSamples":
+    def take(self, which: slice | Ints) -> "ChannelSamples":
         """A part of them."""
         return ChannelSamples(self.host_ns[which], self.counts[which], self.status[which])
 
@@ -67,11 +65,11 @@ class MergedRows:
 
     counts: Counts
     """(n, 2) int32 or float64."""
-    status: NDArray[np.uint8]
+    status: UInt8s
     """(n,) uint8: `SampleStatus` flags."""
-    lag_ns: NDArray[np.int64]
+    lag_ns: Ints
     """(n,) int64: time of gauge 2 minus time of gauge 1."""
-    is_paired: NDArray[np.bool_]
+    is_paired: Flags
     """(n,) bool: whether both readings exist."""
 
     def __len__(self) -> int:
@@ -151,7 +149,7 @@ class Merger:
         return ChannelSamples(rows.host_ns - 2 * self._reach_ns, rows.counts, np.zeros_like(rows.status))
 
 
-def _nearest(wanted: NDArray[np.int64], offered: NDArray[np.int64]) -> NDArray[np.int64]:
+def _nearest(wanted: Ints, offered: Ints) -> Ints:
     """Index in `offered` (m,), m >= 1, sorted, of the nearest to each of `wanted` (n,)."""
     after = np.clip(np.searchsorted(offered, wanted), 1, max(len(offered) - 1, 1))
     after = np.minimum(after, len(offered) - 1)
@@ -206,7 +204,7 @@ class HostTimeFit:
         elif _late_ns(point) < _late_ns(self._best):
             self._best = point
 
-    def host_ns(self, device_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    def host_ns(self, device_s: Floats) -> Ints:
         """Host's time (ns) of readings (n,) at the device's own times (s).
 
         It includes the shortest delay of delivery, which cannot be measured here.

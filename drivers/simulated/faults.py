@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats
 from drivers.errors import SettingsError
 
 
@@ -215,7 +215,7 @@ class DisturbanceSchedule:
         """What happens to a frame whose first sample is taken at `time_s`: STALL, GARBAGE or nothing."""
         return self._first_of((DisturbanceKind.STALL, DisturbanceKind.GARBAGE), time_s)
 
-    def clock_offset_s(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def clock_offset_s(self, time_s: Floats) -> Floats:
         """Error of the device's time by its jumps (s), (n,), at the stand's times (n,)."""
         offset = np.zeros_like(time_s)
         for one in self.disturbances:

@@ -5,8 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-import numpy as np
-from numpy.typing import NDArray
+from drivers.arrays import Floats, Int32s, UInt8s
 
 MAX_RATE_HZ = 100_000.0
 """Rate at which the simulated stand still keeps up on a common computer."""
@@ -76,13 +75,7 @@ class SimulatedProtocol(ABC):
         return 1
 
     @abstractmethod
-    def encode(
-        self,
-        first_sequence: int,
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],
-        times_s: NDArray[np.float64],
-    ) -> list[bytes]:
+    def encode(self, first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:
         """Whole frames.
 
         `counts` (frames * n, 2) and `status` (frames * n,) are samples with their `SampleStatus`, `times_s`
@@ -105,15 +98,15 @@ class PolledProtocol(SimulatedProtocol):
         """Length of a request."""
 
     @abstractmethod
-    def store_sample(self, counts: NDArray[np.int32], status: int) -> None:
+    def store_sample(self, counts: Int32s, status: int) -> None:
         """Put a sample, (2,) counts and the overload bits of `SampleStatus`, into the registers."""
 
     def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - registers have no number
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],
-        times_s: NDArray[np.float64],
+        counts: Int32s,
+        status: UInt8s,
+        times_s: Floats,
     ) -> list[bytes]:
         """Store the last sample; nothing is sent that was not asked for."""
         self.store_sample(counts[-1], int(status[-1]))

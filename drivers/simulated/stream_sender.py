@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Int32s, UInt8s
 from drivers.simulated.faults import (
     LASTING_FAULTS,
     LOSING_FAULTS,
@@ -83,7 +83,7 @@ class TransmissionLog:
 class Signal(Protocol):
     """What the device's converter reads, sample after sample."""
 
-    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    def take(self, count: int) -> tuple[Int32s, UInt8s]:
         """Counts (count, 2) of the next samples and their overload bits of `SampleStatus` (count,)."""
 
 
@@ -188,9 +188,7 @@ class StreamSender:
         is_flagged = [protocol.flags_overload and bool(row.any()) for row in status.reshape(frames, self._n)]
         self._count(sent, is_flagged, room, FrameFault.CUT if has_reader else FrameFault.NO_READER)
 
-    def _encode(
-        self, frames: int, counts: NDArray[np.int32], status: NDArray[np.uint8]
-    ) -> tuple[list[bytes], list[float]]:
+    def _encode(self, frames: int, counts: Int32s, status: UInt8s) -> tuple[list[bytes], list[float]]:
         """Frames of the next samples, and the stand's time (s) of the first sample of each."""
         log, clock = self._log, self._clock
         first = log.samples + self._n * np.arange(frames)

@@ -5,14 +5,14 @@ from functools import reduce
 from operator import xor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Floats, Records
 from drivers.clock import rate_from_steps
 from drivers.crc import crc16
 from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
-from drivers.packets import MAX_GAP_S, PACKET, Counts, LossEstimator, PacketDecoder
+from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder
 from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024
@@ -39,12 +39,7 @@ def encode_line(layout: LineFormat, time_s: float, table: float, relative: float
     return line + b"\r\n"
 
 
-def encode_lines(
-    layout: LineFormat,
-    times_s: NDArray[np.float64],
-    counts: NDArray[np.int32] | NDArray[np.float64],
-    first_sequence: int = 0,
-) -> list[bytes]:
+def encode_lines(layout: LineFormat, times_s: Floats, counts: Counts, first_sequence: int = 0) -> list[bytes]:
     """A line for each row of `counts` (n, 2), at device times `times_s` (n,); see `encode_line`."""
     return [
         encode_line(layout, time_s, table, relative, first_sequence + row)
@@ -167,7 +162,7 @@ class LineDecoder(PacketDecoder):
             self._skipping = True
         return data[:end]
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         data = self._whole_lines(data)
         lines = self._parser.read(data)
         packets = np.empty(len(lines), dtype=PACKET)

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Ints, Record, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_slice
 from drivers.devices.csv_lines.columns import Column, LineFormat
-from drivers.packets import Record
 
 ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
 ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)
@@ -73,7 +73,7 @@ class LineParser:
         self._comment = np.frombuffer(layout.comment.encode("ascii"), dtype=np.uint8)
         self._unit = np.frombuffer(layout.unit.encode("ascii"), dtype=np.uint8)
 
-    def read(self, data: bytes) -> NDArray[np.void]:
+    def read(self, data: bytes) -> Records:
         """(lines,) LINE of `data`, which are empty or end in a terminator."""
         most = len(data) // 2 + 1
         if len(self._lines) < most:
@@ -85,12 +85,7 @@ class LineParser:
 
 @compiled
 def read_lines(
-    buffer: NDArray[np.uint8],
-    roles: NDArray[np.int64],
-    marks: NDArray[np.void],
-    comment: NDArray[np.uint8],
-    unit: NDArray[np.uint8],
-    lines: NDArray[np.void],
+    buffer: UInt8s, roles: Ints, marks: Records, comment: UInt8s, unit: UInt8s, lines: Records
 ) -> int:
     """Read all lines of `buffer`, whose last byte is a terminator; returns how many have content.
 
@@ -120,7 +115,7 @@ def read_lines(
 
 
 @inlined
-def _is_in(character: int, characters: NDArray[np.uint8]) -> bool:
+def _is_in(character: int, characters: UInt8s) -> bool:
     for one in characters:  # noqa: SIM110 (plain loops compile to better code)
         if one == character:
             return True
@@ -128,14 +123,7 @@ def _is_in(character: int, characters: NDArray[np.uint8]) -> bool:
 
 
 @inlined
-def _read_line(
-    buffer: NDArray[np.uint8],
-    start: int,
-    roles: NDArray[np.int64],
-    mark: Record,
-    unit: NDArray[np.uint8],
-    line: Record,
-) -> int:
+def _read_line(buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt8s, line: Record) -> int:
     """Position of the terminator after a good line, or `_BROKEN`."""
     at = start
     for column in range(len(roles)):
@@ -167,7 +155,7 @@ def _read_line(
 
 
 @inlined
-def _read_word(buffer: NDArray[np.uint8], start: int, word: NDArray[np.uint8]) -> int:
+def _read_word(buffer: UInt8s, start: int, word: UInt8s) -> int:
     """Position after `word`, or after any word if that is empty; `_BROKEN` if there is none."""
     first = _skip_blanks(buffer, start, -1)
     at = first
@@ -179,7 +167,7 @@ def _read_word(buffer: NDArray[np.uint8], start: int, word: NDArray[np.uint8]) -
 
 
 @inlined
-def _read_number(buffer: NDArray[np.uint8], at: int, separator: int, decimal: int) -> tuple[float, int]:
+def _read_number(buffer: UInt8s, at: int, separator: int, decimal: int) -> tuple[float, int]:
     """A number, maybe with blanks around it, and the position after it; `_BROKEN` if there is none."""
     at = _skip_blanks(buffer, at, -1)
     negative = buffer[at] == _MINUS
@@ -206,7 +194,7 @@ def _read_number(buffer: NDArray[np.uint8], at: int, separator: int, decimal: in
 
 
 @inlined
-def _read_digits(buffer: NDArray[np.uint8], at: int, mantissa: int) -> tuple[int, int, int]:
+def _read_digits(buffer: UInt8s, at: int, mantissa: int) -> tuple[int, int, int]:
     """`mantissa` with the digits from `at` on appended, the number of them, and the position after them."""
     kept = 0
     while True:
@@ -220,7 +208,7 @@ def _read_digits(buffer: NDArray[np.uint8], at: int, mantissa: int) -> tuple[int
 
 
 @inlined
-def _read_exponent(buffer: NDArray[np.uint8], at: int) -> tuple[int, int]:
+def _read_exponent(buffer: UInt8s, at: int) -> tuple[int, int]:
     """A whole number of at most three digits and the position after it; `_BROKEN` if there is none."""
     negative = buffer[at] == _MINUS
     if negative or buffer[at] == _PLUS:
@@ -244,7 +232,7 @@ def _scaled(mantissa: float, power: int) -> float:
 
 
 @inlined
-def _skip_blanks(buffer: NDArray[np.uint8], at: int, separator: int) -> int:
+def _skip_blanks(buffer: UInt8s, at: int, separator: int) -> int:
     """Position of the next character that is no blank, or is the separator."""
     while buffer[at] == _BLANK and separator != _BLANK:
         at += 1
@@ -252,7 +240,7 @@ def _skip_blanks(buffer: NDArray[np.uint8], at: int, separator: int) -> int:
 
 
 @inlined
-def _check(buffer: NDArray[np.uint8], start: int, at: int, role: int) -> int:
+def _check(buffer: UInt8s, start: int, at: int, role: int) -> int:
     """Position after a checksum that agrees with the line before it, else `_BROKEN`."""
     digits = 4 if role == ROLE_CRC else 2
     if at + digits >= len(buffer):

@@ -1,8 +1,6 @@
 """A simulated device that sends lines of values."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from drivers.arrays import Floats, Int32s, UInt8s
 from drivers.devices.csv_lines import DRIVER
 from drivers.devices.csv_lines.codec import encode_lines
 from drivers.devices.csv_lines.columns import LineFormat
@@ -23,9 +21,9 @@ class SimulatedCsv(SimulatedProtocol):
     def encode(
         self,
         first_sequence: int,
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],  # noqa: ARG002 - a line of numbers has no flags
-        times_s: NDArray[np.float64],
+        counts: Int32s,
+        status: UInt8s,  # noqa: ARG002 - a line of numbers has no flags
+        times_s: Floats,
     ) -> list[bytes]:
         """Lines."""
         return encode_lines(self._layout, times_s, counts, first_sequence)

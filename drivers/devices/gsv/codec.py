@@ -4,21 +4,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
-from drivers.packets import (
-    LOSS_FIELDS,
-    MAX_GAP_S,
-    PACKET,
-    Counts,
-    LossEstimator,
-    PacketDecoder,
-    Record,
-    count_packet,
-)
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet
 from drivers.samples import Losses, SampleStatus
 
 HEADER_BYTES = 3
@@ -117,9 +108,7 @@ def _layout_at(data: bytes, at: int) -> tuple[int, ValueKind] | None:
     return (channels, ValueKind(kind)) if len(data) > end and data[end] == END else None
 
 
-def encode_frames(
-    layout: FrameLayout, counts: NDArray[np.int32] | NDArray[np.float64], flags: int | NDArray[np.uint8] = 0
-) -> NDArray[np.uint8]:
+def encode_frames(layout: FrameLayout, counts: Counts, flags: int | UInt8s = 0) -> UInt8s:
     """Frames as a device without faults sends them; channels without a gauge are 0.
 
     `counts` (n, 2) are table and relative; whole numbers are limited to the range of their kind. `flags`, of
@@ -137,7 +126,7 @@ def encode_frames(
     return wire
 
 
-def _encode_values(kind: ValueKind, values: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _encode_values(kind: ValueKind, values: Floats) -> UInt8s:
     if kind is ValueKind.FLOAT32:
         return values.astype(">f4").view(np.uint8)
     zero = _ZERO[kind]
@@ -175,7 +164,7 @@ class FrameDecoder(PacketDecoder):
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
@@ -187,13 +176,7 @@ class FrameDecoder(PacketDecoder):
             self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
         return packets, self._values(buffer, offsets[:found])
 
-    def _make_packets(
-        self,
-        buffer: NDArray[np.uint8],
-        offsets: NDArray[np.int64],
-        broken: NDArray[np.int64],
-        arrival_ns: int,
-    ) -> NDArray[np.void]:
+    def _make_packets(self, buffer: UInt8s, offsets: Ints, broken: Ints, arrival_ns: int) -> Records:
         packets = np.zeros(len(offsets), dtype=PACKET)
         packets["samples"] = 1
         packets["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
@@ -206,14 +189,14 @@ class FrameDecoder(PacketDecoder):
             packets["missing"][0] = gap - packets["damaged"][0]
         return packets
 
-    def _values(self, buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _values(self, buffer: UInt8s, offsets: Ints) -> Floats:
         kind, size = self._layout.kind, self._layout.kind.size
         starts = [self._layout.offset(channel) for channel in (self._layout.table, self._layout.relative)]
         places = np.add.outer(offsets, np.add.outer(starts, np.arange(size)))
         if kind is ValueKind.FLOAT32:
             return buffer[places].view(">f4")[:, :, 0].astype(np.float64)
         weights = 256.0 ** np.arange(size - 1, -1, -1)
-        values: NDArray[np.float64] = buffer[places] @ weights - _ZERO[kind]
+        values: Floats = buffer[places] @ weights - _ZERO[kind]
         return values
 
 
@@ -245,7 +228,7 @@ STATE = np.dtype(
 _KIND_BITS = 0xF0
 
 
-def frame_pattern(layout: FrameLayout) -> NDArray[np.void]:
+def frame_pattern(layout: FrameLayout) -> Records:
     """(1,) FRAME_PATTERN for frames of `layout`."""
     pattern = np.zeros(1, dtype=FRAME_PATTERN)
     pattern["header"] = layout.header
@@ -259,11 +242,7 @@ def frame_pattern(layout: FrameLayout) -> NDArray[np.void]:
 
 @compiled
 def find_frames(
-    buffer: NDArray[np.uint8],
-    patterns: NDArray[np.void],
-    states: NDArray[np.void],
-    offsets: NDArray[np.int64],
-    broken: NDArray[np.int64],
+    buffer: UInt8s, patterns: Records, states: Records, offsets: Ints, broken: Ints
 ) -> tuple[int, int]:
     """Offsets of the good frames in `buffer`, and how many came broken before each.
 
@@ -294,7 +273,7 @@ def find_frames(
 
 
 @compiled
-def count_packets(packets: NDArray[np.void], states: NDArray[np.void]) -> None:
+def count_packets(packets: Records, states: Records) -> None:
     """Add `packets` to the counts in `states` (1,)."""
     state = states[0]
     for packet in packets:
@@ -304,13 +283,13 @@ def count_packets(packets: NDArray[np.void], states: NDArray[np.void]) -> None:
 
 
 @inlined
-def _is_header(buffer: NDArray[np.uint8], at: int, pattern: Record) -> bool:
+def _is_header(buffer: UInt8s, at: int, pattern: Record) -> bool:
     is_begun = buffer[at] == SYNC and buffer[at + 1] == pattern.header
     return bool(is_begun and buffer[at + 2] & _KIND_BITS == pattern.kind)
 
 
 @inlined
-def _is_whole(buffer: NDArray[np.uint8], at: int, pattern: Record) -> bool:
+def _is_whole(buffer: UInt8s, at: int, pattern: Record) -> bool:
     end = at + pattern.length
     if buffer[end - 1] != END or buffer[end] != SYNC:
         return False
@@ -320,6 +299,6 @@ def _is_whole(buffer: NDArray[np.uint8], at: int, pattern: Record) -> bool:
 
 
 @inlined
-def _is_finite(buffer: NDArray[np.uint8], at: int) -> bool:
+def _is_finite(buffer: UInt8s, at: int) -> bool:
     """Whether a big-endian 32-bit float is finite: its exponent is not all ones."""
     return not (buffer[at] & 0x7F == 0x7F and buffer[at + 1] & 0x80)

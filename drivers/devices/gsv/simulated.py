@@ -3,8 +3,8 @@
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats, Int32s, UInt8s
 from drivers.devices.gsv import DRIVER
 from drivers.devices.gsv.codec import FrameLayout, ValueKind, encode_frames
 from drivers.devices.gsv.commands import (
@@ -78,9 +78,9 @@ class SimulatedGsv(SimulatedProtocol):
     def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - frames have no number
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],
-        times_s: NDArray[np.float64],  # noqa: ARG002 - and no time
+        counts: Int32s,
+        status: UInt8s,
+        times_s: Floats,  # noqa: ARG002 - and no time
     ) -> list[bytes]:
         """Frames; an overload of either gauge sets the same flag."""
         self._last = counts[-1].astype(np.float64)

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s
 from drivers.clock import rate_from_steps
 from drivers.compiled import compiled, inlined
 from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
-from drivers.packets import MAX_GAP_S, PACKET, Counts, PacketDecoder, Record
+from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder
 
 READ, WRITE, EVENT = 1, 2, 3
 ERROR = 0x08
@@ -170,9 +170,7 @@ _ERROR_MASK = 0xF7
 
 
 @compiled
-def find_events(
-    buffer: NDArray[np.uint8], channels: NDArray[np.int64], garbage: int, lines: NDArray[np.void]
-) -> tuple[int, int, int, int]:
+def find_events(buffer: UInt8s, channels: Ints, garbage: int, lines: Records) -> tuple[int, int, int, int]:
     """Events in `buffer` and what is none, as `lines`.
 
     `garbage` is the number of bytes since the last whole message. After a whole message any whole message is
@@ -207,7 +205,7 @@ def find_events(
 
 
 @inlined
-def _may_begin(buffer: NDArray[np.uint8], at: int, garbage: int) -> bool:
+def _may_begin(buffer: UInt8s, at: int, garbage: int) -> bool:
     if garbage:
         return _is_event(buffer, at)
     kind = buffer[at] & _ERROR_MASK
@@ -215,7 +213,7 @@ def _may_begin(buffer: NDArray[np.uint8], at: int, garbage: int) -> bool:
 
 
 @inlined
-def _is_event(buffer: NDArray[np.uint8], at: int) -> bool:
+def _is_event(buffer: UInt8s, at: int) -> bool:
     return bool(
         buffer[at] == EVENT
         and buffer[at + 1] == _LENGTH_BYTE
@@ -226,7 +224,7 @@ def _is_event(buffer: NDArray[np.uint8], at: int) -> bool:
 
 
 @inlined
-def _is_whole(buffer: NDArray[np.uint8], at: int, size: int) -> bool:
+def _is_whole(buffer: UInt8s, at: int, size: int) -> bool:
     total = 0
     for place in range(at, at + size - 1):
         total += buffer[place]
@@ -240,9 +238,7 @@ def _break_line(line: Record, at: int) -> None:
 
 
 @inlined
-def _fill_line(
-    line: Record, buffer: NDArray[np.uint8], at: int, channels: NDArray[np.int64], discarded: int
-) -> None:
+def _fill_line(line: Record, buffer: UInt8s, at: int, channels: Ints, discarded: int) -> None:
     line.start = at
     line.end = at + EVENT_BYTES
     line.good = 1
@@ -256,7 +252,7 @@ def _fill_line(
 
 
 @inlined
-def _value(buffer: NDArray[np.uint8], at: int) -> float:
+def _value(buffer: UInt8s, at: int) -> float:
     value = int(buffer[at]) | int(buffer[at + 1]) << 8
     return float(value - 65536 if value >= 32768 else value)
 
@@ -266,12 +262,7 @@ FULL_SCALE = 32767
 _MAX_HELD_BYTES = 1024
 
 
-def encode_events(
-    times_s: NDArray[np.float64],
-    counts: NDArray[np.int32] | NDArray[np.float64],
-    table: int = 0,
-    relative: int = 1,
-) -> NDArray[np.uint8]:
+def encode_events(times_s: Floats, counts: Counts, table: int = 0, relative: int = 1) -> UInt8s:
     """Events as a device without faults sends them; channels without a gauge are 0.
 
     `times_s` (n,) is device time, sent in steps of 32 us; `counts` (n, 2) table and relative, limited to 16
@@ -327,7 +318,7 @@ class EventDecoder(PacketDecoder):
         self._garbage = 0
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
         buffer = np.frombuffer(data, dtype=np.uint8)
         found, used, discarded, self._garbage = find_events(buffer, self._channels, self._garbage, lines)
@@ -345,12 +336,12 @@ class EventDecoder(PacketDecoder):
         return packets[:good], counts[:good]
 
 
-def count_events(data: bytes) -> tuple[int, NDArray[np.float64]]:
+def count_events(data: bytes) -> tuple[int, Floats]:
     """Number of good events in `data`, and their times (in 32 us)."""
     lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
     buffer = np.frombuffer(data, dtype=np.uint8)
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
-    times: NDArray[np.float64] = lines["time"][:found][lines["good"][:found] != 0]
+    times: Floats = lines["time"][:found][lines["good"][:found] != 0]
     return len(times), times
 
 

@@ -1,8 +1,6 @@
 """A simulated Harp LoadCells: registers that can be read and written, and an event a sample."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from drivers.arrays import Floats, Int32s, UInt8s
 from drivers.devices.harp import DRIVER
 from drivers.devices.harp.codec import (
     ERROR,
@@ -66,9 +64,9 @@ class SimulatedHarp(SimulatedProtocol):
     def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - events have no number
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],  # noqa: ARG002 - and no flags
-        times_s: NDArray[np.float64],
+        counts: Int32s,
+        status: UInt8s,  # noqa: ARG002 - and no flags
+        times_s: Floats,
     ) -> list[bytes]:
         """An event for each sample; none in standby."""
         self._ticks = round(float(times_s[-1]) * TICKS_PER_S)

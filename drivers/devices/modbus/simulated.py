@@ -3,8 +3,8 @@
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Int32s
 from drivers.devices.modbus import DRIVER
 from drivers.devices.modbus.frames import (
     MAX_REGISTERS,
@@ -71,7 +71,7 @@ class SimulatedModbus(PolledProtocol):
         """See `PolledProtocol`."""
         return len(command.parameters) + 3
 
-    def store_sample(self, counts: NDArray[np.int32], status: int) -> None:
+    def store_sample(self, counts: Int32s, status: int) -> None:
         """See `PolledProtocol`."""
         self._latest = dict(zip(GAUGES, counts.tolist(), strict=True))
         states: dict[tuple[int, int, int], int] = {}

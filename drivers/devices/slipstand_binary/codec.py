@@ -9,22 +9,13 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Counts, Int32s, Ints, Record, Records, UInt8s
 from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16, crc16_slice
 from drivers.errors import ProtocolError, SettingsError
-from drivers.packets import (
-    LOSS_FIELDS,
-    MAX_GAP_S,
-    PACKET,
-    Counts,
-    PacketDecoder,
-    Record,
-    count_packet,
-    is_plausible_gap,
-)
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, PacketDecoder, count_packet, is_plausible_gap
 
 START = b"S"
 STOP = b"P"
@@ -116,17 +107,12 @@ def frame_length(samples: int) -> int:
     return HEADER_BYTES + SAMPLE_BYTES * samples + 2
 
 
-def encode_frame(first_index: int, time_us: int, counts: NDArray[np.int32], flags: int = 0) -> bytes:
+def encode_frame(first_index: int, time_us: int, counts: Int32s, flags: int = 0) -> bytes:
     """One frame of counts (n, 2); see `encode_frames`."""
     return encode_frames(first_index, np.array([time_us]), np.asarray(counts).reshape(-1, 2), flags).tobytes()
 
 
-def encode_frames(
-    first_index: int,
-    times_us: NDArray[np.int64],
-    counts: NDArray[np.int32],
-    flags: int | NDArray[np.uint8] = 0,
-) -> NDArray[np.uint8]:
+def encode_frames(first_index: int, times_us: Ints, counts: Int32s, flags: int | UInt8s = 0) -> UInt8s:
     """Many frames of equal length, as a device without faults sends them.
 
     `first_index` is that of the very first sample, sent modulo 2**32; each sample has the next one.
@@ -191,7 +177,7 @@ class FrameDecoder(PacketDecoder):
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[NDArray[np.void], Counts]:
+    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         buffer = np.frombuffer(data, dtype=np.uint8)
         frames = np.empty(len(data) // MIN_FRAME_BYTES, dtype=FRAME)
         found, samples, used = scan_frames(buffer, frames)
@@ -203,7 +189,7 @@ class FrameDecoder(PacketDecoder):
         return packets[:found], counts[:samples]
 
 
-def find_frames(data: bytes) -> NDArray[np.void]:
+def find_frames(data: bytes) -> Records:
     """Good frames (f,) FRAME in `data`."""
     frames = np.empty(len(data) // MIN_FRAME_BYTES, dtype=FRAME)
     found, _, _ = scan_frames(np.frombuffer(data, dtype=np.uint8), frames)
@@ -253,7 +239,7 @@ STATE = np.dtype(
 
 
 @compiled
-def scan_frames(buffer: NDArray[np.uint8], frames: NDArray[np.void]) -> tuple[int, int, int]:
+def scan_frames(buffer: UInt8s, frames: Records) -> tuple[int, int, int]:
     """Fill `frames` with the good ones in `buffer`; a bad candidate costs one byte.
 
     Returns the number of frames, the number of their samples, and the number of bytes that were used: the
@@ -288,12 +274,7 @@ def scan_frames(buffer: NDArray[np.uint8], frames: NDArray[np.void]) -> tuple[in
 
 @compiled
 def count_frames(
-    buffer: NDArray[np.uint8],
-    frames: NDArray[np.void],
-    used: int,
-    states: NDArray[np.void],
-    packets: NDArray[np.void],
-    counts: NDArray[np.int32],
+    buffer: UInt8s, frames: Records, used: int, states: Records, packets: Records, counts: Int32s
 ) -> tuple[int, int]:
     """Fill packets (frames,) and counts (samples, 2) of `frames`; returns how many.
 
@@ -376,6 +357,6 @@ def _update(state: Record, frame: Record, packet: Record) -> None:
 
 
 @inlined
-def _u32(buffer: NDArray[np.uint8], at: int) -> int:
+def _u32(buffer: UInt8s, at: int) -> int:
     low = np.int64(buffer[at]) | np.int64(buffer[at + 1]) << 8
     return int(low | np.int64(buffer[at + 2]) << 16 | np.int64(buffer[at + 3]) << 24)

@@ -3,8 +3,8 @@
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Floats, Int32s, UInt8s
 from drivers.devices.slipstand_binary import DRIVER
 from drivers.devices.slipstand_binary.codec import (
     FirmwareIdentity,
@@ -51,13 +51,7 @@ class SimulatedBinary(SimulatedProtocol):
         """As the reference firmware: at most 5 ms and at most 32 samples."""
         return samples_per_frame(rate_hz)
 
-    def encode(
-        self,
-        first_sequence: int,
-        counts: NDArray[np.int32],
-        status: NDArray[np.uint8],
-        times_s: NDArray[np.float64],
-    ) -> list[bytes]:
+    def encode(self, first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:
         """Frames; one is flagged as overloaded when one of its samples is."""
         seen = np.bitwise_or.reduce(status.reshape(len(times_s), -1), axis=1)
         table = np.where(seen & SampleStatus.OVERLOAD_TABLE, np.uint8(FrameFlags.OVERLOAD_TABLE), np.uint8(0))
