@@ -256,8 +256,9 @@ def ages_s(seen: np.ndarray, started_s: float) -> np.ndarray:
 def feed(traces: LiveTraces, start_s: float, length_s: float) -> None:
     first, count = round(start_s * RATE_HZ), round(length_s * RATE_HZ)
     time_s = (first + np.arange(count)) / RATE_HZ
-    table_m, relative_m = motion_m(time_s).T
-    traces.append(RingRows(first, time_s, table_m, relative_m, np.zeros(count, np.uint8)))
+    readings = motion_m(time_s)
+    counts, status = np.zeros((count, 2)), np.zeros(count, np.uint8)
+    traces.append(RingRows(first, counts, readings, readings[:, 1], status, time_s))
 
 
 def motion_m(time_s: np.ndarray) -> np.ndarray:

@@ -132,7 +132,7 @@ def look(ring_path: str) -> None:
     ring, next_row = open_ring(ring_path), 0
     while True:
         rows = ring.read_since(next_row)
-        next_row = rows.first_row + len(rows)
+        next_row = rows.end_index
         everything = ring.read_since(0)
         if len(everything):
             np.nanmin(everything.table_m), np.nanmax(everything.relative_m)

@@ -12,8 +12,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
 from app.acquisition.live_client import LiveIdentifier
@@ -48,7 +46,6 @@ from app.acquisition.run_setup import (
     complete_port_settings,
     create_run_journal,
 )
-from app.acquisition.stream.calibration import concatenate
 from app.acquisition.stream.live_stream import (
     DeviceFound,
     LiveStream,
@@ -56,7 +53,7 @@ from app.acquisition.stream.live_stream import (
     engine_events,
     open_stream,
 )
-from app.acquisition.stream.reads import DecodedRead, ReadHistory
+from app.acquisition.stream.reads import DecodedRead, ReadHistory, concatenate
 from app.child_process import (
     CommandReader,
     EventSender,
@@ -262,8 +259,7 @@ class Engine:
 
     def _take(self, chunks: list[DecodedRead]) -> None:
         for rows in concatenate(tuple(rows for chunk in chunks for rows in chunk.rows)):
-            time_s = np.arange(rows.first_index, rows.end_index) / self._rate_hz
-            self._ring.append(time_s, rows.table_m, rows.relative_m, rows.status)
+            self._ring.append(rows.counts, rows.status)
         for chunk in chunks:
             self._history.add(chunk)
         if self._recording is not None and chunks:
@@ -422,7 +418,7 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
     port = complete_port_settings(connect.port, gauges.device)
     with (
         open_stream(port, gauges) as stream,
-        create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz) as ring,
+        create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz, gauges) as ring,
     ):
         engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())

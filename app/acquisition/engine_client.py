@@ -110,7 +110,7 @@ class EngineClient:
         if ring is None or ring.written == self._next_row:
             return None
         rows = ring.read_since(self._next_row)
-        self._next_row = rows.first_row + len(rows)
+        self._next_row = rows.end_index
         return rows
 
     def close(self) -> None:

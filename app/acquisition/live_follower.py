@@ -11,7 +11,8 @@ from analysis.record import Record
 from analysis.synthetic import Truth, simulate_record
 from app.acquisition.errors import RingError
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCommand, LiveResult, LiveValue
-from app.acquisition.ring import Floats, RingReader, RingRows, open_ring
+from app.acquisition.ring import RingReader, RingRows, open_ring
+from app.acquisition.stream.calibration import Floats
 from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
 from drivers.clock import TimeBase
@@ -81,9 +82,9 @@ class RunFollower:
     def answer(self) -> LiveAnswer | None:
         """What is known now; None when no row has come since the last time, or all is known long since."""
         rows = self._ring.read_since(self._next_row)
-        if not len(rows) or rows.first_row > self._last_row:
+        if not len(rows) or rows.first_index > self._last_row:
             return None
-        self._next_row = rows.first_row + len(rows)
+        self._next_row = rows.end_index
         self._last_row = min(self._last_row, self._next_row + _FOLLOWED_S * self._ring.rate_hz)
         self._take(rows)
         time_s, table_m, relative_m = self._rows.columns

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ring_kit import ring_rows
 
 from analysis.identification import Events, FittedModel, ModelSelection
 from analysis.quantities import Quantity, ResultWarning
@@ -69,7 +70,7 @@ def rows_between(start_s: float, end_s: float, *, status: int = 0) -> RingRows:
     first, last = round(start_s * RATE_HZ), round(end_s * RATE_HZ)
     time_s = np.arange(first, last) / RATE_HZ
     table_m, relative_m = motion_m(time_s).T
-    return RingRows(first, time_s, table_m, relative_m, np.full(len(time_s), status, np.uint8))
+    return ring_rows(first, time_s, table_m, relative_m, status)
 
 
 class FakeRecorder:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Gauges
-from drivers.packets import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT_BY_GAUGE, SampleBlock
 
 Floats = NDArray[np.float64]
@@ -61,17 +60,6 @@ class CalibratedBlock:
             self.relative_m[part],
             self.status[part],
         )
-
-
-def concatenate(parts: tuple[CalibratedBlock, ...]) -> tuple[CalibratedBlock, ...]:
-    """Consecutive rows in one piece; as they are where there is nothing to join, or a long gap is in them."""
-    if len(parts) < 2 or parts[-1].end_index - parts[0].first_index > MAX_BLOCK_ROWS:
-        return parts
-    columns = (
-        np.concatenate([getattr(rows, name) for rows in parts])
-        for name in ("counts", "readings", "relative_m", "status")
-    )
-    return (CalibratedBlock(parts[0].first_index, *columns),)
 
 
 def calibrate(block: SampleBlock, gauges: Gauges) -> CalibratedBlock:

@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import TypeAlias
 
-from app.acquisition.stream.calibration import CalibratedBlock, concatenate
+import numpy as np
+
+from app.acquisition.stream.calibration import CalibratedBlock
 from drivers.errors import QueueFullError
+from drivers.packets import MAX_BLOCK_ROWS
 from drivers.samples import Losses
 from messages.message import message
 
@@ -139,6 +142,17 @@ class ReadHistory:
     def reads(self, first_index: int = -1) -> Iterator[DecodedRead]:
         """Reads that are kept, oldest first; only those with samples from `first_index` on, where given."""
         return (chunk for chunk in self._chunks if _end_index(chunk) > first_index or first_index < 0)
+
+
+def concatenate(parts: tuple[CalibratedBlock, ...]) -> tuple[CalibratedBlock, ...]:
+    """Consecutive rows in one piece; as they are where there is nothing to join, or a long gap is in them."""
+    if len(parts) < 2 or parts[-1].end_index - parts[0].first_index > MAX_BLOCK_ROWS:
+        return parts
+    columns = (
+        np.concatenate([getattr(rows, name) for rows in parts])
+        for name in ("counts", "readings", "relative_m", "status")
+    )
+    return (CalibratedBlock(parts[0].first_index, *columns),)
 
 
 def merge_reads(chunks: Sequence[DecodedRead]) -> DecodedRead:

@@ -21,7 +21,6 @@ from app.presenters.gauges.state import (
 from app.presenters.gauges.tasks import FitCalibration, SaveCalibration, SavedCalibration
 from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.results import sentence
-from config.schema import Gauges
 from messages.i18n import gettext
 from messages.message import Message
 
@@ -55,7 +54,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._recent = recent
         self._submit = submit
         self._now = now
-        self._gauges: Gauges | None = None
+        self._is_connected = False
         self._averager = ReadingAverager(recent)
         self._dial_mm = 0.0
         self._file_name = ""
@@ -76,7 +75,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         except ValueError as error:
             self._update(message=Chip(str(error), Tone.BAD))
             return
-        if self._gauges is None or not self._averager.start():
+        if not self._is_connected or not self._averager.start():
             self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
@@ -125,9 +124,9 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         self._submit(task)
 
-    def on_connected(self, gauges: Gauges | None) -> None:
-        """Live samples are converted with these calibrations; None: nothing is connected."""
-        self._gauges = gauges
+    def set_connected(self, is_connected: bool) -> None:
+        """Live samples come from now on, or no longer."""
+        self._is_connected = is_connected
         was_averaging = self._averager.is_active
         self._averager.stop()
         self._update(live_value="", live_note=gettext(NO_DEVICE), reading_status="", offers_reconnect=False)
@@ -136,12 +135,12 @@ class CalibrationPresenter(Presenter[CalibrationState]):
 
     def tick(self) -> None:
         """Evaluate the newest samples."""
-        if self._gauges is None:
+        if not self._is_connected:
             return
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
         if rows is not None:
-            self._show_live(average_counts(rows, self.state.form.gauge, self._gauges))
-        self._poll_reading(self._gauges)
+            self._show_live(average_counts(rows, self.state.form.gauge))
+        self._poll_reading()
 
     def on_fitted(self, task: FitCalibration, fit: CalibrationFit) -> None:
         """Show the fit of the current points."""
@@ -154,9 +153,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         text = gettext("Written to {file}.", file=saved.file)
         if saved.previous:
             text += " " + gettext("The one before is kept as {file}.", file=saved.previous)
-        self._update(
-            message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
-        )
+        self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._is_connected)
 
     def on_failed(self, task: FitCalibration | SaveCalibration, message: Message) -> None:
         """Show why a task failed; too few points for a curve are no fault."""
@@ -178,9 +175,9 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             ),
         )
 
-    def _poll_reading(self, gauges: Gauges) -> None:
+    def _poll_reading(self) -> None:
         """Add the reading once it is complete."""
-        average = self._averager.poll(self.state.form.gauge, gauges)
+        average = self._averager.poll(self.state.form.gauge)
         if isinstance(average, AveragedCounts):
             self._add_point(average, self._dial_mm)
         elif isinstance(average, InvalidWindow):

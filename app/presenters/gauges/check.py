@@ -68,7 +68,7 @@ class CheckPresenter(Presenter[CheckState]):
         """Evaluate the newest samples."""
         if self._gauges is None:
             return
-        reading = self._averager.poll(self.state.form.gauge, self._gauges)
+        reading = self._averager.poll(self.state.form.gauge)
         if isinstance(reading, AveragedCounts):
             self._on_reading(reading)
         elif isinstance(reading, InvalidWindow):

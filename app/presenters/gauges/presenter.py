@@ -105,7 +105,7 @@ class GaugesPresenter(Presenter[GaugesState]):
     def on_connected(self, event: Connected) -> None:
         """The device is connected."""
         self._rate_hz = event.rate_hz
-        self.calibration.on_connected(self._stream_gauges)
+        self.calibration.set_connected(True)
         self.check.on_connected(self._stream_gauges, event.device)
         self._update(device=event.device, health_note=gettext(_WAITING))
 
@@ -115,7 +115,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._stream_gauges = None
         self._recent.clear()
         self._measured_s = self._live_s = float("-inf")
-        self.calibration.on_connected(None)
+        self.calibration.set_connected(False)
         self.check.on_connected(None)
         self._update(device="", health=(), health_note=gettext(_NOT_CONNECTED))
 

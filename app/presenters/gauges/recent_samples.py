@@ -3,25 +3,18 @@
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.formatting import typeset
-from app.acquisition.averaged_counts import AveragedCounts, compute_average
+from app.acquisition.averaged_counts import OVERLOAD_FLAGS, AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
-from config.schema import Gauge, Gauges
-from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
+from drivers.samples import ABSENT_BY_GAUGE
 from messages.i18n import gettext
 
-Floats = NDArray[np.float64]
-
-_OVERLOADS: Final = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _MIN_VALID_FRACTION: Final = 0.5
 """Least fraction of valid samples in a window: below it the gauge is hardly in range."""
-_NEWTON_STEPS: Final = 6
-"""Newton converges quadratically: non-linearities of percents vanish below rounding in fewer steps."""
 WINDOW_S: Final = 1.0
 """Length of an averaging window: 1 s averages whole periods of 50 and 60 Hz hum."""
 MAX_WINDOWS: Final = 5
@@ -77,61 +70,31 @@ class RecentSamples:
         parts = [rows for rows in self._parts if rows.time_s[-1] >= start_s]
         if not parts:
             return None
-        columns = ("time_s", "table_m", "relative_m", "status")
-        time_s, table_m, relative_m, status = (
-            np.concatenate([getattr(rows, name) for rows in parts]) for name in columns
-        )
-        first = int(np.searchsorted(time_s, start_s))
+        names = ("counts", "readings", "relative_m", "status", "time_s")
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(rows, name) for rows in parts]) for name in names
+        }
+        skipped = int(np.searchsorted(columns["time_s"], start_s))
         return RingRows(
-            parts[0].first_row + first, time_s[first:], table_m[first:], relative_m[first:], status[first:]
+            parts[0].first_index + skipped, **{name: column[skipped:] for name, column in columns.items()}
         )
 
 
-def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCounts | InvalidWindow:
-    """Average the counts of a gauge over rows.
-
-    Parameters
-    ----------
-    rows : RingRows
-    channel : int
-        0 for gauge 1, 1 for gauge 2.
-    gauges : Gauges
-        Calibrations that the displacements were computed with.
-    """
-    invalid = (rows.status & int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])) != 0
-    displacement_m = rows.table_m if channel == 0 else gauge_2_displacement_m(rows, gauges)
-    valid_m = displacement_m[~invalid & np.isfinite(displacement_m)]
-    if len(valid_m) < max(_MIN_VALID_FRACTION * len(rows), 2):
-        bad = len(rows) - len(valid_m)
+def average_counts(rows: RingRows, channel: int) -> AveragedCounts | InvalidWindow:
+    """Average the counts of gauge 1 (channel 0) or gauge 2 (channel 1) over rows."""
+    valid = (rows.status & int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])) == 0
+    counts = rows.counts[valid, channel].astype(np.float64)
+    if len(counts) < max(_MIN_VALID_FRACTION * len(rows), 2):
         return InvalidWindow(
             gettext(
                 "Gauge {number} is overloaded or its samples are damaged: {bad} of {all}."
                 " Move it back into its range, or check the cable",
                 number=channel + 1,
-                bad=bad,
+                bad=len(rows) - len(counts),
                 all=len(rows),
             )
         )
-    return compute_average(counts_from_displacement(valid_m, (gauges.table, gauges.relative)[channel]))
-
-
-def gauge_2_displacement_m(rows: RingRows, gauges: Gauges) -> Floats:
-    """Displacement (m, (n,)) that gauge 2 measures: relative, or absolute if it measures the plate."""
-    return rows.relative_m + rows.table_m if gauges.relative.measures == "plate" else rows.relative_m
-
-
-def counts_from_displacement(displacement_m: Floats, gauge: Gauge) -> Floats:
-    """Counts (n,) of displacements (n,): the inverse of `Gauge.displacement_m`.
-
-    The polynomial is close to a straight line, so Newton's method converges from the line.
-    """
-    linear = displacement_m.copy()
-    if gauge.polynomial:
-        terms = np.polynomial.Polynomial((0.0, 1.0, *gauge.polynomial))
-        slope = terms.deriv()
-        for _ in range(_NEWTON_STEPS):
-            linear -= (terms(linear) - displacement_m) / slope(linear)
-    return linear / gauge.gain_m_per_count + gauge.zero_count
+    return compute_average(counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +134,7 @@ class ReadingAverager:
         """Abandon the reading."""
         self._windows = 0
 
-    def poll(self, gauge: int, gauges: Gauges) -> AveragedCounts | InvalidWindow | StillMoving | None:
+    def poll(self, gauge: int) -> AveragedCounts | InvalidWindow | StillMoving | None:
         """Evaluate the current window once it is complete; None before.
 
         The last window is accepted even if the gauge still creeps.
@@ -181,7 +144,7 @@ class ReadingAverager:
         rows = self._recent.since(self._since_s)
         if rows is None:
             return None
-        average = average_counts(rows, gauge, gauges)
+        average = average_counts(rows, gauge)
         if isinstance(average, InvalidWindow) or average.is_steady or self._windows == MAX_WINDOWS:
             self.stop()
             return average

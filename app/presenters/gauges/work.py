@@ -10,8 +10,7 @@ from analysis.calibration.known_displacement import DisplacementCheck
 from analysis.calibration.points import CalibrationPoints
 from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
-from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
-from app.acquisition.gauge_samples import samples_from_ring
+from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge, gauge_samples
 from app.presenters.base import LabelledValue, ReportProgress
 from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
 from app.presenters.gauges.state import NAMES, CalibrationFit, CheckKind
@@ -67,7 +66,7 @@ def _load_calibrations() -> ActiveCalibrations:
 
 
 def _measure_health(task: MeasureHealth) -> tuple[GaugeHealthState, ...]:
-    pair = samples_from_ring(task.rows, task.rate_hz, task.gauges)
+    pair = gauge_samples([task.rows], task.rate_hz, task.gauges)
     return tuple(
         gauge_health_state(name, measure_health(samples)) for name, samples in zip(NAMES, pair, strict=True)
     )

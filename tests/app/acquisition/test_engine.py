@@ -101,8 +101,8 @@ def test_the_ring_shows_the_whole_stream_and_runs_follow_one_another(tmp_path, s
             assert (ended.samples, ended.release_s) == (800, 0.3)
             rows.append(engine.new_rows())
             until(engine, StateChanged, state=PullbackState.IDLE)
-        assert rows[0].first_row == 0
-        assert rows[1].first_row == len(rows[0])
+        assert rows[0].first_index == 0
+        assert rows[1].first_index == len(rows[0])
         time_s = np.concatenate([part.time_s for part in rows])
         np.testing.assert_allclose(time_s, np.arange(len(time_s)) / 1000.0, atol=1e-12)
         assert len(list(tmp_path.glob("*.h5"))) == 2

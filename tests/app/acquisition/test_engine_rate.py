@@ -67,7 +67,7 @@ def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quick
     source.prepare()
     connection = HeardConnection()
     owner = Owner(intake, tmp_path, connection.start_ns, quicker)
-    with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
+    with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ, load_gauges()) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")
         Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner).run()

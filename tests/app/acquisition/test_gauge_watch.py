@@ -1,13 +1,12 @@
-"""Samples of both gauges at rest, from a stream and from the live ring."""
+"""Samples of both gauges at rest."""
 
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from app.acquisition import gauge_samples
-from app.acquisition.gauge_samples import NoSamplesError, collect_samples, samples_from_ring
-from app.acquisition.ring import RingRows
+from app.acquisition import gauge_check
+from app.acquisition.gauge_check import NoSamplesError, collect_samples, gauge_samples
 from app.acquisition.stream.calibration import calibrate
 from app.acquisition.stream.reads import DecodedRead
 from config.files import load_gauges
@@ -46,22 +45,15 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gauge_samples, "TIMEOUT_S", -0.95)
+    monkeypatch.setattr(gauge_check, "TIMEOUT_S", -0.95)
     with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
         collect_samples(FakeStream(10), 1.0, load_gauges())
-
-
-def test_the_ring_gives_the_same_gauges() -> None:
-    rows = RingRows(0, np.arange(4) / RATE_HZ, np.zeros(4), np.ones(4), STATUS)
-    table, relative = samples_from_ring(rows, RATE_HZ, load_gauges())
-    assert relative.displacement_m.tolist() == [1.0] * 4
-    assert relative.overloaded.tolist() == [False, False, True, False]
-    assert table.range_m == 0.0165
 
 
 def test_a_gauge_of_the_plate_reads_where_the_plate_is() -> None:
     gauges = load_gauges()
     absolute = gauges.replace(relative=gauges.relative.replace(measures="plate"))
-    rows = RingRows(0, np.arange(4) / RATE_HZ, np.full(4, 2.0), np.ones(4), STATUS)
-    _, plate = samples_from_ring(rows, RATE_HZ, absolute)
-    assert plate.displacement_m.tolist() == [3.0] * 4
+    block = SampleBlock(0, np.full((4, 2), 8000, np.int32), np.zeros(4, np.uint8), 0)
+    for mounted in (gauges, absolute):
+        _, plate = gauge_samples([calibrate(block, mounted)], RATE_HZ, mounted)
+        assert plate.displacement_m.tolist() == gauges.relative.displacement_m(np.full(4, 8000.0)).tolist()

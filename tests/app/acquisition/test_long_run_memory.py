@@ -141,7 +141,7 @@ def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     source.prepare()
     connection = Connection()
     owner = Owner(intake, tmp_path, connection.start_ns)
-    with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
+    with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ, load_gauges()) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")
         Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner, low_latency=True).run()

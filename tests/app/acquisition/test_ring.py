@@ -11,20 +11,24 @@ from hypothesis import strategies as st
 
 from app.acquisition.errors import RingError
 from app.acquisition.ring import create_ring, open_ring
+from config.files import load_gauges
+from drivers.samples import SampleStatus
+
+GAUGES = load_gauges()
 
 
 def rows(first: int, count: int):
     """Columns in which each value tells its own row."""
     n = np.arange(first, first + count)
-    return n / 1000.0, n * 1e-6, -n * 1e-6, (n % 200).astype(np.uint8)
+    return np.column_stack((n, -n)), (n % 4 * SampleStatus.OVERLOAD_TABLE).astype(np.uint8)
 
 
 def check(read) -> None:
-    time_s, table, relative, status = rows(read.first_row, len(read))
-    np.testing.assert_array_equal(read.time_s, time_s)
-    np.testing.assert_array_equal(read.table_m, table)
-    np.testing.assert_array_equal(read.relative_m, relative)
+    counts, status = rows(read.first_index, len(read))
+    np.testing.assert_array_equal(read.time_s, np.arange(read.first_index, read.end_index) / 1000.0)
+    np.testing.assert_array_equal(read.counts, counts)
     np.testing.assert_array_equal(read.status, status)
+    np.testing.assert_array_equal(read.table_m, GAUGES.table.displacement_m(counts[:, 0].astype(float)))
 
 
 @given(
@@ -34,7 +38,7 @@ def check(read) -> None:
 @settings(deadline=None, max_examples=100)
 def test_a_reader_gets_every_row_or_is_told_how_many_it_missed(tmp_path_factory, capacity, steps):
     path = tmp_path_factory.mktemp("ring") / "live.ring"
-    with create_ring(path, capacity, 1000.0) as ring, open_ring(path) as reader:
+    with create_ring(path, capacity, 1000.0, GAUGES) as ring, open_ring(path) as reader:
         written = row = 0
         for count, looks in steps:
             ring.append(*rows(written, count))
@@ -42,15 +46,15 @@ def test_a_reader_gets_every_row_or_is_told_how_many_it_missed(tmp_path_factory,
             if looks:
                 read = reader.read_since(row)
                 check(read)
-                assert read.first_row == max(row, written - capacity)
-                assert read.lost == read.first_row - row
-                assert read.first_row + len(read) == reader.written == written
+                assert read.first_index == max(row, written - capacity)
+                assert read.lost == read.first_index - row
+                assert read.end_index == reader.written == written
                 row = written
     assert not path.exists()
 
 
 def test_header_says_rate_and_capacity(tmp_path):
-    with create_ring(tmp_path / "r", 100, 2500.0) as ring, open_ring(tmp_path / "r") as reader:
+    with create_ring(tmp_path / "r", 100, 2500.0, GAUGES) as ring, open_ring(tmp_path / "r") as reader:
         assert (reader.rate_hz, reader.capacity, ring.capacity, reader.written) == (2500.0, 100, 100, 0)
         assert len(reader.read_since(0)) == 0
         assert len(reader.read_since(50)) == 0
@@ -58,7 +62,7 @@ def test_header_says_rate_and_capacity(tmp_path):
 
 def test_rows_read_while_being_written_are_never_mixed(tmp_path):
     ended = threading.Event()
-    with create_ring(tmp_path / "r", 500, 1000.0) as ring, open_ring(tmp_path / "r") as reader:
+    with create_ring(tmp_path / "r", 500, 1000.0, GAUGES) as ring, open_ring(tmp_path / "r") as reader:
 
         def write():
             first = 0
@@ -73,7 +77,7 @@ def test_rows_read_while_being_written_are_never_mixed(tmp_path):
             for _ in range(2000):
                 read = reader.read_since(row)
                 check(read)
-                row = read.first_row + len(read)
+                row = read.end_index
         finally:
             ended.set()
             writer.join()
@@ -81,7 +85,7 @@ def test_rows_read_while_being_written_are_never_mixed(tmp_path):
 
 
 def test_another_process_reads_it_and_its_end_leaves_it_alone(tmp_path):
-    with create_ring(tmp_path / "r", 1000, 1000.0) as ring:
+    with create_ring(tmp_path / "r", 1000, 1000.0, GAUGES) as ring:
         ring.append(*rows(0, 700))
         told = subprocess.run(
             [
@@ -89,14 +93,14 @@ def test_another_process_reads_it_and_its_end_leaves_it_alone(tmp_path):
                 "-c",
                 "import sys; from app.acquisition.ring import open_ring\n"
                 "rows = open_ring(sys.argv[1]).read_since(100)\n"
-                "print(rows.first_row, len(rows), rows.table_m[-1])",
+                "print(rows.first_index, len(rows), rows.counts[-1, 0])",
                 str(tmp_path / "r"),
             ],
             capture_output=True,
             check=True,
             text=True,
         )
-        assert told.stdout.split() == ["100", "600", str(699 * 1e-6)]
+        assert told.stdout.split() == ["100", "600", "699.0"]
         assert told.stderr == ""
         ring.append(*rows(700, 100))
         with open_ring(tmp_path / "r") as reader:
@@ -111,4 +115,4 @@ def test_files_that_are_no_rings_are_refused(tmp_path):
     with pytest.raises(RingError, match="absent"):
         open_ring(tmp_path / "absent")
     with pytest.raises(RingError, match="no room"):
-        create_ring(tmp_path / "no" / "folder", 10, 1.0)
+        create_ring(tmp_path / "no" / "folder", 10, 1.0, GAUGES)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ring_kit import ring_rows
 
 from app.acquisition.messages import EndReason, PullbackState, RunEnded, StandPosition, StateChanged
 from app.acquisition.ring import RingRows
@@ -26,9 +27,7 @@ class Line(StatusLine):
 
 def rows(table_mm: float, relative_mm: float = 0.0) -> RingRows:
     time_s = np.arange(100) / 1000.0
-    return RingRows(
-        0, time_s, np.full(100, table_mm / 1e3), np.full(100, relative_mm / 1e3), np.zeros(100, np.uint8)
-    )
+    return ring_rows(0, time_s, np.full(100, table_mm / 1e3), np.full(100, relative_mm / 1e3))
 
 
 def told(capsys) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ring_kit import ring_rows
 from stage import FakeWorker
 
 from app.acquisition.messages import Connected
@@ -21,7 +22,6 @@ from app.presenters.gauges.recent_samples import (
     InvalidWindow,
     RecentSamples,
     average_counts,
-    counts_from_displacement,
 )
 from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, GaugesTab, PortCard
 from app.presenters.gauges.tasks import (
@@ -51,13 +51,8 @@ def rows(start_s: float, end_s: float, table_m: float = 0.0, slope: float = 0.0,
     number = np.arange(round(start_s * RATE_HZ), round(end_s * RATE_HZ))
     time_s = number / RATE_HZ
     noise = np.random.default_rng(int(number[0])).normal(scale=2e-6, size=(2, len(time_s)))
-    return RingRows(
-        int(number[0]),
-        time_s,
-        table_m + slope * (time_s - start_s) + noise[0],
-        1e-3 + noise[1],
-        np.full(len(time_s), status, np.uint8),
-    )
+    table_m = table_m + slope * (time_s - start_s) + noise[0]
+    return ring_rows(int(number[0]), time_s, table_m, 1e-3 + noise[1], status)
 
 
 class Desk:
@@ -255,18 +250,10 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
 
 
 def test_counts_are_what_the_device_has_sent() -> None:
-    gauge = GAUGES.table.replace(polynomial=(0.8, -20.0))
-    counts = np.linspace(-8e6, 8e6, 41)
-    np.testing.assert_allclose(
-        counts_from_displacement(gauge.displacement_m(counts), gauge), counts, atol=1e-3
-    )
-
-
-def test_gauge_2_of_the_plate_is_read_as_it_reads() -> None:
-    plate = GAUGES.replace(relative=GAUGES.relative.replace(measures="plate"))
-    seen = average_counts(rows(0.0, 1.0, table_m=2e-3), 1, plate)
+    seen = average_counts(rows(0.0, 1.0), 1)
     assert not isinstance(seen, InvalidWindow)
-    assert seen.counts == pytest.approx(3e-3 / 4e-9 - 8000.0, abs=200.0)
+    gauge = GAUGES.relative
+    assert seen.counts == pytest.approx(1e-3 / gauge.gain_m_per_count + gauge.zero_count, abs=200.0)
 
 
 def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
@@ -277,10 +264,10 @@ def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
     newest = recent.since(5.5)
     assert newest is not None
     assert newest.time_s[0] == 5.5
-    assert newest.first_row == 2750
+    assert newest.first_index == 2750
     clipped = rows(0.0, 1.0, status=int(SampleStatus.OVERLOAD_TABLE))
-    assert isinstance(average_counts(clipped, 0, GAUGES), InvalidWindow)
-    assert not isinstance(average_counts(clipped, 1, GAUGES), InvalidWindow)
+    assert isinstance(average_counts(clipped, 0), InvalidWindow)
+    assert not isinstance(average_counts(clipped, 1), InvalidWindow)
 
 
 # --- calibrating ---
