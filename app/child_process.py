@@ -98,8 +98,6 @@ def spawn(
 
     Parameters
     ----------
-    module : str
-    *arguments : str
     is_background : bool
         Numerical libraries use one thread. On Windows the process gets a lower priority; elsewhere it lowers
         its own.

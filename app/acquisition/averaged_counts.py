@@ -27,21 +27,14 @@ _STEADY = 6.0
 
 @dataclass(frozen=True, slots=True)
 class AveragedCounts:
-    """Counts of one gauge over a window.
-
-    Attributes
-    ----------
-    counts, noise_counts : float
-        Mean, and standard deviation of a sample.
-    samples : int
-    creep_counts : float
-        Mean of the second half minus that of the first.
-    """
+    """Counts of one gauge over a window."""
 
     counts: float
+    """Mean, and standard deviation of a sample."""
     noise_counts: float
     samples: int
     creep_counts: float
+    """Mean of the second half minus that of the first."""
 
     @property
     def is_steady(self) -> bool:

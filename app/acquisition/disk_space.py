@@ -25,18 +25,12 @@ _WARN_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class DiskDemand:
-    """What a run writes.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Samples a second.
-    wire_bytes_per_s : float
-        What the device sends.
-    """
+    """What a run writes."""
 
     rate_hz: float
+    """Samples a second."""
     wire_bytes_per_s: float
+    """What the device sends."""
 
     @property
     def journal_bytes_per_s(self) -> float:
@@ -103,13 +97,7 @@ class DiskWarning:
 
 
 class DiskSpaceMonitor:
-    """Looks after the room on a disk while a run is recorded; `look` some times a second.
-
-    Parameters
-    ----------
-    folder : Path
-    demand : DiskDemand
-    """
+    """Looks after the room on a disk while a run is recorded; `look` some times a second."""
 
     def __init__(self, folder: Path, demand: DiskDemand) -> None:
         self._folder = folder

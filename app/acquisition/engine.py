@@ -88,8 +88,6 @@ class HealthReporter:
 
     Parameters
     ----------
-    stream : LiveStream
-    space : FreeSpace
     demand : callable
         Tells what a run writes.
     """
@@ -128,8 +126,6 @@ class Engine:
         As connected.
     stand, gauges
         Settings in use.
-    stream : LiveStream
-    ring : RingWriter
     commands, events
         The pipes to the owner.
     is_watched : bool
@@ -175,12 +171,8 @@ class Engine:
     def run(self) -> None:
         """Work until told to quit, or left alone.
 
-        Raises
-        ------
-        StreamEndedError
-            When no more samples come. A run was ended and stored then.
-        AcquisitionError, ConfigError, RunError
-            For a run that cannot be recorded as asked.
+        Raises StreamEndedError when no more samples come. A run was ended and stored then. Raises
+        AcquisitionError, ConfigError, RunError for a run that cannot be recorded as asked.
         """
         try:
             while not (self._is_leaving and self._recording is None):

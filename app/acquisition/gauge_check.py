@@ -24,24 +24,16 @@ from config.schema import Gauge, GaugeCheck, Gauges
 
 @dataclass(frozen=True, slots=True)
 class ReferenceStep:
-    """What the gauge is tried with.
-
-    Attributes
-    ----------
-    value : float
-        How far it is moved (m), or by how many counts the shunt resistor shifts it.
-    standard_uncertainty : float, optional
-        In the same unit.
-    unit : str
-        `m`, or `count` for a shunt that is known by its counts.
-    kind : str
-        `displacement`, or `shunt`, which shifts the amplifier's input while nothing moves.
-    """
+    """What the gauge is tried with."""
 
     value: float
+    """How far it is moved (m), or by how many counts the shunt resistor shifts it."""
     standard_uncertainty: float | None = None
+    """In the same unit."""
     unit: Literal["m", "count"] = "m"
+    """`m`, or `count` for a shunt that is known by its counts."""
     kind: Literal["displacement", "shunt"] = "displacement"
+    """`displacement`, or `shunt`, which shifts the amplifier's input while nothing moves."""
 
 
 def check_gauge(

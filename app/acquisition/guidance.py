@@ -47,30 +47,21 @@ _THIN_SPACE, _MINUS = "\u202f", "\u2212"
 
 @dataclass(frozen=True, slots=True)
 class PullbackSituation:
-    """What the guidance depends on. Readings in m, as the gauges read; NaN where unknown.
-
-    Attributes
-    ----------
-    plate_m : float
-        Reading of gauge 2.
-    plate_range : AllowedPlateRange or None
-        Allowed position of the plate before a pull; None where the range of gauge 2 is unknown.
-    simulated : bool
-        The stand pulls and releases by itself.
-    note : Message or str
-        What did not go as expected.
-    loss_reason : Message or str
-        Why the device is lost; empty while it is there.
-    """
+    """What the guidance depends on. Readings in m, as the gauges read; NaN where unknown."""
 
     state: PullbackState
     position: StandPosition = _UNKNOWN_POSITION
     table_m: float = math.nan
     plate_m: float = math.nan
+    """Reading of gauge 2."""
     plate_range: AllowedPlateRange | None = None
+    """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
     simulated: bool = False
+    """The stand pulls and releases by itself."""
     note: Message | str = ""
+    """What did not go as expected."""
     loss_reason: Message | str = ""
+    """Why the device is lost; empty while it is there."""
 
     @property
     def is_device_lost(self) -> bool:

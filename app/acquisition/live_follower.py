@@ -62,13 +62,7 @@ def warm_up() -> None:
 
 
 class RunFollower:
-    """Answers with what is known of a run, each time of all its rows until then.
-
-    Parameters
-    ----------
-    ring : RingReader
-    follow : Follow
-    """
+    """Answers with what is known of a run, each time of all its rows until then."""
 
     def __init__(self, ring: RingReader, follow: FollowRun) -> None:
         self._ring = ring

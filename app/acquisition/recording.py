@@ -45,21 +45,17 @@ class RecordingContext:
     ----------
     intake : Intake
         Gives the journal each read before it is decoded.
-    history : History
-        Holds each read before the recording takes it.
-    writer : Writer
-        Idle.
-    time_base : callable
-        Gives the time base of the samples from one index to another.
-    emit : callable
-        Takes what is to be told.
     """
 
     read_queue: ReadQueue
     history: ReadHistory
+    """Holds each read before the recording takes it."""
     writer: Writer
+    """Idle."""
     time_base: Callable[[int, int], TimeBase]
+    """Gives the time base of the samples from one index to another."""
     emit: Callable[[Event], None]
+    """Takes what is to be told."""
 
 
 class Recording:
@@ -75,7 +71,6 @@ class Recording:
         Nominal samples a second.
     journal : Journal
         Empty but for its header.
-    around : Surroundings
     last_slip : SeenSlip, optional
         How far the plate went in the run before.
     """

@@ -134,7 +134,6 @@ class RunFile:
 
     Parameters
     ----------
-    writer : Writer
     request : OpenRun
         What the file is to be.
     journal : Journal

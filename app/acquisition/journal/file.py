@@ -80,7 +80,6 @@ class JournalFile:
 
     Parameters
     ----------
-    path : Path
     file
         Unbuffered, at its end; written by nobody else.
     first : bytes

@@ -181,17 +181,12 @@ class Journal:
 def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:
     """Create the journal of a run; its folder is made if there is none.
 
+    Raises JournalError if the folder cannot be made or written to, or the name is taken.
+
     Parameters
     ----------
-    path : Path
-    header : JournalHeader
     refuges : sequence of Path
         Folders to move to when that of `path` fails.
-
-    Raises
-    ------
-    JournalError
-        If the folder cannot be made or written to, or the name is taken.
     """
     record = encode_record(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
     try:

@@ -40,7 +40,6 @@ def rebuild(story: JournalSummary, path: Path, progress: Callable[[float], None]
 
     Parameters
     ----------
-    story : Story
     path : Path
         Must not exist yet.
     progress : callable

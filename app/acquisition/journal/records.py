@@ -98,26 +98,21 @@ class JournalSummary:
 
     Attributes
     ----------
-    path : Path
-        Of the journal.
-    header : JournalHeader
     mark : Mark or None
         The last one.
-    opened, named, ended
-    wire_bytes : int
-        Received bytes that it holds.
-    is_torn : bool
-        There is more behind the last whole record.
     """
 
     path: Path
+    """Of the journal."""
     header: JournalHeader
     checkpoint: Mark | None
     opened: Opened | None
     named: Named | None
     ended: Ended | None
     wire_bytes: int
+    """Received bytes that it holds."""
     is_torn: bool
+    """There is more behind the last whole record."""
 
     @property
     def rate_hz(self) -> float:

@@ -75,7 +75,6 @@ def recover_folder(
 
     Parameters
     ----------
-    folder : Path
     progress : callable, optional
         Told each journal, and the share of it that is done.
     home : Path, optional

@@ -23,24 +23,16 @@ _READS_MAX = 4096
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReplayedReads:
-    """A read of the journal, or several that stand together in the midst of the run.
-
-    Attributes
-    ----------
-    rows : Rows or None
-        The samples that they completed, with the numbers that these had in the stream; None without any.
-    losses : Losses
-        What they added to the account of the stream.
-    start : int
-        Byte of the journal at which the first record begins.
-    is_in_run : bool
-        They came after the run file was begun.
-    """
+    """A read of the journal, or several that stand together in the midst of the run."""
 
     rows: CalibratedBlock | None
+    """The samples that they completed, with the numbers that these had in the stream; None without any."""
     losses: Losses
+    """What they added to the account of the stream."""
     start: int
+    """Byte of the journal at which the first record begins."""
     is_in_run: bool
+    """They came after the run file was begun."""
 
 
 class Replay:

@@ -17,12 +17,7 @@ _EVERY_S = 1.0
 
 
 class JournalTap:
-    """Puts each read into a journal as it comes, and knows where it stands once it is decoded.
-
-    Parameters
-    ----------
-    journal : Journal
-    """
+    """Puts each read into a journal as it comes, and knows where it stands once it is decoded."""
 
     def __init__(self, journal: Journal) -> None:
         self.decoded_reads = 0
@@ -46,7 +41,6 @@ class JournalTap:
 
         Parameters
         ----------
-        chunk : Chunk
         oldest_index : int
             No run begins before this sample any more.
 
@@ -84,7 +78,6 @@ class CheckpointWriter:
 
     Parameters
     ----------
-    journal : Journal
     armed_index : int
         Sample from which on a release is waited for.
     rate_hz : float

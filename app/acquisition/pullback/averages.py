@@ -20,13 +20,12 @@ class BinAverages:
     Attributes
     ----------
     middle : (n,) float64
-        Sample index of the middle of each bin.
-    table_m, relative_m : (n,) float64
-        Mean displacements (m); `relative_m` is NaN where gauge 2 has no reading.
+        (n,) float64: sample index of the middle of each bin.
     """
 
     center: Floats
     table_m: Floats
+    """(n,) float64: mean displacements (m); `relative_m` is NaN where gauge 2 has no reading."""
     relative_m: Floats
 
     def __len__(self) -> int:

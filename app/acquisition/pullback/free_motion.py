@@ -44,7 +44,6 @@ class FreeMotion:
 
     Parameters
     ----------
-    plan : PullbackPlan
     readings : Readings
         Holds each short average before `see` is told of it.
     facts : PullbackFacts

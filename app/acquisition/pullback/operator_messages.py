@@ -94,7 +94,6 @@ class ReleaseTimeout:
 
     Parameters
     ----------
-    plan : PullbackPlan
     armed_index : int
         Sample from which the time counts.
     """

@@ -84,44 +84,33 @@ class PullbackPlan:
 
     Attributes
     ----------
-    rate_hz : float
-        Samples a second.
-    pullback_m : float or None
-        Nominal pullback, of either sign (m); about 10 mm are expected where none is known.
-    duration_s : float or None
-        How long to go on after release; None until rest, or `enough_s`.
-    trigger_timeout_s : float
-        How long to wait for a release (s).
-    enough_s : float
-        Time after release at which waiting longer no longer pays (s).
-    tolerance_m : float or None
-        How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least.
-    pretrigger_s : float
-        What is to be kept from before the release (s).
-    first_index : int
-        Oldest sample that is kept: before it is so long ago as the pretrigger, nothing is armed.
-    relative_range_m : float or None
-        Gauge 2 reads from minus to plus this (m); None where nobody says.
-    gauge_2_on_base : bool
-        Gauge 2 measures the plate against the base, and not against the table.
     expected : Excursion or None
         How far the plate is expected to go; None takes what any plate may.
-    side : int
-        To which side the table was pulled the last time: 1, -1, or 0 if nobody knows.
     """
 
     rate_hz: float
+    """Samples a second."""
     pullback_m: float | None = None
+    """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
     duration_s: float | None = None
+    """How long to go on after release; None until rest, or `enough_s`."""
     trigger_timeout_s: float = math.inf
+    """How long to wait for a release (s)."""
     enough_s: float = 20.0
+    """Time after release at which waiting longer no longer pays (s)."""
     tolerance_m: float | None = None
+    """How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least."""
     pretrigger_s: float = 0.0
+    """What is to be kept from before the release (s)."""
     first_index: int = 0
+    """Oldest sample that is kept: before it is so long ago as the pretrigger, nothing is armed."""
     relative_range_m: float | None = None
+    """Gauge 2 reads from minus to plus this (m); None where nobody says."""
     gauge_2_on_base: bool = False
+    """Gauge 2 measures the plate against the base, and not against the table."""
     expected_excursion: Excursion | None = None
     side: int = 0
+    """To which side the table was pulled the last time: 1, -1, or 0 if nobody knows."""
 
     @property
     def target_m(self) -> float | None:

@@ -56,7 +56,6 @@ class PullbackStateMachine:
 
     Parameters
     ----------
-    plan : PullbackPlan
     armed_index : int
         Sample from which on a release is waited for; what is fed from before is context.
     """

@@ -14,27 +14,18 @@ Counts = NDArray[np.int32] | NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibratedBlock:
-    """Consecutive calibrated samples.
-
-    Attributes
-    ----------
-    first_index : int
-        Of the first row, counted from the first sample of the stream.
-    counts : (n, 2) int32 or float64
-        As received.
-    readings : (n, 2) float64
-        Displacements that the gauges show, each as it is mounted (m); NaN where absent.
-    relative_m : (n,) float64
-        Plate against table (m), also where gauge 2 is mounted on the base.
-    status : (n,) uint8
-        `drivers.samples.SampleStatus` flags.
-    """
+    """Consecutive calibrated samples."""
 
     first_index: int
+    """Of the first row, counted from the first sample of the stream."""
     counts: Counts
+    """(n, 2) int32 or float64: as received."""
     readings: Floats
+    """(n, 2) float64: displacements that the gauges show, each as it is mounted (m); NaN where absent."""
     relative_m: Floats
+    """(n,) float64: plate against table (m), also where gauge 2 is mounted on the base."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
 
     def __len__(self) -> int:
         return len(self.status)

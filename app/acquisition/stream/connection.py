@@ -31,20 +31,14 @@ class PortOpener(Protocol):
 def create_source(
     settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
-    """Source of the device, or of both.
+    """Source of the device, or of both. Raises SettingsError if it cannot be.
 
     Parameters
     ----------
-    settings : PortSettings
     rate_hz : float or None
         Rows a second, asked for or of an earlier recording.
     facts : mapping, optional
         What an earlier recording noted of its device's settings; it tells the rates of two devices.
-
-    Raises
-    ------
-    SettingsError
-        If it cannot be.
     """
     protocol = find_driver(settings.protocol)
     if settings.relative_url:

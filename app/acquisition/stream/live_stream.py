@@ -101,8 +101,6 @@ class LiveStream:
         Brings its reads to `intake`.
     source : SampleSource
         Started.
-    intake : Intake
-    gauges : Gauges
     reopen : callable
         Opens the port of the same device again. Raises DriverError while it is not there.
     """
@@ -208,12 +206,8 @@ class LiveStream:
     def next_read(self, timeout_s: float) -> DecodedRead | None:
         """What was read since the last call, with its samples; None when nothing came within `timeout_s`.
 
-        A chunk without data says that the connection was broken before what comes next.
-
-        Raises
-        ------
-        StreamEndedError
-            When this computer is too slow to take what comes, or what comes makes no sense.
+        A chunk without data says that the connection was broken before what comes next. Raises
+        StreamEndedError when this computer is too slow to take what comes, or what comes makes no sense.
         """
         self._news.extend(StreamNotice(as_message(note)) for note in self._host.check())
         if self._connection is None:

@@ -160,7 +160,6 @@ class StallDetector:
     ----------
     url : str
         Of the port, for words.
-    source : SampleSource
     began_ns : int
         Host's time at which the connection began.
     """

@@ -83,24 +83,16 @@ class ReadQueue:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DecodedRead:
-    """One read of the port, and the samples that it completed.
-
-    Attributes
-    ----------
-    data : bytes
-        As they came.
-    arrival_ns : int
-        Host's monotonic time after the read.
-    rows : tuple of Rows
-        In order, without holes.
-    losses : Losses
-        What this read added to the account of the stream.
-    """
+    """One read of the port, and the samples that it completed."""
 
     data: bytes
+    """As they came."""
     arrival_ns: int
+    """Host's monotonic time after the read."""
     rows: tuple[CalibratedBlock, ...]
+    """In order, without holes."""
     losses: Losses
+    """What this read added to the account of the stream."""
 
 
 _BYTES_PER_SAMPLE = 25.0
