@@ -37,7 +37,7 @@ STEP_S = 0.0005
 OURS = """
 import json, queue, resource, sys, time
 from drivers.port import open_port
-from drivers.port_reader import PortReader
+from drivers.stream import PortReader
 from drivers.devices.slipstand_binary.codec import FrameDecoder, compile_decoder
 
 port_name, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])

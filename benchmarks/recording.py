@@ -118,7 +118,7 @@ def record(rate_hz: float, seconds: float, tcp: bool, window: bool) -> str:
 
 def watch(engine: EngineClient, began: float, duration_s: float) -> str:
     """Wait for so long and look at the memory of engine and writer now and then; cells of a table."""
-    writer = next(iter(named_children(engine, "writer_process")))
+    writer = next(iter(named_children(engine, "runs.writer")))
     memories = {engine.process_id: Memory(), writer: Memory()}
     while (passed_s := time.monotonic() - began) < duration_s:
         for process_id, memory in memories.items():
@@ -154,7 +154,7 @@ def until(engine: EngineClient, kind: type, patience_s: float = 600.0):
 def cost(engine: EngineClient, stand: SimulatedStand) -> Cost:
     """Processor time of each process until now; writer and live identification are the engine's children."""
     writer, live = (
-        sum(map(processor_s, named_children(engine, name))) for name in ("writer_process", "live.process")
+        sum(map(processor_s, named_children(engine, name))) for name in ("runs.writer", "live.process")
     )
     return Cost(processor_s(engine.process_id), writer, live, processor_s(stand.process_id))
 

@@ -1,19 +1,22 @@
 """What sources share: settings, the conversation with a device, and decoding once the rate is known."""
 
 import logging
+import threading
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol, TypeVar
 
 import msgspec
 
-from drivers.errors import NoDataError, ProtocolError, SettingsError
-from drivers.port_reader import BatchedReader
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFullError, SettingsError
+from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link, SampleSource
-from messages.message import MessageError
+from messages.message import EMPTY, Message, MessageError, message, message_of
 
 _log = logging.getLogger(__name__)
 _Settings = TypeVar("_Settings", bound=msgspec.Struct)
@@ -195,3 +198,190 @@ def check_gauge_channels(table: int, relative: int, allowed: range) -> None:
         raise SettingsError(
             "table and relative are both channel {channel}: give each gauge its own", channel=table
         )
+
+
+_SAFE_BYTES = 2048
+"""Bytes that may collect before they are read: the smallest buffers of systems and adapters hold 4 kB."""
+_BUSY_BYTES = 512
+"""The same on a busy computer, where a sleep ends late."""
+_BUSY_DELAY_S = 0.002
+_LATE_S = 0.005
+"""A sleep that lasts so much longer than asked shows a busy computer. Quiet ones wake up within 1 ms."""
+_BUSY_S = 5.0
+"""How long a computer counts as busy after a late sleep; a balance of processor time against lost bytes."""
+_FULL_READ_BYTES = 4000
+"""After a read of so many bytes, more may wait that had no room."""
+_INITIAL_BYTES_PER_S = 1e6
+"""Assumed before anything is measured; high, so that the first delays are short."""
+_MAX_BATCH_BYTES = 1 << 20
+_WAITED_S = 2e-4
+"""A read that takes so long has waited for its bytes, so the time after it is that of their arrival."""
+_PUNCTUAL_INTERVAL_S = 0.05
+"""How often a read must wait for its bytes: the clock fit takes the earliest arrival of each 0.1 s."""
+
+
+class BatchedReader:
+    """Lets bytes collect in a port before it reads them.
+
+    A read costs about the same whatever it brings, so fewer and larger reads cost less. Every 50 ms it waits
+    for the next byte, because the clock fit needs arrival times without delay (docs/decisions/0013).
+    """
+
+    def __init__(self) -> None:
+        self._bytes_per_s = _INITIAL_BYTES_PER_S
+        self._ended_s = self._waited_s = time.monotonic()
+        self._busy_until_s = 0.0
+
+    def read(self, link: Link, batch_delay_s: float) -> bytes:
+        """What came, or comes within the next 50 ms; b"" if nothing.
+
+        Raises DeviceLostError if the port is gone. What came before it is returned by the call before.
+
+        Parameters
+        ----------
+        batch_delay_s : float
+            How long bytes may collect (s); less where they would be too many for the port.
+        """
+        parts: list[bytes] = []
+        try:
+            self._fetch(link, batch_delay_s, parts)
+        except DeviceLostError:
+            if not parts:
+                raise
+        self._update_byte_rate(sum(map(len, parts)))
+        return b"".join(parts)
+
+    def _fetch(self, link: Link, batch_delay_s: float, parts: list[bytes]) -> None:
+        due_s = time.monotonic() + batch_delay_s
+        size, is_full = 0, False
+        while (left_s := due_s - time.monotonic()) > 0.0 and size < _MAX_BATCH_BYTES:
+            longest_s = self._longest_delay_s()
+            if not is_full:
+                self._sleep(min(left_s, longest_s))
+            if is_full or longest_s < left_s:
+                parts.append(link.read())
+                size += len(parts[-1])
+                is_full = len(parts[-1]) >= _FULL_READ_BYTES
+        has_waited = self._read_once(link, parts)
+        is_due = time.monotonic() - self._waited_s > _PUNCTUAL_INTERVAL_S
+        if not has_waited and batch_delay_s and is_due:
+            self._read_once(link, parts)
+            self._waited_s = time.monotonic()
+
+    def _longest_delay_s(self) -> float:
+        """How long bytes may collect before the port must be read."""
+        if time.monotonic() < self._busy_until_s:
+            return max(_BUSY_BYTES / self._bytes_per_s, _BUSY_DELAY_S)
+        return _SAFE_BYTES / self._bytes_per_s
+
+    def _sleep(self, duration_s: float) -> None:
+        due_s = time.monotonic() + duration_s
+        time.sleep(duration_s)
+        now_s = time.monotonic()
+        if now_s - due_s > _LATE_S:
+            self._busy_until_s = now_s + _BUSY_S
+
+    def _read_once(self, link: Link, parts: list[bytes]) -> bool:
+        """Read once; returns whether the read waited for its bytes."""
+        began_s = time.monotonic()
+        parts.append(link.read())
+        has_waited = time.monotonic() - began_s > _WAITED_S
+        if has_waited:
+            self._waited_s = time.monotonic()
+        return has_waited
+
+    def _update_byte_rate(self, size: int) -> None:
+        began_s, self._ended_s = self._ended_s, time.monotonic()
+        self._bytes_per_s = max(size, 1) / max(self._ended_s - began_s, _WAITED_S)
+
+
+def read_for(read: Callable[[], bytes], duration_s: float) -> bytes:
+    """What repeated reads bring in `duration_s`, until one brings nothing; b"" if nothing came at all.
+
+    A polled device gives one answer a read, each with its own time.
+    """
+    due_s = time.monotonic() + duration_s
+    parts = [read()]
+    try:
+        while parts[-1] and time.monotonic() < due_s:
+            parts.append(read())
+    except DeviceLostError:  # the next call raises it again
+        pass
+    return b"".join(parts)
+
+
+class ReaderEndReason(StrEnum):
+    """Why a `PortReader` ended."""
+
+    STOPPED = "stopped"
+    DEVICE_LOST = "device-lost"
+    QUEUE_FULL = "queue-full"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class ReaderEnd:
+    """How a `PortReader` ended."""
+
+    reason: ReaderEndReason
+    message: Message = EMPTY
+
+
+class PortReader:
+    """Thread that reads a device, stamps what came, and hands it on; nothing else.
+
+    Parameters
+    ----------
+    read : callable
+        Waits shortly and returns what came, b"" if nothing; `SampleSource.read` of an open port. Raises
+        DeviceLostError.
+    sink : callable (arrival_ns, data)
+        Takes each read with the host's time after it (ns, `host_time.host_ns`); must not wait. Raises
+        `QueueFullError` when it cannot take more.
+    on_end : callable (ReaderEnd)
+        Called once from the thread, as its last act.
+    """
+
+    def __init__(
+        self,
+        read: Callable[[], bytes],
+        sink: Callable[[int, bytes], None],
+        on_end: Callable[[ReaderEnd], None],
+    ) -> None:
+        self._read = read
+        self._sink = sink
+        self._on_end = on_end
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="port reader", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Wait for the read under way (50 ms, a fraction of a second for a polled device) and end."""
+        self._stopping.set()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join()
+
+    def _run(self) -> None:
+        end = ReaderEnd(ReaderEndReason.STOPPED)
+        try:
+            self._read_until_stopped()
+        except DeviceLostError as error:
+            end = ReaderEnd(ReaderEndReason.DEVICE_LOST, error.message)
+        except QueueFullError as error:
+            end = ReaderEnd(ReaderEndReason.QUEUE_FULL, error.message)
+        except Exception as error:  # the application must learn why no samples come
+            _log.exception("reader failed")
+            what = message("reading {kind}: {fault}", kind=type(error).__name__, fault=message_of(error))
+            end = ReaderEnd(ReaderEndReason.FAILED, what)
+        _log.info("reader ended: %s %s", end.reason, end.message)
+        self._on_end(end)
+
+    def _read_until_stopped(self) -> None:
+        while not self._stopping.is_set():
+            data = self._read()
+            arrival_ns = host_ns()
+            if data:
+                self._sink(arrival_ns, data)

@@ -13,7 +13,7 @@ from app.acquisition.errors import AcquisitionError
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
-    from app.acquisition.stream.reads import DecodedRead
+    from app.acquisition.stream.live_stream import DecodedRead
 
 TIMEOUT_S = 5.0
 _STALE_S = 0.1

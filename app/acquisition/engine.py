@@ -1,15 +1,15 @@
 """The acquisition engine: a process of its own, `python -m app.acquisition.engine`, see `EngineClient`.
 
-Commands come in on stdin and events go out on stdout, a JSON document a line (`messages.py`). When stdin
-ends, whoever gave the commands is gone: a run that needs nobody goes on to its end, any other is ended;
-either way it is stored, and the process ends.
+Commands come in on stdin and events go out on stdout, one JSON document per line (`messages.py`). When stdin
+ends, the owner is gone: a run that needs nobody goes on to its end, any other is ended. Either way it is
+stored, and the process ends.
 """
 
+import logging
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
@@ -28,15 +28,16 @@ from app.acquisition.messages import (
     PortSettings,
     PullbackState,
     Quit,
+    Reconnected,
+    Reconnecting,
     RunEnded,
     RunSettings,
     StateChanged,
     Stop,
     decode_command,
 )
-from app.acquisition.poll_schedule import Latency, PollSchedule
 from app.acquisition.pullback.plan import ObservedSlip
-from app.acquisition.recording import Recording, RecordingContext
+from app.acquisition.recording import Latency, Recording, RecordingContext
 from app.acquisition.ring import RingWriter, create_ring, live_folder, ring_capacity
 from app.acquisition.run_file import end_reason
 from app.acquisition.run_setup import (
@@ -47,13 +48,16 @@ from app.acquisition.run_setup import (
     create_run_journal,
 )
 from app.acquisition.stream.live_stream import (
+    DecodedRead,
     DeviceFound,
+    DeviceLost,
     LiveStream,
+    ReadHistory,
+    SearchFailed,
     StreamNotice,
-    engine_events,
+    concatenate,
     open_stream,
 )
-from app.acquisition.stream.reads import DecodedRead, ReadHistory, concatenate
 from app.child_process import (
     CommandReader,
     EventSender,
@@ -69,52 +73,45 @@ from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 from messages.message import EMPTY, Message, as_message, message, message_of
 
+_log = logging.getLogger(__name__)
+
 _SWITCH_S = 0.001
-"""No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
+"""Longest turn of a thread of the interpreter; the port's buffer may hold no more than 20 ms."""
 _WAIT_S = 0.05
-_READS_A_BEAT = 64
-"""No more are taken before they are followed, should decoding fall behind: the history must reach back."""
+_READS_PER_STEP = 64
+"""Most reads taken before they are followed, should decoding fall behind: the history must reach back."""
 _HISTORY_S = 10.0
 _AFTER_PRETRIGGER_S = 4.0
-"""The history reaches so much further back than a pretrigger: a release is sure only after a while."""
+"""The history reaches so much further back than a pretrigger: a release is confirmed only after a while."""
 _CONNECT_S = 60.0
-
-
 _HEALTH_PERIOD_S = 0.5
+_STEP_PERIOD_S = 0.1
+"""Between two steps that nobody waits for: each costs about the same, however much came meanwhile."""
+_WATCHED_PAUSE_S = 0.015
+"""Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
+_PAUSE_S = 0.04
+_AWAITING_PAUSE_S = 0.003
 
 
-class HealthReporter:
-    """Looks after a stream and the disk that its runs go to.
+class PollSchedule:
+    """Decides how often the engine reads and steps; `low_latency` while somebody watches the samples."""
 
-    Parameters
-    ----------
-    demand : callable
-        Tells what a run writes.
-    """
-
-    def __init__(self, stream: LiveStream, space: FreeSpacePoller, demand: Callable[[], DiskDemand]) -> None:
-        self._stream = stream
-        self._space = space
-        self._demand = demand
+    def __init__(self, *, low_latency: bool) -> None:
+        self._is_watched = low_latency
         self._due_s = 0.0
 
-    def poll(self) -> Health | None:
-        """How they are; None if that was told half a second ago or later. Look often."""
-        now_s = time.monotonic()
-        if now_s < self._due_s:
-            return None
-        self._due_s = now_s + _HEALTH_PERIOD_S
-        clock, losses = self._stream.recent_clock(), self._stream.losses
-        return Health(
-            rate_hz=self._stream.rate_hz if clock is None else clock.rate_hz,
-            samples=losses.samples,
-            missing=losses.missing,
-            missing_estimated=losses.missing_estimated,
-            damaged=losses.damaged,
-            overloaded=losses.overloaded,
-            free_disk_bytes=self._space.free_bytes or 0,
-            bytes_per_s=self._demand().bytes_per_s,
-        )
+    def pause_s(self, latency: Latency) -> float:
+        """How long bytes may collect in the port before each read (s)."""
+        if latency is Latency.IMMEDIATE:
+            return _AWAITING_PAUSE_S
+        return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
+
+    def wait(self, latency: Latency) -> None:
+        """Sleep until the next step is due, where reads may wait for it."""
+        if latency is not Latency.BATCHED or self._is_watched:
+            return
+        time.sleep(max(0.0, self._due_s - time.monotonic()))
+        self._due_s = time.monotonic() + _STEP_PERIOD_S
 
 
 class Engine:
@@ -126,9 +123,11 @@ class Engine:
         As connected.
     stand, gauges
         Settings in use.
+    stream, ring
+        Open; closed by the caller.
     commands, events
         The pipes to the owner.
-    is_watched : bool
+    low_latency : bool
         Somebody looks at the samples while they come.
     """
 
@@ -144,7 +143,6 @@ class Engine:
         *,
         low_latency: bool = False,
     ) -> None:
-        self._poll_schedule = PollSchedule(low_latency=low_latency)
         self._port = port
         self._stand = stand
         self._gauges = gauges
@@ -152,6 +150,7 @@ class Engine:
         self._ring = ring
         self._commands = commands
         self._events = events
+        self._poll_schedule = PollSchedule(low_latency=low_latency)
         self._rate_hz = stream.rate_hz
         self._history = ReadHistory(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
@@ -160,22 +159,22 @@ class Engine:
             lambda first: stream.time_base(first, self._history.next_index, recent=True),
         )
         self._recording: Recording | None = None
-        self._repetition = RunSequence()
+        self._sequence = RunSequence()
         self._last_slip: ObservedSlip | None = None
         self._space = FreeSpacePoller(Path(tempfile.gettempdir()))
         self._disk: DiskSpaceMonitor | None = None
-        self._health = HealthReporter(stream, self._space, self._demand)
-        self._is_asked_to_leave = False
-        self._is_leaving = False
+        self._health_due_s = 0.0
+        self._is_asked_to_quit = False
+        self._is_quitting = False
 
     def run(self) -> None:
-        """Work until told to quit, or left alone.
+        """Work until told to quit, or until the owner is gone.
 
-        Raises StreamEndedError when no more samples come. A run was ended and stored then. Raises
+        Raises StreamEndedError when no more samples come; a run was ended and stored then. Raises
         AcquisitionError, ConfigError, RunError for a run that cannot be recorded as asked.
         """
         try:
-            while not (self._is_leaving and self._recording is None):
+            while not (self._is_quitting and self._recording is None):
                 self._step()
         except StreamEndedError as error:
             self._finish(error.reason, message_of(error))
@@ -188,99 +187,86 @@ class Engine:
             self._live.stop()
             self._writer.stop()
 
-    def ask_to_leave(self) -> None:
+    def ask_to_quit(self) -> None:
         """Make `run` end a run, keep it, and return; may be called at any moment, as by a signal."""
-        self._is_asked_to_leave = True
+        self._is_asked_to_quit = True
 
     def _step(self) -> None:
-        haste = self._latency()
-        self._stream.set_read_pause(self._poll_schedule.pause_s(haste))
-        self._poll_schedule.wait(haste)
-        self._take_what_came()
+        latency = self._latency()
+        self._stream.set_read_pause(self._poll_schedule.pause_s(latency))
+        self._poll_schedule.wait(latency)
+        self._take_reads()
         self._follow_stream()
         while (command := self._commands.take()) is not None:
-            self._obey(command)
-        if self._is_asked_to_leave:
-            self._leave()
+            self._execute(command)
+        if self._is_asked_to_quit:
+            self._is_quitting = True
+            self._end_all(EndReason.STOPPED)
         elif self._commands.is_closed:
-            self._go_on_alone()
+            self._continue_alone()
         self._follow_recording()
-        self._tell_health()
+        self._send_health()
 
     def _latency(self) -> Latency:
         if self._stream.is_disconnected:
             return Latency.INTERACTIVE
         return Latency.BATCHED if self._recording is None else self._recording.latency
 
-    def _take_what_came(self) -> None:
+    def _take_reads(self) -> None:
         """Take the reads that wait; where none does, wait for one."""
-        chunks, wait_s = list[DecodedRead](), _WAIT_S
+        reads, wait_s = list[DecodedRead](), _WAIT_S
         try:
-            while len(chunks) < _READS_A_BEAT and (chunk := self._stream.next_read(wait_s)) is not None:
-                chunks.append(chunk)
+            while len(reads) < _READS_PER_STEP and (read := self._stream.next_read(wait_s)) is not None:
+                reads.append(read)
                 wait_s = 0.0
-        finally:  # what came before the end of a stream
-            self._take(chunks)
+        finally:  # also what came before the end of a stream
+            for rows in concatenate(tuple(rows for read in reads for rows in read.rows)):
+                self._ring.append(rows.counts, rows.status)
+            for read in reads:
+                self._history.add(read)
+            if self._recording is not None and reads:
+                self._recording.add(reads)
 
     def _follow_stream(self) -> None:
-        """Tell what has become of the connection, and end a run that would wait too long for it."""
-        for news in self._stream.take_events():
-            for event in engine_events(news):
-                self._events.send(event)
+        """Report what has become of the connection, and end a run that would wait too long for it."""
+        for event in self._stream.take_events():
+            if isinstance(event, DeviceLost | SearchFailed):
+                self._events.send(Reconnecting(event.message))
+            elif isinstance(event, DeviceFound):
+                self._events.send(Reconnected(event.gap_s, event.message))
             if self._recording is None:
-                self._tell_idle(news.message)
-            elif isinstance(news, DeviceFound | StreamNotice):
-                self._recording.add_note(news.message)
+                self._send_idle(event.message)
+            elif isinstance(event, DeviceFound | StreamNotice):
+                self._recording.add_note(event.message)
             else:
-                self._recording.show_note(news.message)
+                self._recording.show_note(event.message)
         fault = self._stream.fault
         if fault is not None and self._recording is not None:
             self._end_all(fault.reason, fault.message)
 
-    def _follow_disk(self) -> None:
-        """Warn of a disk that fills up, and end a run while it can still be closed."""
-        recording = self._recording
-        if recording is None or self._disk is None or recording.is_ending:
-            return
-        if (news := self._disk.update(self._space.free_bytes, recording.journal_bytes)) is None:
-            return
-        if news.must_end:
-            self._end_all(EndReason.DISK_FULL, news.note)
-        else:
-            recording.add_note(news.note)
-
-    def _take(self, chunks: list[DecodedRead]) -> None:
-        for rows in concatenate(tuple(rows for chunk in chunks for rows in chunk.rows)):
-            self._ring.append(rows.counts, rows.status)
-        for chunk in chunks:
-            self._history.add(chunk)
-        if self._recording is not None and chunks:
-            self._recording.add(chunks)
-
-    def _obey(self, command: Command) -> None:
+    def _execute(self, command: Command) -> None:
         match command:
             case Arm(run, count):
                 self._begin(run, count)
             case Stop(reason):
                 self._end_all(reason)
             case Quit():
-                self.ask_to_leave()
+                self.ask_to_quit()
             case Connect():
                 raise AcquisitionError("this engine is connected already: start another one for another port")
 
     def _begin(self, run: RunSettings, count: int) -> None:
         if self._recording is not None:
             self._recording.show_note(message("A run is being recorded already: stop it before the next one"))
-            return
-        if self._stream.is_disconnected:
+        elif self._stream.is_disconnected:
             self._refuse(
                 EndReason.DEVICE_LOST, message("the device is away: plug it in, and record when it is back")
             )
         elif self._try_to_arm(run):
-            self._repetition.begin(run, count)
+            self._sequence.begin(run, count)
 
     def _try_to_arm(self, run: RunSettings) -> bool:
-        """Arm a run; tell, and return False, when there is no place for it."""
+        """Arm a run; report it, and return False, when there is no place for it."""
         try:
             self._arm(run)
         except DiskSpaceError as error:
@@ -291,31 +277,29 @@ class Engine:
 
     def _refuse(self, reason: EndReason, message: Message) -> None:
         """End a run that has not begun; the connection stays."""
-        self._repetition.stop()
+        _log.warning("run refused (%s): %s", reason, message)
+        self._sequence.stop()
         self._events.send(RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
-        self._tell_idle()
+        self._send_idle()
 
     def _arm(self, run: RunSettings) -> None:
         check_run_settings(run)
         folder = Path(run.directory).absolute()
-        demand = self._demand()
+        demand = self._disk_demand()
         note = check_disk_space(folder, run, demand)
         metadata = build_metadata(run, self._stand, self._gauges, self._stream)
-        self._history.set_span(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
+        self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
         journal = create_run_journal(self._port, run, metadata)
         self._disk = DiskSpaceMonitor(folder, demand)
         self._space.set_folder(folder)
         if self._writer.failure is not None:
             self._writer.abandon()
             self._writer = WriterClient.start()
-        around = RecordingContext(
-            self._stream.read_queue,
-            self._history,
-            self._writer,
-            self._stream.time_base,
-            self._events.send,
+        context = RecordingContext(
+            self._stream.read_queue, self._history, self._writer, self._stream.time_base, self._events.send
         )
-        self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
+        self._recording = Recording(run, metadata, self._rate_hz, journal, context, self._last_slip)
+        _log.info("armed: series %s, trigger %s, journal %s", run.series, run.trigger, journal.path)
         self._live.prepare()
         if self._stream.note:
             self._recording.add_note(as_message(self._stream.note))
@@ -324,47 +308,41 @@ class Engine:
 
     def _end_all(self, reason: EndReason, message: Message = EMPTY) -> None:
         """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
-        self._repetition.stop()
+        self._sequence.stop()
         if self._recording is not None:
-            self._recording.end(reason, message, keep_rest=not self._repetition.is_repeat)
+            self._recording.end(reason, message, keep_rest=not self._sequence.is_repeat)
 
-    def _leave(self) -> None:
-        self._is_leaving = True
-        self._end_all(EndReason.STOPPED)
-
-    def _go_on_alone(self) -> None:
+    def _continue_alone(self) -> None:
         """The owner is gone: only a run that comes to its end by itself goes on."""
-        self._is_leaving = True
-        self._repetition.stop()
+        self._is_quitting = True
+        self._sequence.stop()
         if self._recording is not None and not self._recording.is_unattended:
             self._end_all(EndReason.INTERRUPTED, message("the program that recorded ended"))
 
     def _follow_recording(self) -> None:
-        if self._recording is not None and not self._recording.is_ending:
-            self._follow_live(self._recording)
-        ended = self._recording.poll() if self._recording is not None else None
-        if self._recording is not None and ended is not None:
-            self._live.end_run()
-            self._last_slip = self._recording.observed_slip or self._last_slip
-            self._recording = None
-            self._go_on_after(ended)
-
-    def _go_on_after(self, ended: RunEnded) -> None:
-        """Tell of a run's end, and arm the next one if it is to follow by itself."""
-        ended, following = self._repetition.next_after(ended)
+        recording = self._recording
+        if recording is None:
+            return
+        if not recording.is_ending:
+            self._follow_live(recording)
+        ended = recording.poll()
+        if ended is None:
+            return
+        _log.info(
+            "run ended (%s): %d samples in %s %s", ended.ended, ended.samples, ended.path, ended.message
+        )
+        self._live.end_run()
+        self._last_slip = recording.observed_slip or self._last_slip
+        self._recording = None
+        ended, following = self._sequence.next_after(ended)
         self._events.send(ended)
         if following is None:
-            self._tell_idle()
+            self._send_idle()
         else:
             self._try_to_arm(following)
 
-    def _tell_idle(self, note: Message = EMPTY) -> None:
-        """Nothing is recorded: tell whether anything could be."""
-        state = PullbackState.CONNECTING if self._stream.is_disconnected else PullbackState.IDLE
-        self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
-
     def _follow_live(self, recording: Recording) -> None:
-        """Hand on what the live identification says, and end a run that it says enough of."""
+        """Pass on results of the live identification, and end a run that it knows enough of."""
         now_s = self._history.next_index / self._rate_hz
         result = self._live.poll(recording.confirmed_start_index, recording.metadata, now_s)
         if result is not None:
@@ -374,34 +352,60 @@ class Engine:
 
     def _finish(self, reason: EndReason, message: Message) -> None:
         """End and store a run without any more samples."""
-        self._repetition.stop()
+        self._sequence.stop()
         if self._recording is not None:
             self._recording.end(reason, message)
         while self._recording is not None:
             time.sleep(_WAIT_S)
             self._follow_recording()
-            self._tell_health()
+            self._send_health()
 
-    def _tell_health(self) -> None:
-        health = self._health.poll()
-        if health is not None:
-            self._follow_disk()
-            self._events.send(health)
+    def _send_idle(self, note: Message = EMPTY) -> None:
+        """Nothing is recorded: report whether anything could be."""
+        state = PullbackState.CONNECTING if self._stream.is_disconnected else PullbackState.IDLE
+        self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
 
-    def _demand(self) -> DiskDemand:
+    def _send_health(self) -> None:
+        """Twice a second, check the disk and report the state of the stream."""
+        now_s = time.monotonic()
+        if now_s < self._health_due_s:
+            return
+        self._health_due_s = now_s + _HEALTH_PERIOD_S
+        self._follow_disk()
+        clock, losses = self._stream.recent_clock(), self._stream.losses
+        self._events.send(
+            Health(
+                rate_hz=self._rate_hz if clock is None else clock.rate_hz,
+                samples=losses.samples,
+                missing=losses.missing,
+                missing_estimated=losses.missing_estimated,
+                damaged=losses.damaged,
+                overloaded=losses.overloaded,
+                free_disk_bytes=self._space.free_bytes or 0,
+                bytes_per_s=self._disk_demand().bytes_per_s,
+            )
+        )
+
+    def _follow_disk(self) -> None:
+        """Warn of a disk that fills up, and end a run while it can still be closed."""
+        recording = self._recording
+        if recording is None or self._disk is None or recording.is_ending:
+            return
+        warning = self._disk.update(self._space.free_bytes, recording.journal_bytes)
+        if warning is None:
+            return
+        _log.warning("%s", warning.note)
+        if warning.must_end:
+            self._end_all(EndReason.DISK_FULL, warning.note)
+        else:
+            recording.add_note(warning.note)
+
+    def _disk_demand(self) -> DiskDemand:
         return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
 
 
 def serve(commands: CommandReader[Command], events: EventSender[Event], folder: Path) -> None:
-    """Be an engine: connect as the first command says, and work until the end.
-
-    Parameters
-    ----------
-    commands, events
-        The pipes to the owner.
-    folder : Path
-        A private one, for the ring.
-    """
+    """Connect as the first command says, and work until the end; the ring is made in `folder`."""
     connect = commands.take(timeout_s=_CONNECT_S)
     if not isinstance(connect, Connect):
         raise AcquisitionError("an engine is told what to connect to first: send Connect")
@@ -413,7 +417,7 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
         create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz, gauges) as ring,
     ):
         engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
-        signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
+        signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_quit())
         device = stream.identity
         events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
         events.send(StateChanged(PullbackState.IDLE, 0.0))
@@ -421,7 +425,7 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
 
 
 def main() -> int:
-    """Run the process. Whatever ends it early is told in one `Failed` event."""
+    """Run the process. Whatever ends it early is reported in one `Failed` event."""
     start_log("engine")
     ignore_session_signals()
     sys.setswitchinterval(_SWITCH_S)
@@ -432,9 +436,11 @@ def main() -> int:
         with live_folder() as folder:
             serve(CommandReader(0, LineDecoder(decode_command)), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
+        _log.error("engine failed: %s", error)
         events.send(Failed(message_of(error)))
         return 1
     except Exception as error:
+        _log.exception("engine failed")
         failure = message(
             "Slipstand's engine failed ({kind}: {error}). Please report this",
             kind=type(error).__name__,

@@ -18,7 +18,7 @@ from analysis.calibration.known_displacement import (
 from analysis.gauge_health import GaugeSamples
 from app.acquisition.averaged_counts import OVERLOAD_FLAGS, TIMEOUT_S, AveragedCounts, SampleStream
 from app.acquisition.errors import AcquisitionError
-from app.acquisition.stream.calibration import CalibratedBlock
+from app.runs.blocks import CalibratedBlock
 from config.schema import Gauge, GaugeCheck, Gauges
 
 

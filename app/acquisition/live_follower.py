@@ -12,9 +12,9 @@ from analysis.synthetic import Truth, simulate_record
 from app.acquisition.errors import RingError
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCommand, LiveResult, LiveValue
 from app.acquisition.ring import RingReader, RingRows, open_ring
-from app.acquisition.stream.calibration import Floats
 from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
+from app.runs.blocks import Floats
 from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 

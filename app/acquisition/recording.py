@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
@@ -16,12 +17,12 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.poll_schedule import Latency
 from app.acquisition.pullback.plan import ObservedSlip, PullbackPlan, Transition
 from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
+from app.acquisition.stream.connection import RawRead, ReadQueue
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, merge_reads
 from app.acquisition.stream.monitors import RATE_TEMPLATE, is_rate_wrong, rate_note
-from app.acquisition.stream.reads import DecodedRead, RawRead, ReadHistory, ReadQueue, merge_reads
 from app.runs.blocks import BlockLayout
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
@@ -35,6 +36,17 @@ _NOTES_MAX = 100
 """Of a run: a cable that is loose for hours says something else each time."""
 _FOLLOW_S = 0.07
 """How often a run is followed that may wait: what is done for so many samples at once costs less."""
+
+
+class Latency(Enum):
+    """How soon what comes must be followed."""
+
+    BATCHED = auto()
+    """Nobody at the stand waits for it."""
+    INTERACTIVE = auto()
+    """It may call for the operator's next step."""
+    IMMEDIATE = auto()
+    """The table is held and may be released, which must be reported at once."""
 
 
 @dataclass(frozen=True)

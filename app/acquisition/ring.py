@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.acquisition.errors import RingError
-from app.acquisition.stream.calibration import CalibratedBlock, Counts, Floats, calibrate
+from app.runs.blocks import CalibratedBlock, Counts, Floats, calibrate
 from app.runs.lock import FileLock, is_held
 from config.schema import Gauges
 from drivers.samples import SampleBlock

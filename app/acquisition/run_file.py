@@ -19,9 +19,8 @@ from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.records import Ended, Named, Opened
 from app.acquisition.journal.tap import JournalTap
 from app.acquisition.messages import EndReason
-from app.acquisition.stream.calibration import CalibratedBlock
-from app.acquisition.stream.reads import DecodedRead
-from app.runs.blocks import RunBlock, StoredRun
+from app.acquisition.stream.live_stream import DecodedRead
+from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
 from app.runs.writer_client import OpenRun

@@ -195,7 +195,7 @@ class WriterClient:
     @classmethod
     def start(cls) -> Self:
         """Start the process; it is ready some 0.3 s later, and takes requests at once."""
-        return cls(spawn("app.runs.writer_process"))
+        return cls(spawn("app.runs.writer"))
 
     @property
     def pid(self) -> int:

@@ -12,8 +12,9 @@ from app.acquisition.journal.journal import create_journal
 from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
-from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue, losses_between
+from app.acquisition.stream.connection import ReadQueue
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, losses_between
+from app.runs.blocks import calibrate
 from app.runs.metadata import create_metadata
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth

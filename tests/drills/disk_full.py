@@ -215,7 +215,7 @@ def _children(process: int) -> list[int]:
 
 
 def _is_writer(process: int) -> bool:
-    return b"app.runs.writer_process" in Path(f"/proc/{process}/cmdline").read_bytes()
+    return b"app.runs.writer" in Path(f"/proc/{process}/cmdline").read_bytes()
 
 
 @contextlib.contextmanager

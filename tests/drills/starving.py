@@ -15,7 +15,7 @@ from tests.drills.processes import descendants_of, is_alive
 
 ROLES = {
     "engine": "app.acquisition.engine",
-    "writer": "app.runs.writer_process",
+    "writer": "app.runs.writer",
     "live": "app.acquisition.live_process",
     "stand": "app.simulated_stand",
 }

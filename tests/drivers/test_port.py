@@ -20,8 +20,8 @@ from drivers.port import (
     port_info,
     port_unavailable_error,
 )
-from drivers.port_reader import PortReader, ReaderEndReason
 from drivers.source import LineSettings
+from drivers.stream import PortReader, ReaderEndReason
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError
-from drivers.port_reader import BatchedReader, read_for
+from drivers.stream import BatchedReader, read_for
 
 
 class Wire:
@@ -87,7 +87,7 @@ def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
     gathering._bytes_per_s = 100_000.0
     assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1)
     real = time.sleep
-    monkeypatch.setattr("drivers.port_reader.time.sleep", lambda span_s: real(span_s + 0.01))
+    monkeypatch.setattr("drivers.stream.time.sleep", lambda span_s: real(span_s + 0.01))
     gathering.read(Wire(*[b"ab"] * 10), 0.001)
     gathering._bytes_per_s = 100_000.0
     assert gathering._longest_delay_s() == pytest.approx(0.005, rel=0.1)

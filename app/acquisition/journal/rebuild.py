@@ -11,8 +11,7 @@ from app.acquisition.journal.records import JournalSummary, Known, Mark, Opened
 from app.acquisition.journal.replay import Replay, ReplayedReads
 from app.acquisition.messages import EndReason
 from app.acquisition.run_file import SampleStatistics, run_block
-from app.acquisition.stream.calibration import CalibratedBlock
-from app.runs.blocks import BlockLayout, StoredRun
+from app.runs.blocks import BlockLayout, CalibratedBlock, StoredRun
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, Events
 from app.runs.writer import RunWriter, create_run

@@ -9,9 +9,9 @@ import numpy as np
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.records import JournalSummary, Mark, Opened, decode_metadata_record
 from app.acquisition.messages import PortSettings
-from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.acquisition.stream.connection import create_source
-from app.acquisition.stream.reads import losses_between
+from app.acquisition.stream.live_stream import losses_between
+from app.runs.blocks import CalibratedBlock, calibrate
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.clock import Skew
 from drivers.errors import DriverError, SettingsError

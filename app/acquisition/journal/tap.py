@@ -10,7 +10,8 @@ from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.records import Known, Mark
 from app.acquisition.pullback.plan import PullbackMeasurement
-from app.acquisition.stream.reads import DecodedRead, RawRead
+from app.acquisition.stream.connection import RawRead
+from app.acquisition.stream.live_stream import DecodedRead
 from drivers.clock import TimeBase
 
 _EVERY_S = 1.0

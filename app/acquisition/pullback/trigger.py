@@ -7,8 +7,8 @@ from app.acquisition.messages import EndReason, PullbackState, RunSettings, Stan
 from app.acquisition.pullback.operator_messages import no_room_note
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
 from app.acquisition.pullback.state_machine import PullbackStateMachine
-from app.acquisition.stream.calibration import CalibratedBlock
-from app.acquisition.stream.reads import ReadHistory
+from app.acquisition.stream.live_stream import ReadHistory
+from app.runs.blocks import CalibratedBlock
 from messages.message import EMPTY, Message
 
 _CONTEXT_S = 1.0

@@ -1,44 +1,99 @@
-"""One connection to a device: an open port, read by a thread of its own until it ends."""
+"""One connection to a device: an open port, the thread that reads it, and the queue of its reads."""
 
+import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 from app.acquisition.messages import PortSettings
-from app.acquisition.stream.reads import ReadQueue
-from drivers.errors import DriverError, SettingsError
+from drivers.errors import DriverError, QueueFullError, SettingsError
 from drivers.host_time import host_ns
-from drivers.pair.link import PairLink, open_pair
+from drivers.pair.link import open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import OpenPort, PortConfig, PortInfo
-from drivers.port_reader import PortReader, ReaderEnd, read_for
 from drivers.registry import find_driver
 from drivers.source import CancellableLink, SampleSource
-from messages.message import message
+from drivers.stream import PortReader, ReaderEnd, read_for
+
+_log = logging.getLogger(__name__)
+
+_WAITING_READS = 4096
+"""Reads that may wait to be decoded: 16 s at 250 reads a second, longer than a busy host stands still."""
 
 
-class PortOpener(Protocol):
-    """How to come to an open port, and to that of the same device again."""
+@dataclass(frozen=True, slots=True)
+class RawRead:
+    """Bytes of one read, and the host's time after it (ns); no bytes where the link was broken."""
 
-    def open(self) -> OpenPort:
-        """Open it. Raises DriverError."""
+    arrival_ns: int
+    data: bytes
 
-    def reopen(self) -> OpenPort:
-        """Open that of the device that was opened before. Raises DriverError while it is not there."""
+
+Tap: TypeAlias = Callable[[RawRead], None]
+"""Takes each read in the thread that reads the port: must neither wait nor raise."""
+
+
+class ReadQueue:
+    """Holds reads until they are decoded, over all connections of a stream. A tap gets each at once."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[RawRead] = deque()
+        self._changed = threading.Condition(threading.Lock())
+        self._tap: Tap | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether all reads were taken."""
+        return not self._waiting
+
+    def put(self, arrival_ns: int, data: bytes) -> None:
+        """Add a read. Raises QueueFullError when thousands wait; the tap has this one too."""
+        read = RawRead(arrival_ns, data)
+        with self._changed:
+            if self._tap is not None:
+                self._tap(read)
+            if len(self._waiting) >= _WAITING_READS:
+                raise QueueFullError(
+                    "this computer is too slow: {reads} reads wait to be decoded. Close other programs",
+                    reads=_WAITING_READS,
+                )
+            self._waiting.append(read)
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> RawRead | None:
+        """Oldest read that waits; None when nothing comes in time."""
+        with self._changed:
+            if not self._waiting:
+                self._changed.wait(timeout_s)
+            return self._waiting.popleft() if self._waiting else None
+
+    def open_tap(self, tap: Tap, earlier: Iterable[RawRead] = ()) -> None:
+        """Give all reads to `tap` from now on, preceded by `earlier` ones and those that wait."""
+        with self._changed:
+            for read in (*earlier, *self._waiting):
+                tap(read)
+            self._tap = tap
+
+    def close_tap(self) -> None:
+        """Give nothing to the tap any more; no call of it is under way when this returns."""
+        with self._changed:
+            self._tap = None
 
 
 def create_source(
     settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
-    """Source of the device, or of both. Raises SettingsError if it cannot be.
+    """Create the source of the device, or of both devices. Raises SettingsError.
 
     Parameters
     ----------
+    settings : PortSettings
     rate_hz : float or None
         Rows a second, asked for or of an earlier recording.
     facts : mapping, optional
-        What an earlier recording noted of its device's settings; it tells the rates of two devices.
+        Device settings noted by an earlier recording; they hold the rates of two devices.
     """
     protocol = find_driver(settings.protocol)
     if settings.relative_url:
@@ -46,63 +101,46 @@ def create_source(
     source = protocol.make_source(settings.device, rate_hz)
     if source.channels == 1:
         raise SettingsError(
-            message(
-                "{protocol} is set to one gauge, and two are recorded: give the port of the other device"
-                " too, with --relative-port",
-                protocol=settings.protocol,
-            )
+            "{protocol} is set to one gauge, and two are recorded: give the port of the other device"
+            " too, with --relative-port",
+            protocol=settings.protocol,
         )
     return source
 
 
-def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
-    """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
-    baud = settings.baud or find_driver(settings.protocol).default_baud_for(settings.device)
-    choice = PortConfig(settings.url, baud, settings.parity)
-    if not isinstance(source, PairSource):
-        return _Single(choice)
-    if settings.relative_url == settings.url:
-        raise SettingsError(
-            message("both gauges are said to be at {url}: give the port of each device", url=settings.url)
-        )
-    return _Pair((choice, PortConfig(settings.relative_url, baud, settings.parity)), source)
+class PortOpener:
+    """Opens the port of a device, or the ports of two; from the second time on, those of the same devices.
 
+    Raises SettingsError where both gauges are said to be at one port.
+    """
 
-@dataclass(slots=True)
-class _Single:
-    choice: PortConfig
-    opened: PortInfo | None = None
+    def __init__(self, settings: PortSettings, source: SampleSource) -> None:
+        baud = settings.baud or find_driver(settings.protocol).default_baud_for(settings.device)
+        self._source = source
+        self._config = PortConfig(settings.url, baud, settings.parity)
+        self._second = PortConfig(settings.relative_url, baud, settings.parity)
+        self._opened: tuple[PortInfo, PortInfo] | None = None
+        if isinstance(source, PairSource) and settings.relative_url == settings.url:
+            raise SettingsError(
+                "both gauges are said to be at {url}: give the port of each device", url=settings.url
+            )
 
     def open(self) -> OpenPort:
-        port = self.choice.open()
-        self.opened = port.info
+        """Open it. Raises DriverError while it, or the device that was there before, is not there."""
+        if isinstance(self._source, PairSource):
+            first, second = self._source.channel_sources
+            link = open_pair((self._config, self._second), (first.source, second.source), self._opened)
+            self._opened = self._opened or link.infos
+            return link
+        if self._opened is not None:
+            return self._config.reopen(self._opened[0])
+        port = self._config.open()
+        self._opened = (port.info, port.info)
         return port
-
-    def reopen(self) -> OpenPort:
-        return self.open() if self.opened is None else self.choice.reopen(self.opened)
-
-
-@dataclass(slots=True)
-class _Pair:
-    choices: tuple[PortConfig, PortConfig]
-    source: PairSource
-    opened: tuple[PortInfo, PortInfo] | None = None
-
-    def open(self) -> OpenPort:
-        return self._opened(None)
-
-    def reopen(self) -> OpenPort:
-        return self._opened(self.opened)
-
-    def _opened(self, lost: tuple[PortInfo, PortInfo] | None) -> PairLink:
-        first, second = self.source.channel_sources
-        link = open_pair(self.choices, (first.source, second.source), lost)
-        self.opened = self.opened or link.infos
-        return link
 
 
 class Connection:
-    """A device that is being read.
+    """A device that is being read, until its reader ends.
 
     Parameters
     ----------
@@ -111,9 +149,9 @@ class Connection:
     source : SampleSource
         Of the device, started.
     first : bytes
-        What of the stream was read already.
-    intake : Intake
-        Gets that, and all that is read.
+        Part of the stream that was read already.
+    read_queue : ReadQueue
+        Receives that, and everything that is read.
     """
 
     def __init__(self, port: OpenPort, source: SampleSource, first: bytes, read_queue: ReadQueue) -> None:
@@ -122,81 +160,82 @@ class Connection:
         self.last_poll_ns = self.start_ns
         """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
-        self._intake = read_queue
+        self._queue = read_queue
         self._ended: ReaderEnd | None = None
         if first:
             read_queue.put(self.start_ns, first)
-        self._reader = PortReader(self._read, read_queue.put, self._end)
+        _log.info("%s opened", port.info.identity)
+        self._reader = PortReader(self._read, read_queue.put, self._on_end)
         self._reader.start()
 
     @property
     def ended(self) -> ReaderEnd | None:
-        """Why no more will come, once all that came has been taken."""
-        return self._ended if self._intake.is_empty else None
+        """Why no more will come, once all reads were taken."""
+        return self._ended if self._queue.is_empty else None
 
     def close(self, *, stop_device: bool = False) -> None:
-        """Give the port up, with or without a word to the device."""
+        """Close the port; the device may be told to stop before that."""
         self._reader.stop()
         if stop_device:
             self._source.stop(self.port)
         self.port.close()
+        _log.info("%s closed", self.port.info.identity)
 
     def _read(self) -> bytes:
         data = read_for(lambda: self._source.read(self.port), self._source.batch_delay_s)
         self.last_poll_ns = host_ns()
         return data
 
-    def _end(self, ended: ReaderEnd) -> None:
+    def _on_end(self, ended: ReaderEnd) -> None:
         self._ended = ended
 
 
 _OFTEN_S = 0.2
+"""Between two attempts at first: a cable that was loose is back soon."""
 _SELDOM_S = 1.0
 _OFTEN_UNTIL_S = 30.0
 _UNWATCHED_S = 1.0
-"""Who has not looked for so long got no processor, and nor did the search."""
+"""A caller that has not looked for so long got no processor time, and nor did the search."""
 
 
 class Reconnection:
-    """A search that has begun.
+    """A search for a lost device, in a thread of its own.
 
     Parameters
     ----------
-    reopen : callable
+    open_port : callable
         Opens the port of the device, wherever it is now. Raises DriverError while it is not there.
     source : SampleSource
         Of the device; nobody else uses it meanwhile.
-    intake : Intake
-        Gets a read of no bytes, which says that the link was broken, and then what the new connection brings.
+    read_queue : ReadQueue
+        Receives a read of no bytes, which marks the broken link, and then those of the new connection.
     """
 
-    def __init__(self, reopen: Callable[[], OpenPort], source: SampleSource, intake: ReadQueue) -> None:
+    def __init__(
+        self, open_port: Callable[[], OpenPort], source: SampleSource, read_queue: ReadQueue
+    ) -> None:
+        self.failure: Exception | None = None
+        """Why the latest attempt failed; None while the first one is under way."""
         self._began_ns = self._watched_ns = host_ns()
         self._watched_s = 0.0
-        self._reopen = reopen
+        self._open_port = open_port
         self._source = source
-        self._intake = intake
-        self._failure: Exception | None = None
+        self._queue = read_queue
         self._connection: Connection | None = None
         self._is_done = threading.Event()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._search, name="reconnection", daemon=True)
         self._thread.start()
 
-    @property
-    def failure(self) -> Exception | None:
-        """Why the latest attempt failed; None while the first one is under way."""
-        return self._failure
-
     def elapsed_s(self) -> float:
-        """How long it has gone on (s), but for what this computer slept or stood still. Ask often."""
+        """Duration (s), without the time that this computer slept or stood still. Ask often."""
         before_ns, self._watched_ns = self._watched_ns, host_ns()
         passed_s = (self._watched_ns - before_ns) * 1e-9
         self._watched_s += passed_s if passed_s < _UNWATCHED_S else 0.0
         return self._watched_s
 
     def take(self, timeout_s: float) -> Connection | None:
-        """The new connection once there is one, which belongs to the caller then."""
+        """Return the new connection once there is one; it belongs to the caller then."""
         if not self._is_done.wait(timeout_s):
             return None
         connection, self._connection = self._connection, None
@@ -215,14 +254,11 @@ class Reconnection:
             try:
                 self._connection = self._attempt()
             except DriverError as error:
-                self._failure = error
-            except Exception as error:  # a search that dies unseen would be a device lost for ever
-                self._failure = DriverError(
-                    message(
-                        "looking for the device failed ({kind}: {error})",
-                        kind=type(error).__name__,
-                        error=error,
-                    )
+                self.failure = error
+            except Exception as error:  # a search that dies unseen would lose the device for ever
+                _log.exception("looking for the device failed")
+                self.failure = DriverError(
+                    "looking for the device failed ({kind}: {error})", kind=type(error).__name__, error=error
                 )
             else:
                 self._is_done.set()
@@ -230,11 +266,11 @@ class Reconnection:
             self._stopping.wait(_OFTEN_S if host_ns() - self._began_ns < _OFTEN_UNTIL_S * 1e9 else _SELDOM_S)
 
     def _attempt(self) -> Connection:
-        port = self._reopen()
+        port = self._open_port()
         try:
             first = self._source.resume(CancellableLink(port, self._stopping))
-            self._intake.put(host_ns(), b"")
-            return Connection(port, self._source, first, self._intake)
+            self._queue.put(host_ns(), b"")
+            return Connection(port, self._source, first, self._queue)
         except BaseException:
             port.close()
             raise

@@ -1,34 +1,126 @@
-"""The device's bytes, decoded and calibrated, over as many connections as a loose cable makes of it."""
+"""The device's samples, decoded and calibrated, over as many connections as a loose cable makes of it."""
 
+import logging
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from types import TracebackType
 from typing import Self, TypeAlias
 
+import numpy as np
+
 from app.acquisition.errors import StreamEndedError
-from app.acquisition.messages import EndReason, Event, PortSettings, Reconnected, Reconnecting
-from app.acquisition.stream.calibration import CalibratedBlock, calibrate
-from app.acquisition.stream.connection import Connection, Reconnection, create_opener, create_source
+from app.acquisition.messages import EndReason, PortSettings
+from app.acquisition.stream.connection import (
+    Connection,
+    PortOpener,
+    RawRead,
+    ReadQueue,
+    Reconnection,
+    create_source,
+)
 from app.acquisition.stream.monitors import RateMonitor, StallDetector
-from app.acquisition.stream.reads import DecodedRead, RawRead, ReadQueue, losses_between
+from app.runs.blocks import CalibratedBlock, calibrate
 from config.schema import Gauges
 from drivers.clock import ClockEstimate, TimeBase
 from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostMonitor
+from drivers.packets import MAX_BLOCK_ROWS
 from drivers.port import OpenPort
-from drivers.port_reader import ReaderEndReason
 from drivers.samples import DeviceIdentity, Losses
 from drivers.source import SampleSource
+from drivers.stream import ReaderEndReason
 from messages.message import EMPTY, Message, as_message, message, message_of
+
+_log = logging.getLogger(__name__)
 
 PATIENCE_S = 10.0
 """A run waits so long for a lost device; the search goes on."""
+_BYTES_PER_SAMPLE = 25.0
+"""A line of text with its time and two readings; assumed before anything has come."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DecodedRead:
+    """One read of the port, or several consecutive ones, with the samples that they completed."""
+
+    data: bytes
+    """As they came."""
+    arrival_ns: int
+    """Host's monotonic time after the read."""
+    rows: tuple[CalibratedBlock, ...]
+    """In order, without holes."""
+    losses: Losses
+    """What this read added to the losses of the stream."""
+
+
+def concatenate(parts: tuple[CalibratedBlock, ...]) -> tuple[CalibratedBlock, ...]:
+    """Join consecutive rows; they stay as they are where there is nothing to join, or a long gap between."""
+    if len(parts) < 2 or parts[-1].end_index - parts[0].first_index > MAX_BLOCK_ROWS:
+        return parts
+    columns = (
+        np.concatenate([getattr(rows, name) for rows in parts])
+        for name in ("counts", "readings", "relative_m", "status")
+    )
+    return (CalibratedBlock(parts[0].first_index, *columns),)
+
+
+def merge_reads(reads: Sequence[DecodedRead]) -> DecodedRead:
+    """Join one or more consecutive reads."""
+    if len(reads) == 1:
+        return reads[0]
+    rows = tuple(rows for read in reads for rows in read.rows)
+    losses = Losses(**{f.name: sum(getattr(read.losses, f.name) for read in reads) for f in fields(Losses)})
+    data = b"".join(read.data for read in reads)
+    return DecodedRead(data, reads[-1].arrival_ns, concatenate(rows), losses)
+
+
+def losses_between(after: Losses, before: Losses) -> Losses:
+    """Difference of two counts of losses."""
+    return Losses(**{f.name: getattr(after, f.name) - getattr(before, f.name) for f in fields(Losses)})
+
+
+class ReadHistory:
+    """Reads of the last `span` samples, from which a run takes what came before its release."""
+
+    def __init__(self, span: int) -> None:
+        self.span = span
+        self._reads: deque[DecodedRead] = deque()
+        self.next_index = 0
+        """Index of the sample that comes next."""
+
+    def add(self, read: DecodedRead) -> None:
+        """Add the latest read and forget those that have become too old."""
+        self._reads.append(read)
+        if read.rows:
+            self.next_index = read.rows[-1].end_index
+        while len(self._reads) > 1 and _end_index(self._reads[0]) < self.next_index - self.span:
+            self._reads.popleft()
+
+    @property
+    def bytes_per_sample(self) -> float:
+        """Bytes that the device sends for each sample."""
+        samples = self.next_index - self.first_index
+        return sum(len(read.data) for read in self._reads) / samples if samples else _BYTES_PER_SAMPLE
+
+    @property
+    def first_index(self) -> int:
+        """Index of the oldest sample that is kept."""
+        return next((read.rows[0].first_index for read in self._reads if read.rows), self.next_index)
+
+    def reads(self, first_index: int = -1) -> Iterator[DecodedRead]:
+        """Reads that are kept, oldest first; only those with samples from `first_index` on, where given."""
+        return (read for read in self._reads if _end_index(read) > first_index or first_index < 0)
+
+
+def _end_index(read: DecodedRead) -> int:
+    """Index after the last sample of a read; reads that completed none go with the next one that did."""
+    return read.rows[-1].end_index if read.rows else -1
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceLost:
-    """The device is gone, or says nothing intelligible: it is looked for from now on."""
+    """The device is gone, or sends nothing intelligible: it is looked for from now on."""
 
     reason: EndReason
     message: Message
@@ -38,21 +130,21 @@ class DeviceLost:
 
 @dataclass(frozen=True, slots=True)
 class SearchFailed:
-    """It is not found, for another reason than before."""
+    """The device was not found, for another reason than before."""
 
     message: Message
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceFound:
-    """It is back at `url`, and samples of `gap_s` are missing."""
+    """The device is back at `url`, and samples of `gap_s` are missing."""
 
     url: str
     gap_s: float
 
     @property
     def message(self) -> Message:
-        """In a sentence."""
+        """What has happened."""
         return message(
             "the device was away and is back at {port}: {gap_s:.2f} s are missing and marked",
             port=self.url,
@@ -62,7 +154,7 @@ class DeviceFound:
 
 @dataclass(frozen=True, slots=True)
 class StreamNotice:
-    """Samples come, but something is to be said of them, or of this computer."""
+    """A remark on the samples that come, or on this computer."""
 
     message: Message
 
@@ -72,35 +164,26 @@ StreamEvent: TypeAlias = DeviceLost | SearchFailed | DeviceFound | StreamNotice
 
 @dataclass(frozen=True, slots=True)
 class StreamFault:
-    """Why a run must end that waits for samples."""
+    """Why a run that waits for samples must end."""
 
     reason: EndReason
     message: Message
-
-
-def engine_events(news: StreamEvent) -> tuple[Event, ...]:
-    """What to tell the owner of the engine."""
-    match news:
-        case DeviceLost() | SearchFailed():
-            return (Reconnecting(news.message),)
-        case DeviceFound():
-            return (Reconnected(news.gap_s, news.message),)
-        case StreamNotice():
-            return ()
 
 
 class LiveStream:
     """A device that sends; make it with `open_stream`, use it with `with` or `close`.
 
     When the device is lost, or sends nothing intelligible for a while, it is looked for until it is back.
-    `take_news` tells of it, and `fault` whether a run should still wait.
+    `take_events` reports it, and `fault` tells whether a run should still wait.
 
     Parameters
     ----------
     connection : Connection
-        Brings its reads to `intake`.
+        Puts its reads into `read_queue`.
     source : SampleSource
         Started.
+    read_queue : ReadQueue
+    gauges : Gauges
     reopen : callable
         Opens the port of the same device again. Raises DriverError while it is not there.
     """
@@ -114,7 +197,11 @@ class LiveStream:
         reopen: Callable[[], OpenPort],
     ) -> None:
         self.read_queue = read_queue
-        """Where reads wait to be decoded; a journal may have them before that."""
+        """Where reads wait to be decoded; a journal may take them before that."""
+        self.losses = Losses()
+        """Of the whole stream until now."""
+        self.rate_hz = source.rate_hz
+        """Nominal samples a second."""
         self._connection: Connection | None = connection
         self._source = source
         self._gauges = gauges
@@ -123,11 +210,10 @@ class LiveStream:
         self._search: Reconnection | None = None
         self._is_returning = False
         self._lost = DeviceLost(EndReason.DEVICE_LOST, EMPTY)
-        self._silence = StallDetector(self._port.device, source, connection.start_ns)
-        self._losses = Losses()
-        self._pace = RateMonitor(source.rate_hz)
+        self._stall_detector = StallDetector(self._port.device, source, connection.start_ns)
+        self._rate_monitor = RateMonitor(source.rate_hz)
         self._host = HostMonitor()
-        self._news: deque[StreamEvent] = deque()
+        self._events: deque[StreamEvent] = deque()
 
     @property
     def identity(self) -> DeviceIdentity:
@@ -140,19 +226,9 @@ class LiveStream:
         return self._port.identity
 
     @property
-    def rate_hz(self) -> float:
-        """Nominal samples a second."""
-        return self._source.rate_hz
-
-    @property
     def note(self) -> str:
-        """What every run of the device must say of itself; "" for most."""
+        """Remark that belongs into every run of the device; "" for most."""
         return str(self._source.run_note)
-
-    @property
-    def losses(self) -> Losses:
-        """The account of the whole stream until now."""
-        return self._losses
 
     @property
     def is_disconnected(self) -> bool:
@@ -164,67 +240,62 @@ class LiveStream:
         """Why a run should not wait any longer for a device that is away; None while it should."""
         if self._search is None:
             return None
-        failure, lost = self._search.failure, self._lost
-        is_hopeless = lost.reason is EndReason.STALLED and isinstance(failure, NoDataError)
-        if not is_hopeless and self._search.elapsed_s() < PATIENCE_S:
-            return None
-        if is_hopeless:
+        lost, missing_s = self._lost, self._stall_detector.silent_s()
+        if lost.reason is EndReason.STALLED and isinstance(self._search.failure, NoDataError):
             end = message(
                 "{cause}; beginning anew did not help, and the last {missing_s:.1f} s of the run are missing",
                 cause=lost.message,
-                missing_s=self._silence.silent_s(),
+                missing_s=missing_s,
             )
-        else:
+        elif self._search.elapsed_s() >= PATIENCE_S:
             end = message(
                 "{cause}; it was not back within {waited_s:g} s, and the last {missing_s:.1f} s of the"
                 " run are missing",
                 cause=lost.message,
                 waited_s=PATIENCE_S,
-                missing_s=self._silence.silent_s(),
+                missing_s=missing_s,
             )
+        else:
+            return None
         return StreamFault(lost.reason, end)
 
-    def clock(self) -> ClockEstimate | None:
-        """How the device's clock goes by the host's; None while that cannot be told."""
-        return self._pace.estimate()
-
     def recent_clock(self) -> ClockEstimate | None:
-        """As `clock`, or as that was up to a second ago."""
-        return self._pace.recent()
+        """Rate of the device's clock by the host's, up to a second old; None while it is not known."""
+        return self._rate_monitor.recent()
 
     def time_base(self, first_index: int, end_index: int, *, recent: bool = False) -> TimeBase:
         """Time base of the samples first_index <= index < end_index; `recent` as in `recent_clock`."""
-        clock = self.recent_clock() if recent else self.clock()
+        clock = self._rate_monitor.recent() if recent else self._rate_monitor.estimate()
         return TimeBase.from_estimates(clock, self._source.skew(first_index, end_index))
 
     def take_events(self) -> list[StreamEvent]:
         """What has happened to the stream since the last call."""
-        news = list(self._news)
-        self._news.clear()
-        return news
+        events = list(self._events)
+        self._events.clear()
+        return events
 
     def next_read(self, timeout_s: float) -> DecodedRead | None:
-        """What was read since the last call, with its samples; None when nothing came within `timeout_s`.
+        """Decode the next read; None when nothing came within `timeout_s`.
 
-        A chunk without data says that the connection was broken before what comes next. Raises
+        A read without data marks that the connection was broken before what comes next. Raises
         StreamEndedError when this computer is too slow to take what comes, or what comes makes no sense.
         """
-        self._news.extend(StreamNotice(as_message(note)) for note in self._host.check())
+        self._events.extend(StreamNotice(as_message(note)) for note in self._host.check())
         if self._connection is None:
             self._look_for_device(timeout_s)
         if self._connection is None:
             return None
         read = self.read_queue.take(timeout_s)
-        chunk = None if read is None else self._chunk(read)
+        decoded = None if read is None else self._decode(read)
         self._check(self._connection, is_all_taken=read is None)
-        return chunk
+        return decoded
 
     def set_read_pause(self, pause_s: float) -> None:
-        """Let bytes gather in the port for so long before each read (s): cheaper, and so much later."""
+        """Let bytes collect in the port for so long before each read (s): cheaper, and so much later."""
         self._source.batch_delay_s = pause_s
 
     def close(self) -> None:
-        """Stop the device and give the port up."""
+        """Stop the device and close the port."""
         if self._search is not None:
             self._search.stop()
         if self._connection is not None:
@@ -238,34 +309,33 @@ class LiveStream:
     ) -> None:
         self.close()
 
-    def _chunk(self, read: RawRead) -> DecodedRead:
-        arrival_ns, data = read.arrival_ns, read.data
-        rows = self._decoded(data, arrival_ns)
-        self._news.extend(StreamNotice(as_message(note)) for note in self._source.take_warnings())
-        before, self._losses = self._losses, replace(self._source.losses)
-        added = losses_between(self._losses, before)
+    def _decode(self, read: RawRead) -> DecodedRead:
+        try:
+            blocks = list(self._source.decode(read.data, read.arrival_ns))
+        except DriverError as error:
+            _log.error("the stream cannot be decoded: %s", error)
+            raise StreamEndedError(EndReason.DEVICE_LOST, message_of(error)) from error
+        rows = tuple(calibrate(block, self._gauges) for block in blocks)
+        self._events.extend(StreamNotice(as_message(note)) for note in self._source.take_warnings())
+        before, self.losses = self.losses, replace(self._source.losses)
+        added = losses_between(self.losses, before)
         if added.restarts:
-            self._pace.restart()
+            self._rate_monitor.restart()
         if rows:
-            self._tell_of_rows(rows[-1].end_index - 1, arrival_ns, added)
-        self._silence.add_read(arrival_ns, data, is_sense=bool(rows))
-        return DecodedRead(data, arrival_ns, rows, added)
+            self._on_rows(rows[-1].end_index - 1, read.arrival_ns, added)
+        self._stall_detector.add_read(read.arrival_ns, read.data, is_sense=bool(rows))
+        return DecodedRead(read.data, read.arrival_ns, rows, added)
 
-    def _tell_of_rows(self, last_index: int, arrival_ns: int, added: Losses) -> None:
+    def _on_rows(self, last_index: int, arrival_ns: int, added: Losses) -> None:
         if self._is_returning and self._connection is not None:
             self._is_returning = False
             absent = added.missing + added.missing_estimated + added.damaged
-            self._news.append(DeviceFound(self._connection.port.url, absent / self.rate_hz))
-        note = self._pace.add(last_index, arrival_ns)
+            found = DeviceFound(self._connection.port.url, absent / self.rate_hz)
+            _log.info("reconnected: %s", found.message)
+            self._events.append(found)
+        note = self._rate_monitor.add(last_index, arrival_ns)
         if note:
-            self._news.append(StreamNotice(note))
-
-    def _decoded(self, data: bytes, arrival_ns: int) -> tuple[CalibratedBlock, ...]:
-        try:
-            blocks = list(self._source.decode(data, arrival_ns))
-        except DriverError as error:
-            raise StreamEndedError(EndReason.DEVICE_LOST, message_of(error)) from error
-        return tuple(calibrate(block, self._gauges) for block in blocks)
+            self._events.append(StreamNotice(note))
 
     def _check(self, connection: Connection, *, is_all_taken: bool) -> None:
         ended = connection.ended
@@ -274,46 +344,42 @@ class LiveStream:
                 raise StreamEndedError(EndReason.WRITE_ERROR, as_message(ended.message))
         elif ended is not None:
             self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, as_message(ended.message)))
-        elif self._silence.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
-            self._lose(connection, DeviceLost(EndReason.STALLED, self._silence.message()))
+        elif self._stall_detector.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
+            self._lose(connection, DeviceLost(EndReason.STALLED, self._stall_detector.message()))
 
     def _lose(self, connection: Connection, lost: DeviceLost) -> None:
+        _log.warning("device lost (%s): %s", lost.reason, lost.message)
         connection.close()
         self._connection, self._lost = None, lost
-        self._news.append(lost)
+        self._events.append(lost)
         self._search = Reconnection(self._reopen, self._source, self.read_queue)
 
     def _look_for_device(self, timeout_s: float) -> None:
-        search = self._search
-        connection = search.take(timeout_s) if search is not None else None
-        if search is None or connection is None:
-            self._tell_of(search)
+        if self._search is None:
             return
-        self._search, self._connection, self._is_returning = None, connection, True
-        self._silence.restart(connection.start_ns)
-
-    def _tell_of(self, search: Reconnection | None) -> None:
-        failure = search.failure if search is not None else None
-        if failure is not None and message_of(failure) != self._lost.tried:
-            self._lost = replace(self._lost, tried=message_of(failure))
-            self._news.append(SearchFailed(message_of(failure)))
+        connection = self._search.take(timeout_s)
+        if connection is not None:
+            self._search, self._connection, self._is_returning = None, connection, True
+            self._stall_detector.restart(connection.start_ns)
+        elif (error := self._search.failure) is not None and message_of(error) != self._lost.tried:
+            self._lost = replace(self._lost, tried=message_of(error))
+            _log.warning("not found: %s", error)
+            self._events.append(SearchFailed(message_of(error)))
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     """Open the port, start the device and begin to read; both, where there are two.
 
-    Raises
-    ------
-    DriverError
-        Unknown protocol or setting, no such port, busy port, or nothing intelligible within 3 s.
+    Raises DriverError for an unknown protocol or setting, a port that is absent or busy, or a device that
+    sends nothing intelligible within 3 s.
     """
     source = create_source(settings, settings.rate_hz)
-    opening = create_opener(settings, source)
+    opener = PortOpener(settings, source)
     source.prepare()
-    port, intake = opening.open(), ReadQueue()
+    port, read_queue = opener.open(), ReadQueue()
     try:
-        connection = Connection(port, source, source.start(port), intake)
+        connection = Connection(port, source, source.start(port), read_queue)
     except BaseException:
         port.close()
         raise
-    return LiveStream(connection, source, intake, gauges, opening.reopen)
+    return LiveStream(connection, source, read_queue, gauges, opener.open)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.acquisition.poll_schedule import Latency, PollSchedule
+from app.acquisition.engine import Latency, PollSchedule
 
 
 class Clock:
@@ -23,7 +23,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("app.acquisition.poll_schedule.time", clock)
+    monkeypatch.setattr("app.acquisition.engine.time", clock)
     return clock
 
 

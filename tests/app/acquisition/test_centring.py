@@ -18,7 +18,7 @@ from app.acquisition.pullback.plan import (
     default_excursion,
 )
 from app.acquisition.pullback.trigger import create_trigger
-from app.acquisition.stream.reads import ReadHistory
+from app.acquisition.stream.live_stream import ReadHistory
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_stand, published_table

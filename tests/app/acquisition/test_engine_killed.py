@@ -25,7 +25,7 @@ def test_a_killed_writer_ends_the_run_of_which_nothing_is_lost(tmp_path):
         engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
         until(engine, RunStarted)
         time.sleep(0.3)
-        (writer,) = [pid for pid in children_of(engine.process_id) if b"writer_process" in command_of(pid)]
+        (writer,) = [pid for pid in children_of(engine.process_id) if b"runs.writer" in command_of(pid)]
         os.kill(writer, signal.SIGKILL)
         ended = until(engine, RunEnded)
         assert ended.ended is EndReason.WRITE_ERROR
@@ -100,7 +100,7 @@ def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
         assert owner.stdout.readline() == "armed\n"
         running = descendants_of(owner.pid)
         said = b" ".join(command_of(pid) for pid in running)
-        for module in (b"simulated_stand", b"acquisition.engine", b"writer_process", b"validator_process"):
+        for module in (b"simulated_stand", b"acquisition.engine", b"runs.writer", b"validator_process"):
             assert module in said
         owner.kill()
     assert all(gone(process_id, patience_s=30.0) for process_id in running)

@@ -12,8 +12,8 @@ from test_long_run_memory import RATE_HZ, READ_NS, Connection, frames
 from app.acquisition.engine import Engine
 from app.acquisition.messages import Arm, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
+from app.acquisition.stream.connection import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
-from app.acquisition.stream.reads import ReadQueue
 from app.runs.reader import open_run
 from config.files import load_gauges, load_stand
 from drivers.devices.slipstand_binary.source import make_source

@@ -7,8 +7,8 @@ import pytest
 
 from app.acquisition import gauge_check
 from app.acquisition.gauge_check import NoSamplesError, collect_samples, gauge_samples
-from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.reads import DecodedRead
+from app.acquisition.stream.live_stream import DecodedRead
+from app.runs.blocks import calibrate
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

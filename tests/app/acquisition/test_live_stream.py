@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from app.acquisition.messages import EndReason
-from app.acquisition.stream.connection import Connection
+from app.acquisition.stream.connection import Connection, ReadQueue
 from app.acquisition.stream.live_stream import DeviceFound, DeviceLost, LiveStream, SearchFailed, StreamNotice
-from app.acquisition.stream.reads import ReadQueue
 from config.files import load_gauges
 from drivers.devices.slipstand_binary.codec import encode_frames
 from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_source
@@ -257,7 +256,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
         listener.listen_for(0.5)
     (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
     assert "instead of 1000: check its rate" in str(noticed.message)
-    assert listener.stream.clock().rate_hz == pytest.approx(1050.0, rel=0.01)
+    assert listener.stream.recent_clock().rate_hz == pytest.approx(1050.0, rel=0.01)
 
 
 def test_a_stream_that_is_closed_while_its_device_is_away_leaves_nothing(device, listener):

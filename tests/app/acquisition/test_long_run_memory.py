@@ -23,8 +23,8 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.acquisition.ring import create_ring
+from app.acquisition.stream.connection import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
-from app.acquisition.stream.reads import ReadQueue
 from app.runs.blocks import StoredRun
 from config.files import load_gauges, load_stand
 from drivers.devices.slipstand_binary.codec import encode_frames

@@ -22,9 +22,9 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.acquisition.recording import Recording, RecordingContext
-from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue
-from app.runs.blocks import StoredRun
+from app.acquisition.stream.connection import ReadQueue
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory
+from app.runs.blocks import StoredRun, calibrate
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.metadata import create_metadata

@@ -9,8 +9,8 @@ import pytest
 from app.acquisition.averaged_counts import CountAverager, NoAverageError, compute_average
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason
-from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.reads import DecodedRead
+from app.acquisition.stream.live_stream import DecodedRead
+from app.runs.blocks import calibrate
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

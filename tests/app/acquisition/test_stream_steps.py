@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from app.acquisition.pullback.averages import BinAverager
 from app.acquisition.pullback.stationarity import SlidingWindow, fit_parabola_start, noise_m, stationary_level
-from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.reads import DecodedRead, ReadHistory, losses_between
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, losses_between
+from app.runs.blocks import calibrate
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

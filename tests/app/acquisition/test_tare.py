@@ -14,10 +14,9 @@ import pytest
 from pullback_kit import follow, recording
 
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan
-from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.runs.analysis_json import zero_warnings
 from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
-from app.runs.blocks import RunBlock
+from app.runs.blocks import CalibratedBlock, RunBlock, calibrate
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.options import Timetable

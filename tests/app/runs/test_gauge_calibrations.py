@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.acquisition.stream.calibration import calibrate
 from app.runs.analysis_json import calibration_warnings
+from app.runs.blocks import calibrate
 from app.runs.edits import edit_run
 from app.runs.reader import load_counts, open_run
 from app.runs.saved_analyses import metadata_hash

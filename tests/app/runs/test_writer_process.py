@@ -207,7 +207,7 @@ def _append_until_full(client, taken):
 
 def test_the_writer_starts_without_heavy_modules():
     code = (
-        "import sys, app.runs.writer_process;"
+        "import sys, app.runs.writer;"
         "print([m for m in ('numba', 'scipy', 'matplotlib', 'PySide6', 'serial') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
