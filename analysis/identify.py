@@ -156,9 +156,12 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
     constants = constants_from_tail(record, decay)
     add_constants(constants, budget)
     add_no_slip_bound(record, constants, decay, budget)
-    seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
+    if decay.relative is not None:
+        seen = message("gauge 2 shows no slip")
+    else:
+        seen = message("the table swings as one mass")
     if decay.plateau is None:
-        seen += ", unless it came before the record"
+        seen = message("{seen}, unless it came before the record", seen=seen)
     text = message("{seen}: period and damping are given, and the least f_s that prevents slip.", seen=seen)
     warnings = [*decay.warnings, *tail_warnings(decay), ResultWarning("no-slip", text)]
     if with_monte_carlo:

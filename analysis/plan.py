@@ -26,7 +26,7 @@ from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
 from analysis.results.fitted_quantities import msk64_degree
 from analysis.results.joint_fit import add_systematic_uncertainty
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
-from messages.message import message
+from messages.message import joined, message
 
 CLOCK_UNCERTAINTY = 5e-5
 """Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
@@ -359,14 +359,14 @@ def _warnings(
         text = message("the record will not tell f_d. Sample faster and longer, within the gauges' ranges.")
         found.append(ResultWarning("friction-undetermined", text))
     unstated = [
-        f"gauge {number}"
+        message("gauge {gauge}", gauge=number)
         for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
         if gauge.gain_relative is None
     ]
     if unstated:
         text = message(
             "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
-            gauges=" and ".join(unstated),
+            gauges=joined(unstated, " and "),
         )
         found.append(ResultWarning("gain-not-stated", text))
     return found
@@ -389,4 +389,4 @@ def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
     return found
 
 
-_RANGE_REMEDIES = ("Pull back less.", "Place the plate off centre, or pull back less.")
+_RANGE_REMEDIES = (message("Pull back less."), message("Place the plate off centre, or pull back less."))

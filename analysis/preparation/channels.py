@@ -91,7 +91,7 @@ def read_channels(record: Record) -> tuple[Channels, list[ResultWarning]]:
     time_s = (record.time_s - record.time_s[0]).astype(np.float64) * record.clock_scale
     warnings: list[ResultWarning] = []
     table_valid = _valid(
-        record.table_displacement_m, record.table_overload, record.table_gauge.range_m, "gauge 1"
+        record.table_displacement_m, record.table_overload, record.table_gauge.range_m, gauge=1
     )
     table = Channel(
         time_s[table_valid] - record.table_gauge.delay_s,
@@ -206,12 +206,13 @@ def _check_times(time_s: Floats) -> None:
 
 
 def _valid(
-    value_m: Floats, overload: NDArray[np.bool_] | None, range_m: float | None, gauge: str
+    value_m: Floats, overload: NDArray[np.bool_] | None, range_m: float | None, gauge: int
 ) -> NDArray[np.bool_]:
     present = np.isfinite(value_m)
     if not present.any():
         raise RecordError(
-            "{gauge} holds no reading (all are NaN). Check its cable and the import column.", gauge=gauge
+            "gauge {gauge} holds no reading (all are NaN). Check its cable and the import column.",
+            gauge=gauge,
         )
     valid = present.copy()
     if overload is not None:
@@ -220,7 +221,7 @@ def _valid(
         valid[present] &= np.abs(value_m[present]) < range_m
     if int(valid.sum()) < SAMPLES_MIN:
         raise RecordError(
-            "{gauge} has {count} valid readings of {total}, the rest missing or clipped."
+            "gauge {gauge} has {count} valid readings of {total}, the rest missing or clipped."
             " Re-centre the gauge or choose a wider range, and record again.",
             gauge=gauge,
             count=int(valid.sum()),
@@ -234,7 +235,7 @@ def _relative(
 ) -> Channel | None:
     gauge = record.relative_gauge
     try:
-        valid = _valid(value_m, record.relative_overload, gauge.range_m, "gauge 2")
+        valid = _valid(value_m, record.relative_overload, gauge.range_m, gauge=2)
     except RecordError as error:
         warnings.append(
             ResultWarning(

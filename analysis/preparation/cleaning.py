@@ -34,7 +34,7 @@ _REPEATS_MAX = 0.05
 """A converter that repeats more of its readings than this is merely coarse."""
 
 
-def remove_invalid_readings(channel: Channel, gauge: str, warnings: list[ResultWarning]) -> Channel:
+def remove_invalid_readings(channel: Channel, gauge: int, warnings: list[ResultWarning]) -> Channel:
     """Leave out what the gauge cannot have seen, with a warning for each kind."""
     repeated = _repeated(channel.value_m)
     clipped = _clipped(channel.value_m, repeated)
@@ -59,11 +59,11 @@ def remove_invalid_readings(channel: Channel, gauge: str, warnings: list[ResultW
     return Channel(channel.time_s[~spikes], channel.value_m[~spikes])
 
 
-def _warning(code: str, gauge: str, count: int, total: int, what: Message) -> ResultWarning:
+def _warning(code: str, gauge: int, count: int, total: int, what: Message) -> ResultWarning:
     return ResultWarning(
         code,
         message(
-            "{count} of {total} readings of {gauge} {what}: they are left out.",
+            "{count} of {total} readings of gauge {gauge} {what}: they are left out.",
             count=count,
             total=total,
             gauge=gauge,

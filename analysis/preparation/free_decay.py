@@ -213,12 +213,10 @@ def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
         warnings.append(ResultWarning("gauge-2-absent", text))
     check_span(channels.table)
     check_rate(channels.table)
-    table, relative = remove_invalid_readings(channels.table, "gauge 1", warnings), channels.relative
+    table, relative = remove_invalid_readings(channels.table, 1, warnings), channels.relative
     if relative is not None:
-        relative = _if_mostly_valid(
-            relative, remove_invalid_readings(relative, "gauge 2", warnings), warnings
-        )
-    for gauge, channel in (("gauge 1", table), ("gauge 2", relative)):
+        relative = _if_mostly_valid(relative, remove_invalid_readings(relative, 2, warnings), warnings)
+    for gauge, channel in ((1, table), (2, relative)):
         hum = None if channel is None else detect_hum(channel)
         if hum is not None:
             warnings.append(hum_warning(gauge, hum))

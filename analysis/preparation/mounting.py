@@ -8,6 +8,7 @@ from analysis.arrays import Floats
 from analysis.preparation.channels import Channel
 from analysis.preparation.release import local_slopes, median_of_three, white_noise
 from analysis.quantities import ResultWarning
+from messages.i18n import N_
 from messages.message import message
 
 _SURE = 0.1
@@ -120,14 +121,14 @@ def _warning(code: str) -> ResultWarning:
 
 
 _MOUNTINGS = {
-    "gauge-2-absolute": (
+    "gauge-2-absolute": N_(
         "gauge 2 swings with the table after slip: it is taken as measuring the plate against the base."
     ),
-    "gauge-2-relative": (
+    "gauge-2-relative": N_(
         "gauge 2 is said to measure the plate against the base, but does not swing with the table after"
         " slip: it is taken as measuring the plate against the table."
     ),
-    "gauge-2-reversed": (
+    "gauge-2-reversed": N_(
         "gauge 2 moves against the plate: it is mounted the other way, and taken as reversed."
     ),
 }

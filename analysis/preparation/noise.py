@@ -163,10 +163,10 @@ def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
     return channel
 
 
-def hum_warning(gauge: str, hum: tuple[float, float]) -> ResultWarning:
+def hum_warning(gauge: int, hum: tuple[float, float]) -> ResultWarning:
     """Warning of mains hum, given frequency (Hz) and amplitude (m)."""
     text = message(
-        "{gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
+        "gauge {gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
         " of the amplifier.",
         gauge=gauge,
         hum=hum[0],

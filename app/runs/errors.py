@@ -42,13 +42,17 @@ class MetadataError(RunError, ValueError):
 
 
 class ConditionError(MetadataError):
-    """A condition of a test cannot be stored; `field` names it, and `condition` in its values shows it."""
+    """A condition of a test cannot be stored: `name` and `reason` are values of its message."""
 
     @property
-    def field(self) -> str:
+    def name(self) -> str:
         """Field of `Conditions`, or name of another condition."""
-        condition = cast(Message, self.message.values["condition"])
-        return str(condition.values["name"])
+        return str(self.message.values["name"])
+
+    @property
+    def reason(self) -> Message:
+        """Value, fault and remedy, without the name."""
+        return cast(Message, self.message.values["reason"])
 
 
 class DiskFullError(RunError):

@@ -58,22 +58,22 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
         for name, (low, high) in _PLAUSIBLE.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise ConditionError(
-                    "{condition} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
-                    condition=message("condition {name}", name=name),
+                reason = message(
+                    "{value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
                     value=value,
                     low=low,
                     high=high,
                 )
+                raise ConditionError("condition {name} = {reason}", name=name, reason=reason)
         texts = {name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other
         for name, text in texts.items():
             if len(text) > _TEXT_MAX or not text.isprintable():
-                raise ConditionError(
-                    "{condition} = {text!r} is not a line of text of up to {text_max} characters",
-                    condition=message("condition {name}", name=name),
+                reason = message(
+                    "{text!r} is not a line of text of up to {text_max} characters",
                     text=text[:40],
                     text_max=_TEXT_MAX,
                 )
+                raise ConditionError("condition {name} = {reason}", name=name, reason=reason)
         for name in self.other:
             if not is_field_name(name) or name in Conditions.__struct_fields__:
                 raise MetadataError(
@@ -114,11 +114,8 @@ def _typed(name: str, text: str) -> str | float | int:
             return float(text)
         return int(text) if name == "run_in_number" else text
     except ValueError:
-        raise ConditionError(
-            "{condition} = {text!r} is not a number. Give digits, or leave it out",
-            condition=message("condition {name}", name=name),
-            text=text,
-        ) from None
+        reason = message("{text!r} is not a number. Give digits, or leave it out", text=text)
+        raise ConditionError("condition {name} = {reason}", name=name, reason=reason) from None
 
 
 class RunMetadata(_FrozenStruct, frozen=True):

@@ -18,7 +18,7 @@ from app.presenters.results import sentence
 from app.runs.errors import ConditionError, MetadataError
 from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
 from messages.i18n import gettext
-from messages.message import Message, message
+from messages.message import message
 
 REPEATS_DEFAULT = 3
 """Repeats of a planned series without a number: the fewest that show an outlier."""
@@ -307,8 +307,9 @@ def _form_error(form: RunForm) -> str:
         parse_conditions(form, {})
         _parse_count(form)
     except ConditionError as error:
-        values = {**error.message.values, "condition": _CONDITION_NAMES[error.field]}
-        return sentence(Message(error.message.template, values))
+        return sentence(
+            message("{label} = {reason}", label=_CONDITION_NAMES[error.name], reason=error.reason)
+        )
     except MetadataError as error:
         return sentence(error.message)
     return ""

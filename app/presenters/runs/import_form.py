@@ -7,6 +7,7 @@ from pathlib import PurePath
 
 from app.presenters import number_text
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
+from app.runs.errors import ConditionError, MetadataError
 from messages.i18n import N_, gettext, translate
 
 GAIN = "gain"
@@ -139,8 +140,8 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
     for name in CONDITION_FIELDS:
         try:
             parse_conditions(form, {}, (name,))
-        except ValueError as error:
-            yield name, _text_at_field(error)
+        except ConditionError as error:
+            yield name, translate(error.reason)
     if not all(name and text for name, text in parse_pairs(form.other)):
         words = gettext(
             "{text} is no condition. Write name=text, and ; between them", text=form.other.strip()
@@ -149,11 +150,7 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
         return
     try:
         parse_conditions(form, dict(parse_pairs(form.other)), ())
-    except ValueError as error:
-        yield "other", _text_at_field(error)
-
-
-def _text_at_field(error: ValueError) -> str:
-    """Message without the name of the condition, which the label of the field shows."""
-    words = translate(str(error))
-    return words.partition(" = ")[2] or words
+    except ConditionError as error:
+        yield "other", translate(error.reason)
+    except MetadataError as error:
+        yield "other", translate(error.message)

@@ -13,11 +13,12 @@ from app.runs.reader import open_run
 from app.runs.validation import validate_file
 from app.runs.writer import create_run
 from config.schema import Gauge, GaugeCheck
+from drivers.clock import TimeBase
 from drivers.samples import Losses
 from tests.app.runs.runs_kit import ENDING, block
 from tools.run_file_reference import REFERENCE, reference
 
-DERIVED = {"losses", "events"}
+DERIVED = {"losses", "events", "time_base"}
 
 
 def declared(fields):
@@ -32,6 +33,7 @@ def test_every_value_of_the_end_has_its_field():
     expected = set(EndMetadata.__struct_fields__) - DERIVED
     expected |= {f"events.{name}" for name in Events.__struct_fields__}
     expected |= {f"losses.{name}" for name in Losses.__slots__}
+    expected |= {f"time_base.{name}" for name in TimeBase.__struct_fields__}
     assert declared(schema.END_FIELDS) == expected
 
 
