@@ -8,7 +8,6 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from drivers.crc import crc16
 
@@ -78,15 +77,16 @@ class Unwrapper:
             self.discarded_bytes += start - at
             at, body = start, start + HEADER_BYTES
             header = _header(data, at) if body <= len(data) else None
-            end = body if header is None else body + header.length
+            port, length, arrival_ns, check = header or (0, 0, 0, 0)
+            end = body + length
             if end > len(data):
                 break
             content = data[body:end]
-            if header is None or zlib.crc32(content) != header.data_check:
+            if header is None or zlib.crc32(content) != check:
                 self.discarded_bytes += 1
                 at += 1
             else:
-                yield StampedRead(header.port, header.arrival_ns, content)
+                yield StampedRead(port, arrival_ns, content)
                 at = end
         self._unfinished = data[at:]
 
@@ -100,16 +100,10 @@ def _candidate(data: bytes, at: int) -> int:
     return next((tail for tail in range(first, len(data)) if MAGIC.startswith(data[tail:])), len(data))
 
 
-class _Header(NamedTuple):
-    port: int
-    length: int
-    arrival_ns: int
-    data_check: int
-
-
-def _header(data: bytes, start: int) -> _Header | None:
-    """Fields of the header; None where its checksum is wrong."""
+def _header(data: bytes, start: int) -> tuple[int, int, int, int] | None:
+    """Port, length, arrival and CRC-32 of the data; None where the checksum of the header is wrong."""
     fields = data[start : start + _FIELDS.size]
     if _CHECK.unpack_from(data, start + _FIELDS.size) != (crc16(fields),):
         return None
-    return _Header(*_FIELDS.unpack(fields)[1:])
+    _, port, length, arrival_ns, check = _FIELDS.unpack(fields)
+    return port, length, arrival_ns, check

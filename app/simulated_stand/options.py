@@ -51,6 +51,20 @@ class Timetable:
         return self.parts_s if self.every_s is None else self.every_s
 
 
+_LIMITS = {
+    "rate_hz": (1.0, 100_000.0), "friction": (0.0, 2.0), "static_friction": (0.0, 4.0),
+    "tilt_rad": (-0.1, 0.1), "pullback_m": (-PULLBACK_MAX_M, PULLBACK_MAX_M), "noise_m": (0.0, 1e-2),
+    "nonlinearity_m": (-1e-2, 1e-2), "clock_ppm": (-100_000.0, 100_000.0),
+    "table_drift_m_per_s": (-1e-2, 1e-2), "relative_drift_m_per_s": (-1e-2, 1e-2),
+    "rest_s": (0.05, 3600.0), "pull_s": (0.05, 3600.0), "hold_s": (0.05, 3600.0),
+    "decay_s": (0.05, 3600.0), "recentre_s": (0.05, 3600.0), "count": (0, 1_000_000),
+    "recentre_every": (0, 1_000_000), "plate_offset_m": (-0.1, 0.1), "table_clip_m": (1e-6, 1.0),
+    "relative_clip_m": (1e-6, 1.0), "rate_error": (-0.5, 1.0), "first_sequence": (0, (1 << 32) - 1),
+    "lag_s": (-1.0, 1.0), "first_time_s": (0.0, 1e6), "tcp_port": (0, 65535), "start_at_unix_s": (0.0, 1e11),
+}  # fmt: skip
+"""Least and largest value of each option: beyond them it is another unit by mistake, or no stand."""
+
+
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A simulated stand: what it speaks, what is true of it, what goes wrong on its wire.
 
@@ -132,30 +146,9 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Where the truth is written as JSON."""
 
     def __post_init__(self) -> None:
-        _within("rate_hz", self.rate_hz, 1.0, 100_000.0)
-        _within("friction", self.friction, 0.0, 2.0)
-        _within("static_friction", self.static_friction, 0.0, 4.0)
-        _within("tilt_rad", self.tilt_rad, -0.1, 0.1)
-        _within("pullback_m", self.pullback_m, -PULLBACK_MAX_M, PULLBACK_MAX_M)
-        _within("noise_m", self.noise_m, 0.0, 1e-2)
-        _within("nonlinearity_m", self.nonlinearity_m, -1e-2, 1e-2)
-        _within("clock_ppm", self.clock_ppm, -100_000.0, 100_000.0)
-        for name in ("table_drift_m_per_s", "relative_drift_m_per_s"):
-            _within(name, getattr(self, name), -1e-2, 1e-2)
-        for name in ("rest_s", "pull_s", "hold_s", "decay_s", "recentre_s"):
-            _within(name, getattr(self, name), 0.05, 3600.0)
+        for name, (low, high) in _LIMITS.items():
+            _within(name, getattr(self, name), low, high)
         _within("every_s", self.every_s, self.timetable().parts_s, 86400.0)
-        _within("count", self.count, 0, 1_000_000)
-        _within("recentre_every", self.recentre_every, 0, 1_000_000)
-        _within("plate_offset_m", self.plate_offset_m, -0.1, 0.1)
-        _within("table_clip_m", self.table_clip_m, 1e-6, 1.0)
-        _within("relative_clip_m", self.relative_clip_m, 1e-6, 1.0)
-        _within("rate_error", self.rate_error, -0.5, 1.0)
-        _within("first_sequence", self.first_sequence, 0, (1 << 32) - 1)
-        _within("lag_s", self.lag_s, -1.0, 1.0)
-        _within("first_time_s", self.first_time_s, 0.0, 1e6)
-        _within("tcp_port", self.tcp_port, 0, 65535)
-        _within("start_at_unix_s", self.start_at_unix_s, 0.0, 1e11)
         for name in ("drop", "flip", "truncate", "drop + flip + truncate"):
             _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
         for text in self.disturbances:
@@ -171,16 +164,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
 
     def timetable(self) -> Timetable:
         """What the stand does when."""
-        return Timetable(
-            self.rest_s,
-            self.pull_s,
-            self.hold_s,
-            self.decay_s,
-            self.recentre_s,
-            self.every_s,
-            self.count,
-            self.recentre_every,
-        )
+        return msgspec.convert(self, Timetable, from_attributes=True)
 
 
 def _within(name: str, value: float | None, low: float, high: float) -> None:

@@ -98,6 +98,7 @@ class SimulatedStandDevice:
 
 
 def _setup(options: SimulatedStandOptions) -> DeviceSetup:
+    unix_s = options.start_at_unix_s
     return DeviceSetup(
         rate_hz=options.rate_hz,
         clock_ppm=options.clock_ppm,
@@ -107,10 +108,5 @@ def _setup(options: SimulatedStandOptions) -> DeviceSetup:
         faults=FaultRates(options.drop, options.flip, options.truncate),
         disturbances=tuple(parse_disturbance(text) for text in options.disturbances),
         seed=options.seed,
-        began_ns=_host_ns(options.start_at_unix_s),
+        began_ns=None if unix_s is None else time.monotonic_ns() - round((time.time() - unix_s) * 1e9),
     )
-
-
-def _host_ns(unix_s: float | None) -> int | None:
-    """Host's monotonic time at a time of day, as its clocks stand now."""
-    return None if unix_s is None else time.monotonic_ns() - round((time.time() - unix_s) * 1e9)

@@ -77,7 +77,12 @@ class PairLink:
         if failure is not None and self._is_ending:
             raise failure
         self._is_ending = failure is not None  # reads before the failure are returned first
-        return b"".join(self._waiting())
+        parts = []
+        with contextlib.suppress(queue.Empty):
+            parts.append(self._reads.get(timeout=_WAIT_S))
+            while len(parts) < _MAX_READS:
+                parts.append(self._reads.get_nowait())
+        return b"".join(parts)
 
     def write(self, data: bytes) -> None:
         """Not supported: each device has its own link. Raises DriverError."""
@@ -91,15 +96,6 @@ class PairLink:
             reader.ask_to_stop()
         for reader in self._readers:
             reader.join()
-
-    def _waiting(self) -> list[bytes]:
-        try:
-            parts = [self._reads.get(timeout=_WAIT_S)]
-        except queue.Empty:
-            return []
-        while len(parts) < _MAX_READS and not self._reads.empty():
-            parts.append(self._reads.get_nowait())
-        return parts
 
 
 def open_pair(
@@ -213,7 +209,12 @@ class _ChannelReader:
         lost_ns = host_ns()
         while not self._stopping.is_set():
             try:
-                self._reopen()
+                port = self._config.reopen(self.info)
+                try:
+                    self._start_device(port, is_resumed=True)
+                except BaseException:
+                    port.close()
+                    raise
             except DriverError as error:
                 if host_ns() - lost_ns > RECONNECT_TIMEOUT_S * 1e9:
                     raise DeviceLostError(
@@ -222,17 +223,9 @@ class _ChannelReader:
                         fault=error,
                     ) from error
             else:
+                self._port = port
                 return
             self._stopping.wait(_RETRY_S)
-
-    def _reopen(self) -> None:
-        port = self._config.reopen(self.info)
-        try:
-            self._start_device(port, is_resumed=True)
-        except BaseException:
-            port.close()
-            raise
-        self._port = port
 
     def _put(self, data: bytes) -> None:
         if self._reads.qsize() >= _QUEUED_READS:

@@ -234,13 +234,10 @@ class HostTimeFit:
             self._points.popleft()
         self._line = None
         if len(self._points) >= _MIN_WINDOWS:
-            self._refit()
-
-    def _refit(self) -> None:
-        self._origin = own_s, origin_ns = self._points[-1]
-        since_s = np.array([point_s - own_s for point_s, _ in self._points])
-        late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._points]) - since_s
-        self._line = fit_robust_line(since_s, late_s)
+            self._origin = own_s, origin_ns = self._points[-1]
+            since_s = np.array([point_s - own_s for point_s, _ in self._points])
+            late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._points]) - since_s
+            self._line = fit_robust_line(since_s, late_s)
 
 
 def _window(point: _Point) -> int:

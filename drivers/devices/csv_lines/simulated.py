@@ -18,13 +18,7 @@ class SimulatedCsv(SimulatedProtocol):
     def __init__(self, layout: LineFormat | None = None) -> None:
         self._layout = layout or LineFormat()
 
-    def encode(
-        self,
-        first_sequence: int,
-        counts: Int32s,
-        status: UInt8s,  # noqa: ARG002 - a line of numbers has no flags
-        times_s: Floats,
-    ) -> list[bytes]:
+    def encode(self, first_sequence: int, counts: Int32s, _status: UInt8s, times_s: Floats) -> list[bytes]:
         """Lines."""
         return encode_lines(self._layout, times_s, counts, first_sequence)
 

@@ -75,13 +75,7 @@ class SimulatedGsv(SimulatedProtocol):
         self._last = np.zeros(2)
         self._zero = np.zeros(2)
 
-    def encode(
-        self,
-        first_sequence: int,  # noqa: ARG002 - frames have no number
-        counts: Int32s,
-        status: UInt8s,
-        times_s: Floats,  # noqa: ARG002 - and no time
-    ) -> list[bytes]:
+    def encode(self, _first_sequence: int, counts: Int32s, status: UInt8s, _times_s: Floats) -> list[bytes]:
         """Frames; an overload of either gauge sets the same flag."""
         self._last = counts[-1].astype(np.float64)
         overloads = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE

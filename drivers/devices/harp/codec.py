@@ -190,7 +190,8 @@ def find_events(buffer: UInt8s, channels: Ints, garbage: int, lines: Records) ->
                 size = 0
         if size == 0:
             if garbage % EVENT_BYTES == 0:
-                _break_line(lines[found], at)
+                lines[found].start = lines[found].end = at
+                lines[found].good = 0
                 found += 1
             garbage += 1
             discarded += 1
@@ -229,12 +230,6 @@ def _is_whole(buffer: UInt8s, at: int, size: int) -> bool:
     for place in range(at, at + size - 1):
         total += buffer[place]
     return bool(total & 0xFF == buffer[at + size - 1])
-
-
-@inlined
-def _break_line(line: Record, at: int) -> None:
-    line.start = line.end = at
-    line.good = 0
 
 
 @inlined
@@ -336,16 +331,15 @@ class EventDecoder(PacketDecoder):
         return packets[:good], counts[:good]
 
 
-def count_events(data: bytes) -> tuple[int, Floats]:
-    """Number of good events in `data`, and their times (in 32 us)."""
+def event_times(data: bytes) -> Floats:
+    """Times (in 32 us) of the good events in `data`."""
     lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
     buffer = np.frombuffer(data, dtype=np.uint8)
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
     times: Floats = lines["time"][:found][lines["good"][:found] != 0]
-    return len(times), times
+    return times
 
 
 def rate_from_events(data: bytes) -> float | None:
     """Samples a second by the device's own times; None while there are too few events."""
-    _, times = count_events(data)
-    return rate_from_steps(np.diff(times) / TICKS_PER_S, 1 / TICKS_PER_S)
+    return rate_from_steps(np.diff(event_times(data)) / TICKS_PER_S, 1 / TICKS_PER_S)

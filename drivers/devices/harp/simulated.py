@@ -61,13 +61,7 @@ class SimulatedHarp(SimulatedProtocol):
             Register.EVENTS: _ALL_EVENTS,
         }
 
-    def encode(
-        self,
-        first_sequence: int,  # noqa: ARG002 - events have no number
-        counts: Int32s,
-        status: UInt8s,  # noqa: ARG002 - and no flags
-        times_s: Floats,
-    ) -> list[bytes]:
+    def encode(self, _first_sequence: int, counts: Int32s, _status: UInt8s, times_s: Floats) -> list[bytes]:
         """An event for each sample; none in standby."""
         self._ticks = round(float(times_s[-1]) * TICKS_PER_S)
         if with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:

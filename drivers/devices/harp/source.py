@@ -16,12 +16,12 @@ from drivers.devices.harp.codec import (
     EventDecoder,
     HarpMessage,
     Register,
-    count_events,
     encode_events,
     encode_read,
     encode_start,
     encode_stop,
     encode_write,
+    event_times,
     find_messages,
     find_reply,
     rate_from_events,
@@ -86,7 +86,14 @@ class HarpSource(StreamSource):
             raise ProtocolError("the device refuses to start: switch it off and on, and try again")
         if not good:
             raise self.no_data_error(received)
-        self._check_rate(rate_from_events(received))
+        measured_hz = rate_from_events(received)
+        if measured_hz is not None and abs(measured_hz / self.rate_hz - 1) > RATE_TOLERANCE:
+            raise ProtocolError(
+                "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
+                "ask for --rate {actual_hz:.4g}",
+                actual_hz=measured_hz,
+                rate_hz=self.rate_hz,
+            )
         return received
 
     def make_decoder(self, data: bytes) -> EventDecoder:  # noqa: ARG002 - all is known
@@ -140,15 +147,6 @@ class HarpSource(StreamSource):
                 register=register,
             )
 
-    def _check_rate(self, measured_hz: float | None) -> None:
-        if measured_hz is not None and abs(measured_hz / self.rate_hz - 1) > RATE_TOLERANCE:
-            raise ProtocolError(
-                "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
-                "ask for --rate {actual_hz:.4g}",
-                actual_hz=measured_hz,
-                rate_hz=self.rate_hz,
-            )
-
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
@@ -164,7 +162,7 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    events, _ = count_events(data)
+    events = len(event_times(data))
     share = events * EVENT_BYTES / max(len(data), 1)
     if not is_recognised(events, share, has_checksum=True):
         return None

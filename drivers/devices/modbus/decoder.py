@@ -102,15 +102,12 @@ class ResponseDecoder:
         if isinstance(response, RegisterResponse) and not read.port & LATE:
             self._responses.append(response.data)
         else:
-            self._leave_out(read.data, is_refused=isinstance(response, ExceptionResponse))
+            self._responses = None
+            if not isinstance(response, ExceptionResponse):
+                self._broken += 1
+                self.losses.discarded_bytes += len(read.data)
         if self._responses is not None and len(self._responses) == len(self._poll.requests):
             self._add_sample(self._poll.channel_values(self._responses))
-
-    def _leave_out(self, data: bytes, *, is_refused: bool) -> None:
-        self._responses = None
-        if not is_refused:
-            self._broken += 1
-            self.losses.discarded_bytes += len(data)
 
     def _add_sample(self, values: list[ChannelValue]) -> None:
         self._responses = None

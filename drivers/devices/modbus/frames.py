@@ -13,7 +13,6 @@ from messages.message import Message, message
 
 MAX_REGISTERS = 125
 """Registers that one request may read."""
-BROADCAST = 0
 MAX_UNIT = 247
 LONGEST = 256
 EXCEPTION_BYTES = 5
@@ -74,17 +73,16 @@ class Request:
     @property
     def description(self) -> Message:
         """Function and registers, for messages."""
-        if self.count == 1:
+        first, last = self.register, self.register + self.count - 1
+        if first == last:
             return message(
-                "function {function:02d} for register {register}",
-                function=self.function,
-                register=self.register,
+                "function {function:02d} for register {register}", function=self.function, register=first
             )
         return message(
             "function {function:02d} for registers {register} to {last}",
             function=self.function,
-            register=self.register,
-            last=self.register + self.count - 1,
+            register=first,
+            last=last,
         )
 
     def _body(self) -> bytes:
@@ -111,7 +109,7 @@ class ExceptionResponse:
     code: int
 
     @property
-    def description(self) -> Message:
+    def fault(self) -> Message:
         """Its name in the specification, and its number."""
         name = message(_EXCEPTIONS.get(self.code, N_("unknown reason")))
         return message("{name} (exception {code})", name=name, code=self.code)
@@ -121,7 +119,7 @@ class ExceptionResponse:
 class InvalidResponse:
     """Bytes that are no response to the request, and why."""
 
-    reason: Message
+    fault: Message
 
 
 def is_complete(request: Request, received: bytes) -> bool:
@@ -204,15 +202,10 @@ def crc16_modbus(data: bytes) -> int:
     return crc
 
 
-def _table() -> tuple[int, ...]:
-    """Remainders of all bytes."""
-    remainders = []
-    for byte in range(256):
-        remainder = byte
-        for _ in range(8):
-            remainder = remainder >> 1 ^ (0xA001 if remainder & 1 else 0)
-        remainders.append(remainder)
-    return tuple(remainders)
+def _remainder(byte: int) -> int:
+    for _ in range(8):
+        byte = byte >> 1 ^ (0xA001 if byte & 1 else 0)
+    return byte
 
 
-_TABLE = _table()
+_TABLE = tuple(map(_remainder, range(256)))

@@ -1,6 +1,7 @@
 """Polling: one request and its response, the schedule of polls, and the timing of a device."""
 
 import math
+import statistics
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,7 +111,9 @@ class PollSchedule:
 
     def wait(self) -> bool:
         """Sleep until the next poll is due, 50 ms at most; returns whether it is due now."""
-        self._skip_missed()
+        now_ns = host_ns()
+        if now_ns - self.due_ns > self.tolerance_ns:  # missed
+            self._cell = now_ns // self._period_ns + 1
         wait_ns = self.due_ns - host_ns()
         time.sleep(max(0, min(wait_ns, _MAX_WAIT_NS)) / _NS)
         late_ns = host_ns() - self.due_ns
@@ -129,11 +132,6 @@ class PollSchedule:
             self.is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
             self._window_ns, self._wakeups, self._late_wakeups = self.due_ns, 0, 0
 
-    def _skip_missed(self) -> None:
-        now_ns = host_ns()
-        if now_ns - self.due_ns > self.tolerance_ns:
-            self._cell = now_ns // self._period_ns + 1
-
 
 class ResponseTiming:
     """How quickly a device answers the requests of a poll, measured in trials and during the stream.
@@ -148,7 +146,8 @@ class ResponseTiming:
         self._slow_s = durations_s[len(durations_s) * 9 // 10]
         self._shortest_s = min(transaction.duration_s for poll in trials for transaction in poll)
         self._phases_ns = [
-            _median([poll[i].measured_ns - poll[0].sent_ns for poll in trials]) for i in range(len(trials[0]))
+            statistics.median_high(poll[i].measured_ns - poll[0].sent_ns for poll in trials)
+            for i in range(len(trials[0]))
         ]
 
     @property
@@ -186,7 +185,3 @@ def round_down(rate_hz: float) -> float:
     """A rate of two digits, or a multiple of five."""
     step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
     return float(f"{math.floor(rate_hz / step) * step:.6g}")
-
-
-def _median(values: list[int]) -> int:
-    return sorted(values)[len(values) // 2]

@@ -148,6 +148,10 @@ class RegisterLocation:
     request: int
     start: int
 
+    def bytes_of(self, answers: list[bytes], registers: int) -> bytes:
+        """So many registers from here, of the responses to all requests."""
+        return answers[self.request][self.start : self.start + 2 * registers]
+
 
 @dataclass(frozen=True, slots=True)
 class Poll:
@@ -165,17 +169,12 @@ class Poll:
         """Values of all channels, from the responses to all requests."""
         return [
             decode_channel(
-                channel, self._bytes(answers, value, channel.registers), self._word(answers, state)
+                channel,
+                value.bytes_of(answers, channel.registers),
+                0 if state is None else int.from_bytes(state.bytes_of(answers, 1), "big"),
             )
             for channel, value, state in zip(self.channels, self.values, self.states, strict=True)
         ]
-
-    def _word(self, answers: list[bytes], place: RegisterLocation | None) -> int:
-        return 0 if place is None else int.from_bytes(self._bytes(answers, place, 1), "big")
-
-    @staticmethod
-    def _bytes(answers: list[bytes], place: RegisterLocation, registers: int) -> bytes:
-        return answers[place.request][place.start : place.start + 2 * registers]
 
 
 def plan_poll(channels: tuple[Channel, ...]) -> Poll:

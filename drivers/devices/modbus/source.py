@@ -248,7 +248,7 @@ class ModbusSource(StreamSource):
                 "unit {unit} refuses {request}: {fault}. Hold register map {map} against the device's manual",
                 unit=request.unit,
                 request=request.description,
-                fault=response.description,
+                fault=response.fault,
                 map=self._map.name,
             )
         if not received:
@@ -262,7 +262,7 @@ class ModbusSource(StreamSource):
             "no answer of unit {unit} to {request} ({reason}); {what}",
             unit=request.unit,
             request=request.description,
-            reason=response.reason,
+            reason=response.fault,
             what=describe_unreadable(received, DRIVER.name, DRIVER.default_baud),
         )
 
@@ -277,7 +277,7 @@ class ModbusSource(StreamSource):
                 raise ProtocolError(
                     "the {gauge} gauge was not set to zero: {reason}. Try again, or without zero",
                     gauge=gauge,
-                    reason=_fault(response),
+                    reason=response.fault,
                 )
 
     def _measure_timing(self, link: Link) -> None:
@@ -302,10 +302,6 @@ class ModbusSource(StreamSource):
             if not isinstance(parse_response(request, transactions[-1].data), RegisterResponse):
                 drain(link)
         return transactions
-
-
-def _fault(response: ExceptionResponse | InvalidResponse) -> Message:
-    return response.description if isinstance(response, ExceptionResponse) else response.reason
 
 
 def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSource:
@@ -360,9 +356,7 @@ def explain(received: bytes) -> Message | None:
     refused = find_exception(received)
     if refused is None:
         return None
-    return message(
-        "the device refuses, {fault}: hold its registers against its manual", fault=refused.description
-    )
+    return message("the device refuses, {fault}: hold its registers against its manual", fault=refused.fault)
 
 
 def _parse_response(received: bytes) -> Message | None:

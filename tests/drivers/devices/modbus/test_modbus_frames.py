@@ -60,7 +60,7 @@ def test_answers_as_they_are_written():
 def test_an_exception_is_told_by_its_name(code, words):
     answer = parse_response(READ_ONE, encode_exception(1, 3, code))
     assert isinstance(answer, ExceptionResponse)
-    assert str(answer.description) == f"{words} (exception {code})"
+    assert str(answer.fault) == f"{words} (exception {code})"
 
 
 def test_the_exception_of_the_specification():
@@ -88,7 +88,7 @@ def test_the_exception_of_the_specification():
 def test_what_is_no_answer(received, why):
     answer = parse_response(READ_ONE, received)
     assert isinstance(answer, InvalidResponse)
-    assert why in str(answer.reason)
+    assert why in str(answer.fault)
 
 
 def test_the_echo_of_another_write_is_no_answer():
