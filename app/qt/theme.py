@@ -1,7 +1,8 @@
 """Theme: colours of both schemes, typeface, palette and style sheet."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
+from pathlib import Path
 from string import Template
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -9,6 +10,7 @@ from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QPalett
 from PySide6.QtWidgets import QApplication, QWidget
 
 FAMILY = "IBM Plex Sans"
+_STYLE = Path(__file__).with_name("theme.qss")
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,124 +184,5 @@ def _palette(tokens: Tokens) -> QPalette:
 
 
 def _style_sheet(tokens: Tokens) -> str:
-    values = {name: getattr(tokens, name) for name in Tokens.__slots__}
-    return Template(_STYLE).substitute(values)
-
-
-_STYLE = """
-QFrame[role="card"], QFrame[role="bar"] { background: $surface; border: 1px solid $line; border-radius: 6px; }
-QFrame[role="plots"] { border: 2px solid transparent; border-radius: 6px; }
-QFrame[role="plots"]:focus { border: 2px solid $accent; }
-QFrame[role="rail"] { background: $surface; border: none; border-right: 1px solid $line; }
-QScrollArea[role="column"], QScrollArea[role="column"] > QWidget > QWidget { background: $surface; }
-QLabel[role="muted"] { color: $muted; }
-QLabel[tone="ok"] { color: $ok; }
-QLabel[tone="warn"] { color: $warn; }
-QLabel[tone="bad"] { color: $bad; }
-QLabel[channel="1"] { color: $channel_1; }
-QLabel[channel="2"] { color: $channel_2; }
-QLabel[step="ahead"] { color: $muted; }
-QLabel[step="done"] { color: $ok; }
-QLabel[step="now"] { color: $on_accent; background: $accent; border-radius: 6px; }
-
-QFrame[role="notice"] {
-    background: $surface; border: 1px solid $line; border-left: 4px solid $muted;
-    border-radius: 6px; margin: 8px 8px 0 8px;
-}
-QFrame[role="notice"][tone="ok"] { border-left-color: $ok; }
-QFrame[role="notice"][tone="warn"] { border-left-color: $warn; }
-QFrame[role="notice"][tone="bad"] { border-left-color: $bad; }
-
-QPushButton {
-    background: $surface; color: $text; border: 1px solid $muted; border-radius: 6px;
-    padding: 0 12px; min-height: 30px;
-}
-QPushButton:hover { border-color: $accent; }
-QPushButton:pressed { background: $bg; }
-QPushButton:focus { border: 2px solid $accent; padding: 0 11px; min-height: 28px; }
-QPushButton:disabled { color: $muted; border-color: $line; background: $bg; }
-QPushButton[primary="true"] { background: $accent; color: $on_accent; border-color: $accent; }
-QPushButton[primary="true"]:hover { border-color: $text; }
-QPushButton[primary="true"]:disabled { color: $muted; border-color: $line; background: $bg; }
-QPushButton[primary="true"]:focus { border: 2px solid $text; }
-QPushButton[scale="large"] { min-height: 54px; padding: 0 16px; }
-QPushButton[scale="large"]:focus { min-height: 52px; padding: 0 15px; }
-QPushButton:checked { border-color: $accent; color: $accent; }
-QPushButton[role="row"] {
-    border: 1px solid transparent; text-align: left; padding: 0 6px; min-height: 22px;
-}
-QPushButton[role="row"]:hover { border-color: $line; }
-QPushButton[role="row"]:checked { border-color: $accent; color: $accent; }
-QPushButton[role="row"]:focus { border: 2px solid $accent; padding: 0 5px; min-height: 20px; }
-
-QPushButton[role="plan"] { border: 1px solid transparent; background: $bg; color: $muted; padding: 0 8px; }
-QPushButton[role="plan"]:hover { border-color: $accent; }
-QPushButton[role="plan"]:focus { border: 2px solid $accent; padding: 0 7px; }
-QPushButton[role="plan"][state="full"] { color: $ok; }
-QPushButton[role="plan"][state="now"] { color: $accent; border-color: $accent; background: $surface; }
-QToolButton[role="fold"] { border: 1px solid transparent; border-radius: 4px; }
-QToolButton[role="fold"]:hover, QToolButton[role="fold"]:focus { border-color: $accent; }
-
-QToolButton[role="rail"] {
-    border: 2px solid transparent; border-radius: 6px; color: $muted; padding: 8px 2px;
-}
-QToolButton[role="rail"]:hover { color: $text; background: $bg; }
-QToolButton[role="rail"]:checked { color: $accent; background: $bg; }
-QToolButton[role="rail"]:focus { border-color: $accent; }
-
-QLineEdit, QComboBox {
-    background: $surface; color: $text; border: 1px solid $muted; border-radius: 6px;
-    padding: 0 8px; min-height: 30px;
-}
-QCheckBox::indicator {
-    width: 14px; height: 14px; border: 1px solid $muted; border-radius: 3px; background: $surface;
-}
-QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
-QCheckBox::indicator:disabled { background: $bg; border-color: $line; }
-QCheckBox::indicator:focus { width: 12px; height: 12px; border: 2px solid $accent; }
-QCheckBox::indicator:checked:focus { border-color: $text; }
-QPlainTextEdit { background: $surface; color: $text; border: 1px solid $line; border-radius: 6px; }
-QPlainTextEdit:focus, QScrollArea:focus { border: 2px solid $accent; }
-QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
-QLineEdit { placeholder-text-color: $muted; }
-QLineEdit:disabled, QComboBox:disabled { color: $muted; border-color: $line; background: $bg; }
-QComboBox::drop-down { border: none; width: 24px; }
-QComboBox QAbstractItemView {
-    background: $surface; color: $text; border: 1px solid $line; outline: none;
-    selection-background-color: $accent; selection-color: $on_accent;
-}
-QTableView {
-    background: $surface; alternate-background-color: $bg; color: $text; border: none; outline: none;
-    selection-background-color: $accent; selection-color: $on_accent;
-}
-/* With the frame of 3 px that Qt leaves around a cell, in line with the titles. */
-QTableView::item { padding: 0 5px; border: none; }
-QTableView::item:selected { background: $accent; color: $on_accent; }
-QHeaderView { background: $surface; border: none; }
-QHeaderView::section {
-    background: $surface; color: $muted; border: none; border-bottom: 1px solid $line; padding: 6px 8px;
-}
-QHeaderView[role="tight"]::section { padding: 6px; }
-QTabBar { background: $surface; font-weight: 400; }
-QTabBar::tab {
-    background: $surface; color: $text; border: none; border-bottom: 2px solid transparent;
-    padding: 6px 10px; margin: 2px 0 2px 4px;
-}
-QTabBar QToolButton { background: $surface; border: 1px solid $line; border-radius: 4px; }
-QTabBar::tab:hover { border-bottom-color: $line; }
-QTabBar::tab:selected { color: $accent; border-bottom-color: $accent; }
-QTabBar::tab:focus { color: $text; }
-QTabBar::tab:disabled { color: $muted; }
-QToolTip { background: $surface; color: $text; border: 1px solid $line; padding: 4px; }
-QProgressBar {
-    background: $bg; border: 1px solid $line; border-radius: 4px; max-height: 6px; min-height: 6px;
-}
-QProgressBar::chunk { background: $accent; border-radius: 3px; }
-QScrollBar:vertical { background: transparent; width: 8px; }
-QScrollBar::handle:vertical { background: $muted; border-radius: 4px; min-height: 24px; }
-QScrollBar:horizontal { background: transparent; height: 8px; }
-QScrollBar::handle:horizontal { background: $muted; border-radius: 4px; min-width: 24px; }
-QAbstractScrollArea::corner { background: transparent; border: none; }
-QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
-QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
-"""
+    """Style sheet with the colours of a scheme in place of its `$names`."""
+    return Template(_STYLE.read_text(encoding="utf-8")).substitute(asdict(tokens))

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.record.state import PendingDecision
 from app.presenters.results import FRICTION, make_row, sentence
 from app.runs.next_tests import NextTests
 from messages.i18n import gettext
@@ -103,9 +102,6 @@ class RecordedRun:
         """Edited note; None where it is stored already."""
         return None if self.edited_note.strip() == self.note else self.edited_note.strip()
 
-    def keeping(self, author: str) -> KeepRun:
-        return KeepRun(self.path, author, self.note_to_store, self.has_results)
-
     @property
     def storing_message(self) -> Chip:
         return Chip(f"{self.results_text} {gettext('Keeping {name}', name=self.name)}".strip())
@@ -135,10 +131,6 @@ class RunDecisions:
     """Paths of runs to keep once they are identified: the operator went on before."""
     storing: Mapping[str, RecordedRun] = field(default_factory=dict)
     """Runs that are being kept, by path."""
-
-    @property
-    def shown(self) -> PendingDecision | None:
-        return None if self.pending is None else PendingDecision(self.pending.edited_note)
 
     def undo_text(self, *, is_free: bool) -> str:
         """What undo does; a kept run is decided about again only if the screen `is_free`."""
@@ -179,20 +171,16 @@ class RunDecisions:
 
     def after_keeping(self, task: KeepRun) -> "RunDecisions":
         """A run is kept; a newer message stays."""
-        run = self.storing.get(task.path)
-        storing = {path: other for path, other in self.storing.items() if path != task.path}
+        storing = dict(self.storing)
+        run = storing.pop(task.path, None)
         message = run.stored_message if run and self.message == run.storing_message else self.message
         return replace(self, storing=storing, message=message)
 
     def after_moving(self, task: MoveToTrash, trash_path: str) -> "RunDecisions":
         is_last = self.last is not None and self.last.path == task.path
-        name = Path(task.path).stem
-        return replace(
-            self,
-            is_moving=False,
-            trash_path=trash_path if is_last else self.trash_path,
-            message=Chip(gettext("Moved {name} to the trash", name=name), Tone.WARN, trash_path),
-        )
+        message = Chip(gettext("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, trash_path)
+        path = trash_path if is_last else self.trash_path
+        return replace(self, is_moving=False, trash_path=path, message=message)
 
     def after_failure(self, task: RecordTask, message: Message) -> "RunDecisions":
         """A task failed; the files are as they were."""

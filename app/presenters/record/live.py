@@ -16,7 +16,7 @@ from app.acquisition.ring import RingRows
 from app.presenters import number_text, results
 from app.presenters.base import Chip, Tone
 from app.presenters.decimated_history import DecimatedHistory, Polyline
-from app.presenters.record.state import NO_READINGS, LiveEstimate, LiveReadings, Span, TraceMarks, Traces
+from app.presenters.record.state import LiveEstimate, LiveReadings, Span, TraceMarks, Traces
 from app.presenters.results import FRICTION, MAIN
 from config.schema import Gauge, Gauges
 from drivers.samples import SampleStatus
@@ -56,16 +56,13 @@ _NEAR_LIMIT = 0.95
 """Part of a gauge's range beyond which a reading is near its limit."""
 
 
-# --- traces and readings -----------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class LiveTraces:
     """Samples since the connection, and what is drawn of them.
 
-    Until release the last `ROLLING_S` are drawn. From release on, the time axis starts
-    `BEFORE_RELEASE_S` before it and grows in steps. After the end of the run the traces stand still
-    until `restarted`. All methods return a changed copy; only `samples` grows in place.
+    Until release the last `ROLLING_S` are drawn. From release on, the time axis starts `BEFORE_RELEASE_S`
+    before it and grows in steps. After the end of the run the traces stand still until `restarted`. All
+    methods return a changed copy; only `samples` grows in place.
     """
 
     ranges_m: tuple[float | None, float | None] = (None, None)
@@ -90,7 +87,7 @@ class LiveTraces:
     read_s: float = float("-inf")
     """Time of the sample that the readings were taken at."""
     traces: Traces = field(default_factory=Traces)
-    readings: LiveReadings = NO_READINGS
+    readings: LiveReadings = field(default_factory=LiveReadings)
 
     @classmethod
     def of_gauges(cls, gauges: Gauges) -> "LiveTraces":
@@ -121,15 +118,8 @@ class LiveTraces:
 
     def restarted(self) -> "LiveTraces":
         """Roll again, for the next run."""
-        return replace(
-            self,
-            zero_m=self.tare_m,
-            release_s=None,
-            slip_s=None,
-            end_s=None,
-            is_pulled=False,
-            is_held=False,
-        )
+        rolling = replace(self, release_s=None, slip_s=None, end_s=None)
+        return replace(rolling, zero_m=self.tare_m, is_pulled=False, is_held=False)
 
     def stopped(self) -> "LiveTraces":
         """End the run with the newest sample, unless its end is known."""
@@ -163,16 +153,9 @@ class LiveTraces:
     def with_rows(
         self, rows: RingRows, pullback_m: float, plate_range: AllowedPlateRange | None
     ) -> "LiveTraces":
-        """Append samples and draw them; readings are taken every `_READINGS_EVERY_S`.
+        """Append samples, at least one, and draw them; readings are taken every `_READINGS_EVERY_S`.
 
-        Parameters
-        ----------
-        rows : RingRows
-            At least one.
-        pullback_m : float
-            Nominal pullback.
-        plate_range : AllowedPlateRange or None
-            Allowed position of the plate, if it is to be drawn.
+        `pullback_m` is the nominal pullback; `plate_range` is drawn unless it is None.
         """
         is_settled = self.is_settled
         self.samples.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
@@ -211,7 +194,7 @@ class LiveTraces:
 
     # --- drawing ---
 
-    def _draw(self, pullback_m: float, plate_range: AllowedPlateRange | None) -> Traces:
+    def _draw(self, pullback_m: float, room: AllowedPlateRange | None) -> Traces:
         origin_s, span = self._time_axis()
         last_s = min(origin_s + span[1], np.inf if self.end_s is None else self.end_s)
         lines = self.samples.lines(origin_s + span[0], last_s + 1e-9, self.width_px)
@@ -219,13 +202,21 @@ class LiveTraces:
             Polyline(line.time_s - origin_s, 1e3 * (line.value - zero_m))
             for line, zero_m in zip(lines, self.zero_m, strict=True)
         )
-        marks = self._marks(origin_s, span, table, pullback_m, plate_range)
-        from_release = self.release_s is not None
+        is_released = self.release_s is not None
+        marks = TraceMarks(
+            before_release=(-BEFORE_RELEASE_S, 0.0) if is_released else None,
+            release_s=0.0 if is_released else None,
+            slip=self._slip_span(origin_s, span),
+            target_mm=self._target_mm(table, pullback_m) if self.is_pulled else None,
+            table_range_mm=self._range_mm(0),
+            relative_range_mm=self._range_mm(1),
+            plate_range_mm=None if room is None else self._shown_mm(1, room.low_m, room.high_m),
+        )
         return Traces(
             table=table,
             relative=relative,
             span=span,
-            time_title=gettext("time from release, s") if from_release else gettext("time from now, s"),
+            time_title=gettext("time from release, s") if is_released else gettext("time from now, s"),
             table_limit_mm=_limit_mm(table, pullback_m, marks.table_range_mm),
             relative_limit_mm=_limit_mm(relative, pullback_m, marks.relative_range_mm),
             marks=marks,
@@ -239,26 +230,6 @@ class LiveTraces:
         if self.release_s is None:
             return now_s, (-ROLLING_S, 0.0)
         return self.release_s, (-BEFORE_RELEASE_S, _step_up(now_s - self.release_s, _SPANS_S))
-
-    def _marks(
-        self,
-        origin_s: float,
-        span: Span,
-        table: Polyline,
-        pullback_m: float,
-        plate_range: AllowedPlateRange | None,
-    ) -> TraceMarks:
-        is_released = self.release_s is not None
-        room = None if plate_range is None else self._shown_mm(1, plate_range.low_m, plate_range.high_m)
-        return TraceMarks(
-            before_release=(-BEFORE_RELEASE_S, 0.0) if is_released else None,
-            release_s=0.0 if is_released else None,
-            slip=self._slip_span(origin_s, span),
-            target_mm=self._target_mm(table, pullback_m) if self.is_pulled else None,
-            table_range_mm=self._range_mm(0),
-            relative_range_mm=self._range_mm(1),
-            plate_range_mm=room,
-        )
 
     def _target_mm(self, table: Polyline, pullback_m: float) -> Span | None:
         """Allowed displacement at the end of the pull, on the side that the table is pulled to."""
@@ -308,9 +279,6 @@ def tare_chip(live: LiveTraces | None) -> Chip:
     return Chip(gettext("Tared by {by}", by=by), Tone.OK, hint)
 
 
-# --- live identification -----------------------------------------------------------------
-
-
 def live_estimate(result: LiveResult) -> LiveEstimate:
     """Rows of T, n1 and f_d as far as they are known, and whether waiting still narrows them."""
     if result.message:
@@ -331,9 +299,6 @@ def _stop_note(result: LiveResult) -> str:
     if not narrower:
         return may_stop
     return gettext("{may_stop}; it still narrows {what}", may_stop=may_stop, what=narrower)
-
-
-# --- status bar --------------------------------------------------------------------------
 
 
 def rate_text(rate_hz: float) -> str:

@@ -9,33 +9,12 @@ from app.presenters.base import Progress
 from app.presenters.record.decisions import RunDecisions
 from app.presenters.record.live import GaugeMonitor, LiveTraces
 from app.presenters.record.next_runs import NextRuns
-from app.presenters.record.state import (
-    NO_ESTIMATE,
-    NO_STATUS,
-    Action,
-    LiveEstimate,
-    StandContext,
-    StatusBar,
-    Traces,
-)
+from app.presenters.record.state import Action, LiveEstimate, StandContext, StatusBar, Traces
 from app.presenters.results import Result
 from config.schema import Gauges
 
-UNKNOWN_POSITION = StandPosition()
-RECORDING_STATES = frozenset(
-    {
-        PullbackState.RECENTRE,
-        PullbackState.ZERO,
-        PullbackState.PULLING,
-        PullbackState.HELD,
-        PullbackState.ARMED,
-        PullbackState.RELEASED,
-        PullbackState.SLIPPING,
-        PullbackState.NO_SLIP,
-        PullbackState.TAIL,
-        PullbackState.RECORDING,
-    }
-)
+_NOT_RECORDING = {PullbackState.CONNECTING, PullbackState.IDLE, PullbackState.CLOSING}
+RECORDING_STATES = frozenset(PullbackState) - _NOT_RECORDING
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,26 +25,24 @@ class Session:
     """State that the engine reported last; None without an engine."""
     is_command_pending: bool = False
     """The engine has not yet answered a command."""
-    position: StandPosition = UNKNOWN_POSITION
+    position: StandPosition = field(default_factory=StandPosition)
     note: str = ""
-    """Note of the engine with its state."""
     loss_reason: str = ""
     """Why the device is lost; empty while it is there."""
     waiting_for: str = ""
     """Process that is started before the engine reports."""
     simulated: bool = False
     true_friction: float | None = None
-    """f_d of a simulated stand."""
     device: str = ""
     heard_s: float = 0.0
     """Time of the last event of the engine."""
     series: str = ""
     run_name: str = ""
     run_note: str = ""
-    """series/run_name/run_note: Of the run that was armed last: series, name of its file, note."""
+    """Series, name of the file and note of the run that was armed last."""
     remaining_runs: int = 0
     """Runs that follow without a command."""
-    live_estimate: LiveEstimate = NO_ESTIMATE
+    live_estimate: LiveEstimate = field(default_factory=LiveEstimate)
 
     @property
     def is_recording(self) -> bool:
@@ -84,11 +61,10 @@ class EndedRun:
     series: str
     name: str
     note: str
-    """series/name/note: Series, name of the file, and note that it was armed with."""
+    """Series, name of the file, and note that the run was armed with."""
     result: Result | None = None
     """None while the run is being identified."""
     progress: Progress | None = None
-    """Of the identification."""
 
     @property
     def is_awaited(self) -> bool:
@@ -120,19 +96,13 @@ class RecordModel:
     snapshot: Snapshot | None = None
     """Of the run that was shown before."""
     decisions: RunDecisions = field(default_factory=RunDecisions)
-    status_bar: StatusBar = NO_STATUS
+    status_bar: StatusBar = field(default_factory=StatusBar)
     sounds: bool = False
-    """States are played."""
 
     @classmethod
     def of_stand(cls, stand: StandContext, author: str) -> "RecordModel":
-        return cls(
-            stand,
-            author,
-            NextRuns.of_series(stand.all_series),
-            LiveTraces.of_gauges(stand.gauges),
-            monitors_of(stand.gauges),
-        )
+        next_runs, live = NextRuns.of_series(stand.all_series), LiveTraces.of_gauges(stand.gauges)
+        return cls(stand, author, next_runs, live, monitors_of(stand.gauges))
 
     @property
     def pullback_m(self) -> float:

@@ -13,12 +13,12 @@ from app.acquisition.messages import RunSettings
 from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from app.presenters.record.decisions import LoadedPlan, SavePlan
-from app.presenters.record.state import NO_PLAN, PlanState, RunChoices, RunForm, SeriesProgress
+from app.presenters.record.state import PlanState, RunChoices, RunForm, SeriesProgress
 from app.presenters.results import sentence
 from app.runs.errors import ConditionError, MetadataError
 from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
 from messages.i18n import gettext
-from messages.message import message
+from messages.message import MessageError, message
 
 REPEATS_DEFAULT = 3
 """Repeats of a planned series without a number: the fewest that show an outlier."""
@@ -42,7 +42,7 @@ class NextRuns:
     """Choices for the next runs, the series plan and its progress."""
 
     choices: RunChoices
-    plan: PlanState = NO_PLAN
+    plan: PlanState = field(default_factory=PlanState)
     tests: NextTests = field(default_factory=NextTests)
     """Plan, series, operator and conditions, as they are stored in the folder of runs."""
     saved: NextTests = field(default_factory=NextTests)
@@ -62,8 +62,6 @@ class NextRuns:
     @classmethod
     def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
         return cls(RunChoices(series=all_series[0], all_series=all_series))
-
-    # --- choices ---
 
     @property
     def series(self) -> str:
@@ -99,14 +97,12 @@ class NextRuns:
         number = str(int(number) + 1) if number.strip().isdecimal() else number
         return self.with_choices(form=replace(form, note="", run_in_number=number))
 
-    # --- plan ---
-
     def with_plan(self, text: str) -> "NextRuns":
         """Take an edited plan; text that is no plan is in `plan.text`, the reason in `plan.error`."""
         try:
             plan = parse_plan(text, self.choices.all_series)
-        except ValueError as error:
-            return replace(self, plan=replace(self.plan, text=text, error=sentence(str(error))))
+        except PlanError as error:
+            return replace(self, plan=replace(self.plan, text=text, error=sentence(error.message)))
         changed = replace(self, is_edited=True, tests=self.tests.replace(plan=plan))
         return changed._counted().with_next_series()
 
@@ -115,12 +111,12 @@ class NextRuns:
         changed = replace(self, is_loaded=True, saved=loaded.tests)
         if not self.is_edited:
             stored = loaded.tests
-            series = self.series
-            if stored.series in self.choices.all_series and not self.choices.series_fixed:
-                series = stored.series
-            changed = replace(changed, tests=stored).with_choices(
-                series=series, form=_stored_form(stored, self.choices.form)
+            is_possible = stored.series in self.choices.all_series and not self.choices.series_fixed
+            series, form = (
+                stored.series if is_possible else self.series,
+                _stored_form(stored, self.choices.form),
             )
+            changed = replace(changed, tests=stored).with_choices(series=series, form=form)
         return changed.with_completed(loaded.completed).with_next_series()
 
     def with_completed(self, completed: CompletedRuns) -> "NextRuns":
@@ -148,18 +144,14 @@ class NextRuns:
         """Number of the next run in its series: `1FFM0 run 2 of 3`."""
         return run_text(self.plan.progress, series, self._counts()[series])
 
-    # --- what is sent on ---
-
     def to_save(self, folder: str) -> tuple["NextRuns", SavePlan | None]:
         """Prepare storing the choices; nothing is stored unless the stored plan could be read."""
         if not self.is_loaded or self.choices.form_error:
             return self, None
         form = self.choices.form
-        tests = self.tests.replace(
-            series=self.series,
-            operator=form.operator.strip(),
-            conditions=parse_conditions(form, self.tests.conditions.other),
-        )
+        conditions = parse_conditions(form, self.tests.conditions.other)
+        operator = form.operator.strip()
+        tests = self.tests.replace(series=self.series, operator=operator, conditions=conditions)
         if tests == self.saved:
             return replace(self, tests=tests), None
         return replace(self, tests=tests, saved=tests), SavePlan(folder, tests)
@@ -189,8 +181,6 @@ class NextRuns:
         text = gettext("{series} is full: arm again for {next}", series=series, next=self.series)
         return Chip(text, Tone.WARN)
 
-    # --- inside ---
-
     def _counts(self) -> Counter[str]:
         return Counter(series for path, series in self.completed if path != self.undecided_path)
 
@@ -199,39 +189,36 @@ class NextRuns:
         return replace(self, plan=PlanState(plan_progress(plan, self._counts()), format_plan(plan)))
 
 
-# --- the plan as text --------------------------------------------------------------------
+class PlanError(MessageError, ValueError):
+    """A text is no series plan."""
 
 
 def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
-    """Parse a plan such as `1FF* x3, 2SSM0 x5`; empty text is an empty plan.
+    """Parse a plan such as `1FF* x3, 2SSM0 x5`; empty text is an empty plan. Raises PlanError.
 
-    `*` and `?` match any part of a series code. A series without a number is repeated
-    `REPEATS_DEFAULT` times.
-
-    Raises
-    ------
-    ValueError
-        The text is no plan; the message is translated.
+    `*` and `?` match any part of a series code. A series without a number is repeated `REPEATS_DEFAULT`
+    times.
     """
     planned: dict[str, PlannedSeries] = {}
     for part in filter(None, (part.strip().upper() for part in re.split(r"[,;\n]", text))):
         found = _PLAN_PART.fullmatch(part)
         if found is None:
-            raise ValueError(
-                gettext(
-                    "{part!r} is no part of a plan: write series and repeats, for example 1FFM0 x3", part=part
-                )
+            raise PlanError(
+                "{part!r} is no part of a plan: write series and repeats, for example 1FFM0 x3", part=part
             )
         pattern, repeats = found[1], int(found[2] or REPEATS_DEFAULT)
         if not 1 <= repeats <= REPEATS_MAX:
-            raise ValueError(
-                gettext("{part!r}: repeat a series 1 to {most} times", part=part, most=REPEATS_MAX)
+            raise PlanError("{part!r}: repeat a series 1 to {most} times", part=part, most=REPEATS_MAX)
+        matching = [series for series in all_series if fnmatchcase(series, pattern)]
+        if not matching:
+            raise PlanError(
+                "{pattern} is no series of this stand: write one like {example}, or 1FF*",
+                pattern=pattern,
+                example=all_series[0],
             )
-        for series in _matching(pattern, all_series):
+        for series in matching:
             if series in planned and "*" not in pattern and "?" not in pattern:
-                raise ValueError(
-                    gettext("{series} is planned twice: give it one number of repeats", series=series)
-                )
+                raise PlanError("{series} is planned twice: give it one number of repeats", series=series)
             planned.setdefault(series, PlannedSeries(series, repeats))
     return tuple(planned.values())
 
@@ -262,22 +249,6 @@ def run_text(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
     if done >= planned:
         return gettext("{series} full: {done} of {planned}", series=series, done=done, planned=planned)
     return gettext("{series} run {number} of {planned}", series=series, number=done + 1, planned=planned)
-
-
-def _matching(pattern: str, all_series: Sequence[str]) -> list[str]:
-    found = [series for series in all_series if fnmatchcase(series, pattern)]
-    if not found:
-        raise ValueError(
-            gettext(
-                "{pattern} is no series of this stand: write one like {example}, or 1FF*",
-                pattern=pattern,
-                example=all_series[0],
-            )
-        )
-    return found
-
-
-# --- the form ----------------------------------------------------------------------------
 
 
 def form_summary(form: RunForm) -> str:
@@ -319,9 +290,7 @@ def _parse_count(form: RunForm) -> int:
     text = form.count.strip() or "1"
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= REPEATS_MAX):
         raise MetadataError(
-            "runs in a row = {text!r} is no whole number from 1 to {repeats_max}",
-            text=text,
-            repeats_max=REPEATS_MAX,
+            "runs in a row = {text!r} is no whole number from 1 to {most}", text=text, most=REPEATS_MAX
         )
     return int(text)
 

@@ -127,7 +127,7 @@ def record_state(model: RecordModel) -> RecordState:
         live_estimate=session.live_estimate,
         result=ended.result if ended else None,
         progress=ended.progress if ended else None,
-        decision=decisions.shown,
+        decision=decisions.pending.edited_note if decisions.pending else None,
         status_message=_status_message(model),
         undo=model.undo_text,
         allowed=allowed,

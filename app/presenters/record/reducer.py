@@ -73,13 +73,7 @@ _NEW_MOTION = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackStat
 
 
 def reduce(model: RecordModel, event: RecordEvent) -> tuple[RecordModel, tuple[Effect, ...]]:
-    """Apply an event.
-
-    Returns
-    -------
-    RecordModel, tuple of Effect
-        The new model, and what the presenter has to send.
-    """
+    """Apply an event: return the new model, and what the presenter has to send."""
     reduction = _Reduction(model)
     reduction.apply(event)
     if not isinstance(event, ClockTicked | RingRows):
@@ -88,13 +82,14 @@ def reduce(model: RecordModel, event: RecordEvent) -> tuple[RecordModel, tuple[E
 
 
 class _Reduction:
-    """Changes of one event: replaces `model` step by step, and collects `effects`."""
+    """Changes by one event: replaces `model` step by step, and collects `effects`."""
 
     def __init__(self, model: RecordModel) -> None:
         self.model = model
         self.effects: list[Effect] = []
 
     def apply(self, event: RecordEvent) -> None:
+        model = self.model
         match event:
             case RingRows():
                 self._on_samples(event)
@@ -102,23 +97,44 @@ class _Reduction:
                 self._on_clock(now_s)
             case Action():
                 self._on_action(event)
-            case ScreenEntered() | SeriesChosen() | RunForm() | PlanEdited() | NoteEdited() | PlotResized():
-                self._on_operator(event)
+            case ScreenEntered():
+                self._load_plan()
+            case SeriesChosen(series):
+                self._choose_series(series)
+            case RunForm():
+                if model.next_runs.choices.editable:
+                    self._save(model.next_runs.with_form(event))
+            case PlanEdited(text):
+                self._on_plan(model.next_runs.with_plan(text))
+            case NoteEdited(note):
+                self._set(decisions=model.decisions.with_note(note))
+            case PlotResized(width_px):
+                self._set(live=model.live.with_width(width_px))
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
             case AnalysedRun() | TaskFailed(str()) | TaskProgress():
                 self._on_identification(event)
-            case TaskFailed(is_cancelled=False):
-                self._on_task_failed(event.argument, event.message)
-            case TaskFailed():
-                pass
-            case Connecting() | Disconnected() | SimulationStarted():
-                self._on_connection(event)
+            case TaskFailed(task, message, is_cancelled):
+                if not is_cancelled:
+                    self._on_task_failed(task, message)
+            case Connecting(device, waiting_for):
+                self._close_ended()
+                self._set_session(true_friction=None, waiting_for=waiting_for)
+                self._load_plan()
+                self._start_over(PullbackState.CONNECTING, device)
+            case Disconnected():
+                self._set_session(simulated=False)
+                self._set(next_runs=model.next_runs.with_fixed_series("", ""))
+                self._start_over(None, "")
+            case SimulationStarted(series, true_friction):
+                self._set_session(simulated=True, true_friction=true_friction)
+                hint = gettext("The simulated stand runs this series.")
+                self._set(next_runs=model.next_runs.with_fixed_series(series, hint))
             case Settings():
-                next_runs = self.model.next_runs.with_suggested_operator(event.operator)
+                next_runs = model.next_runs.with_suggested_operator(event.operator)
                 self._set(sounds=event.sounds, next_runs=next_runs)
             case Gauges():
-                self._set(stand=replace(self.model.stand, gauges=event), monitors=monitors_of(event))
+                self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
             case RunsChanged():
                 self._count_completed()
             case _:
@@ -161,33 +177,17 @@ class _Reduction:
                 self._move_to_trash()
                 self._close_ended()
 
-    def _on_operator(
-        self, event: ScreenEntered | SeriesChosen | RunForm | PlanEdited | NoteEdited | PlotResized
-    ) -> None:
-        model = self.model
-        match event:
-            case ScreenEntered():
-                self._load_plan()
-            case SeriesChosen(series):
-                self._choose_series(series)
-            case RunForm() if model.next_runs.choices.editable:
-                self._save(model.next_runs.with_form(event))
-            case PlanEdited(text):
-                next_runs = model.next_runs.with_plan(text)
-                self._set(next_runs=next_runs)
-                if not next_runs.plan.error:
-                    self._save(next_runs)
-            case NoteEdited(note):
-                self._set(decisions=model.decisions.with_note(note))
-            case PlotResized(width_px):
-                self._set(live=model.live.with_width(width_px))
+    def _on_plan(self, next_runs: NextRuns) -> None:
+        self._set(next_runs=next_runs)
+        if not next_runs.plan.error:
+            self._save(next_runs)
 
     def _choose_series(self, series: str) -> None:
         if self.model.next_runs.can_choose_series:
             self._save(self.model.next_runs.with_choices(series=series))
 
     def _arm(self, count: int | None = None) -> None:
-        """Send the next run to the engine, unless there is a reason not to, which is shown."""
+        """Send the next run to the engine, or show why it cannot be recorded."""
         series = self.model.next_runs.series
         reason = self.model.next_runs.why_not_armed(series)
         if not reason.text:
@@ -198,26 +198,20 @@ class _Reduction:
             return
         next_runs = self.model.next_runs
         run, count = next_runs.run_settings(self.model.stand.directory), count or next_runs.run_count
-        self._set_session(
-            is_command_pending=True,
-            remaining_runs=count - 1,
-            series=run.series or "",
-            run_note=run.note,
-            run_name="",
-        )
+        self._set_session(is_command_pending=True, remaining_runs=count - 1)
+        self._set_session(series=run.series or "", run_note=run.note, run_name="")
         self.effects.append(Arm(run, count))
 
     # --- decisions about runs ---
 
     def _decide(self) -> RecordedRun | None:
-        """Take the pending run, if there is one, as decided about."""
         run = self.model.decisions.pending
         self._set(decisions=self.model.decisions.decided())
         return run
 
     def _keep(self, run: RecordedRun) -> None:
         self._set(decisions=self.model.decisions.keeping(run))
-        self.effects.append(run.keeping(self.model.author))
+        self.effects.append(KeepRun(run.path, self.model.author, run.note_to_store, run.has_results))
 
     def _move_to_trash(self) -> None:
         run = self._decide()
@@ -261,7 +255,7 @@ class _Reduction:
             self._show_again(self.model.snapshot.ended.result.path)
 
     def _show_again(self, path: str) -> None:
-        """Show the run that was shown before, which is at `path` now, until it is decided about."""
+        """Show the previous run, which is at `path` now, until it is decided about."""
         snapshot = self.model.snapshot
         if snapshot is None or snapshot.ended.result is None:
             return
@@ -335,12 +329,11 @@ class _Reduction:
             case TaskProgress(_, progress):
                 self._set(ended=replace(ended, progress=progress))
             case AnalysedRun():
-                self._set(decisions=replace(model.decisions, pending=RecordedRun.of(event)))
-                self._set_result(results.make_result(event, model.session.true_friction))
+                result = results.make_result(event, model.session.true_friction)
+                self._set_result(ended, result, RecordedRun.of(event))
             case TaskFailed(_, message):
-                pending = RecordedRun(path, ended.note, ended.note)
-                self._set(decisions=replace(model.decisions, pending=pending))
-                self._set_result(results.failed_result(message, path, ended.event.ended))
+                result = results.failed_result(message, path, ended.event.ended)
+                self._set_result(ended, result, RecordedRun(path, ended.note, ended.note))
 
     def _on_late_identification(self, event: AnalysedRun | TaskFailed | TaskProgress, path: str) -> None:
         """Keep a run that the operator has gone on from; without a result it stays as it is."""
@@ -352,40 +345,17 @@ class _Reduction:
             self._set(decisions=self.model.decisions.undone())
             self._keep(RecordedRun.of(event))
 
-    def _set_result(self, result: Result) -> None:
-        if self.model.ended is not None:
-            self._set(ended=replace(self.model.ended, result=result, progress=None))
+    def _set_result(self, ended: EndedRun, result: Result, pending: RecordedRun) -> None:
+        decisions = replace(self.model.decisions, pending=pending)
+        self._set(ended=replace(ended, result=result, progress=None), decisions=decisions)
 
     # --- engine and connection ---
-
-    def _on_connection(self, event: Connecting | Disconnected | SimulationStarted) -> None:
-        match event:
-            case Connecting(device, waiting_for):
-                self._close_ended()
-                self._set_session(true_friction=None, waiting_for=waiting_for)
-                self._load_plan()
-                self._start_over(PullbackState.CONNECTING, device)
-            case Disconnected():
-                self._set_session(simulated=False)
-                self._set(next_runs=self.model.next_runs.with_fixed_series("", ""))
-                self._start_over(None, "")
-            case SimulationStarted(series, true_friction):
-                self._set_session(simulated=True, true_friction=true_friction)
-                hint = gettext("The simulated stand runs this series.")
-                self._set(next_runs=self.model.next_runs.with_fixed_series(series, hint))
 
     def _start_over(self, engine: PullbackState | None, device: str) -> None:
         """Another engine reports from now on, or none; the result of the last run stays."""
         model = self.model
-        self._set_session(
-            engine=engine,
-            device=device,
-            position=StandPosition(),
-            is_command_pending=False,
-            remaining_runs=0,
-            note="",
-            loss_reason="",
-        )
+        self._set_session(engine=engine, device=device, position=StandPosition(), note="", loss_reason="")
+        self._set_session(is_command_pending=False, remaining_runs=0)
         bar = StatusBar(device_chip(device), run=model.status_bar.run) if device else StatusBar()
         gauges = model.stand.gauges
         self._set(status_bar=bar, monitors=monitors_of(gauges), live=model.live.reconnected(gauges))
@@ -406,11 +376,8 @@ class _Reduction:
             case Reconnected():
                 self._set_loss("")
             case Health():
-                self._set_bar(
-                    rate=rate_text(event.rate_hz),
-                    lost_samples=lost_samples_chip(event),
-                    disk=disk_chip(event.free_disk_bytes, event.bytes_per_s),
-                )
+                disk = disk_chip(event.free_disk_bytes, event.bytes_per_s)
+                self._set_bar(rate=rate_text(event.rate_hz), lost_samples=lost_samples_chip(event), disk=disk)
             case LiveResult():
                 self._set_session(live_estimate=live_estimate(event))
             case RunStarted(path):
@@ -427,30 +394,23 @@ class _Reduction:
         if event.state in RECORDING_STATES and follows:  # without a command: the next run in a row
             remaining = max(remaining - 1, 0)
         self._set(live=self.model.live.on_state(event.state, event.since_s, event.position))
-        self._set_session(
-            engine=event.state,
-            position=event.position,
-            note=event.note,
-            remaining_runs=remaining,
-            live_estimate=LiveEstimate() if event.state in _NEW_MOTION else session.live_estimate,
-            is_command_pending=False,
-            waiting_for="",
-        )
+        self._set_session(engine=event.state, position=event.position, note=event.note)
+        self._set_session(remaining_runs=remaining, is_command_pending=False, waiting_for="")
+        if event.state in _NEW_MOTION:
+            self._set_session(live_estimate=LiveEstimate())
 
     def _on_run_ended(self, event: RunEnded) -> None:
         session = self.model.session
         self._set_session(is_command_pending=False, remaining_runs=event.remaining)
-        progress = Progress(gettext("Identifying"))
-        self._set(
-            ended=EndedRun(event, session.series, session.run_name, session.run_note, progress=progress),
-            live=self.model.live.stopped(),
-            decisions=self.model.decisions.without_last(),
-        )
+        ended = EndedRun(event, session.series, session.run_name, session.run_note)
         if event.path:
             self._save(self.model.next_runs.with_undecided(event.path).after_recording())
+            ended = replace(ended, progress=Progress(gettext("Identifying")))
         else:
             reason = event.message or gettext("nothing was recorded")
-            self._set_result(results.failed_result(reason, "", event.ended))
+            ended = replace(ended, result=results.failed_result(reason, "", event.ended))
+        decisions = self.model.decisions.without_last()
+        self._set(ended=ended, live=self.model.live.stopped(), decisions=decisions)
 
     def _set_loss(self, reason: str) -> None:
         self._set_session(loss_reason=reason)
@@ -468,10 +428,8 @@ class _Reduction:
         model, today = self.model, self.model.stand.today()
         first, second = model.monitors
         monitors = first.with_rows(rows), second.with_rows(rows)
-        self._set(
-            monitors=monitors,
-            live=model.live.with_rows(rows, model.pullback_m, model.shown_plate_range),
-        )
+        live = model.live.with_rows(rows, model.pullback_m, model.shown_plate_range)
+        self._set(monitors=monitors, live=live)
         self._set_bar(gauges=tuple(monitor.chip(rows, today) for monitor in monitors))
 
     # --- changes of the model ---

@@ -31,9 +31,7 @@ class StandContext:
     stand: Stand
     gauges: Gauges
     all_series: tuple[str, ...]
-    """Series codes."""
     directory: Path
-    """Folder that runs are stored in."""
     today: Callable[[], datetime.date] = datetime.date.today
     """Current date, for the validity of calibrations."""
     clock: Callable[[], float] = time.monotonic
@@ -45,12 +43,8 @@ class StandContext:
     def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
         """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
         range_m = self.gauges.relative.range_m
-        if range_m is None:
-            return None
-        return allowed_plate_range(range_m, default_excursion(self.pullback_m(series)))
-
-
-# --- parts of the state ------------------------------------------------------------------
+        excursion_m = default_excursion(self.pullback_m(series))
+        return None if range_m is None else allowed_plate_range(range_m, excursion_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +57,6 @@ class StatusBar:
     gauges: tuple[Chip, ...] = ()
     disk: Chip = EMPTY_CHIP
     run: Chip = EMPTY_CHIP
-
-
-NO_STATUS = StatusBar()
 
 
 class StepStatus(StrEnum):
@@ -164,10 +155,6 @@ class LiveEstimate:
     note: str = ""
 
 
-NO_READINGS = LiveReadings()
-NO_ESTIMATE = LiveEstimate()
-
-
 @dataclass(frozen=True, slots=True)
 class RunForm:
     """Form of the next runs, as typed; conditions by the field names of `Conditions`."""
@@ -248,16 +235,6 @@ class PlanState:
         return sum(min(one.done, one.planned) for one in self.progress)
 
 
-NO_PLAN = PlanState()
-
-
-@dataclass(frozen=True, slots=True)
-class PendingDecision:
-    """A run waits for the decision to keep or to discard it; `note` is stored with either."""
-
-    note: str = ""
-
-
 class Action(StrEnum):
     """Actions of the operator that need no further data."""
 
@@ -290,14 +267,15 @@ class RecordState:
 
     guidance: GuidanceState
     choices: RunChoices
-    status_bar: StatusBar = NO_STATUS
+    status_bar: StatusBar = field(default_factory=StatusBar)
     traces: Traces = field(default_factory=Traces)
-    readings: LiveReadings = NO_READINGS
-    live_estimate: LiveEstimate = NO_ESTIMATE
+    readings: LiveReadings = field(default_factory=LiveReadings)
+    live_estimate: LiveEstimate = field(default_factory=LiveEstimate)
     result: Result | None = None
-    decision: PendingDecision | None = None
+    decision: str | None = None
+    """Note of the run that waits for a decision; None without one."""
     progress: Progress | None = None
-    plan: PlanState = NO_PLAN
+    plan: PlanState = field(default_factory=PlanState)
     status_message: Chip = EMPTY_CHIP
     """Outcome of the last action, and notes of the engine while nothing is recorded."""
     undo: str = ""
@@ -306,9 +284,6 @@ class RecordState:
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
     connected: bool = False
-
-
-# --- events ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

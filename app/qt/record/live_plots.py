@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import Plot, PlotStack, pen, place_region, shade, shaded_region, value_at
 from messages.i18n import N_, gettext
 
@@ -33,18 +34,15 @@ class LivePlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._stack = PlotStack(
-            theme, [(gettext(words), token) for words, token in TITLES], interactive=False
-        )
+        titles = [(gettext(text), token) for text, token in TITLES]
+        self._stack = PlotStack(theme, titles, interactive=False)
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
         self._pointed_s = math.nan
         self._curves = [plot.curve() for plot in self._stack.plots]
         self._marks = [_PlotMarks(plot, is_first=row == 0) for row, plot in enumerate(self._stack.plots)]
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._stack)
+        make_column(self._stack, of=self)
         self.setAccessibleName(gettext("Live traces of table displacement and relative displacement"))
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -53,7 +51,12 @@ class LivePlots(QWidget):
         if traces is self._traces:
             return
         old, self._traces = self._traces, traces
-        self._draw_axes(old, traces)
+        if traces.span != old.span:
+            self._stack.set_time_range(*traces.span)
+        if _limits(traces) != _limits(old):
+            self._set_limits()
+        if traces.time_title != old.time_title:
+            self._stack.set_time_title(gettext(traces.time_title))
         _draw(self._curves[0], traces.table, traces.table_limit_mm)
         _draw(self._curves[1], traces.relative, traces.relative_limit_mm)
         if traces.marks != old.marks:
@@ -61,17 +64,8 @@ class LivePlots(QWidget):
         if not math.isnan(self._pointed_s):
             self._read_out()
 
-    def _draw_axes(self, old: Traces, new: Traces) -> None:
-        if new.span != old.span:
-            self._stack.set_time_range(*new.span)
-        limits = (new.table_limit_mm, new.relative_limit_mm)
-        if limits != (old.table_limit_mm, old.relative_limit_mm):
-            self._set_limits(limits)
-        if new.time_title != old.time_title:
-            self._stack.set_time_title(gettext(new.time_title))
-
-    def _set_limits(self, limits: tuple[float, float]) -> None:
-        for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
+    def _set_limits(self) -> None:
+        for plot, limit_mm in zip(self._stack.plots, _limits(self._traces), strict=True):
             plot.set_value_range(-limit_mm, limit_mm)
 
     def _draw_marks(self, marks: TraceMarks) -> None:
@@ -86,7 +80,7 @@ class LivePlots(QWidget):
         for items in self._marks:
             items.restyle(self._theme)
         self._stack.set_time_range(*self._traces.span)
-        self._set_limits((self._traces.table_limit_mm, self._traces.relative_limit_mm))
+        self._set_limits()
         self._stack.set_time_title(gettext(self._traces.time_title))
         self._draw_marks(self._traces.marks)
 
@@ -97,8 +91,13 @@ class LivePlots(QWidget):
     def _read_out(self) -> None:
         for row, line in enumerate((self._traces.table, self._traces.relative)):
             value = value_at(line.time_s, line.value, self._pointed_s)
-            shown = "" if math.isnan(value) else _readout(self._pointed_s, value)
-            self._stack.set_readout(row, shown)
+            at, read = number_text.format_fixed(self._pointed_s, 3), number_text.format_fixed(value, 3)
+            text = f"{with_unit(at, 's')}   {with_unit(read, 'mm')}"
+            self._stack.set_readout(row, "" if math.isnan(value) else text)
+
+
+def _limits(traces: Traces) -> tuple[float, float]:
+    return traces.table_limit_mm, traces.relative_limit_mm
 
 
 class _PlotMarks:
@@ -181,10 +180,5 @@ def _place_line(item: Any, value: float | None) -> None:
 
 
 def _place_lines(items: list[Any], span: Span | None) -> None:
-    for item, value in zip(items, (None, None) if span is None else span, strict=True):
+    for item, value in zip(items, span or (None, None), strict=True):
         _place_line(item, value)
-
-
-def _readout(at_s: float, value_mm: float) -> str:
-    at = with_unit(number_text.format_fixed(at_s, 3), "s")
-    return f"{at}   {with_unit(number_text.format_fixed(value_mm, 3), 'mm')}"

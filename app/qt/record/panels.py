@@ -2,14 +2,7 @@
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QLabel,
-    QProgressBar,
-    QPushButton,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.record.state import (
@@ -17,7 +10,6 @@ from app.presenters.record.state import (
     GuidanceState,
     LiveEstimate,
     LiveReadings,
-    PendingDecision,
     PullbackTarget,
     Step,
     StepStatus,
@@ -51,16 +43,14 @@ class GuidancePanel(QWidget):
         self._connect.clicked.connect(self.connect_wanted)
         self._instruction = label(role=TextRole.INSTRUCTION, wrap=True)
         self._detail = label(role=TextRole.HEADING, wrap=True)
-        for sentence in (self._instruction, self._detail):
-            sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._instruction.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._detail.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._target = TargetBar(theme)
         self._stepper = Stepper()
         self._progress = QProgressBar()
         self._progress.setTextVisible(False)
         self._progress_text = label(muted=True)
-        self._estimates = [
-            ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_ESTIMATES_MAX)
-        ]
+        self._estimates = _value_labels(_ESTIMATES_MAX)
         self._note = label(muted=True, wrap=True)
         self._readings = (
             _Reading(gettext("u<sub>1</sub>, mm"), "1"),
@@ -89,9 +79,8 @@ class GuidancePanel(QWidget):
     def show_guidance(self, guidance: GuidanceState) -> None:
         self._instruction.setText(guidance.instruction)
         self._detail.setText(guidance.detail)
-        for widget in (self._instruction, self._detail):
-            set_property(widget, "tone", guidance.tone.value)
         for widget, lines in ((self._instruction, 1), (self._detail, 2)):
+            set_property(widget, "tone", guidance.tone.value)
             _reserve_height(widget, lines if guidance.target is not None else 0)
         self._target.show_target(guidance.target)
         self._stepper.show_steps(guidance.steps)
@@ -117,6 +106,10 @@ class GuidancePanel(QWidget):
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.value.setText(text)
         self._origin.setText(readings.origin)
+
+
+def _value_labels(count: int) -> list[ValueLabel]:
+    return [ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(count)]
 
 
 class _Reading(QWidget):
@@ -223,9 +216,7 @@ class ResultPanel(QWidget):
         self._comparison = label(muted=True, wrap=True)
         self._model_status = label(role=TextRole.HEADING)
         self._fit = label(muted=True, wrap=True)
-        self._rows = [
-            ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_RESULT_ROWS_MAX)
-        ]
+        self._rows = _value_labels(_RESULT_ROWS_MAX)
         self._end_status = label(wrap=True)
         self._warnings = [label(wrap=True) for _ in range(_WARNINGS_MAX)]
         self._path = label(role=TextRole.LABEL, muted=True, wrap=True)
@@ -254,19 +245,10 @@ class ResultPanel(QWidget):
             show_chip(warning, Chip(text, Tone.WARN))
 
 
+_REPEAT_HINT = N_("Move the run to the trash, and record the same series again at once")
 _DECISION_BUTTONS = {
-    Action.NEXT: (
-        N_("Keep"),
-        "Enter",
-        (),
-        N_("Keep the run with what was found in it (Enter)"),
-    ),
-    Action.REPEAT: (
-        N_("Repeat"),
-        "R",
-        ("R",),
-        N_("Move the run to the trash, and record the same series again at once"),
-    ),
+    Action.NEXT: (N_("Keep"), "Enter", (), N_("Keep the run with what was found in it (Enter)")),
+    Action.REPEAT: (N_("Repeat"), "R", ("R",), _REPEAT_HINT),
     Action.DISCARD: (N_("Discard"), "Del", ("Del", "D"), N_("Move the run to the trash")),
 }
 
@@ -292,10 +274,11 @@ class DecisionPanel(QFrame):
         buttons = make_row(*((button, 1) for button in self._buttons.values()), spacing=8)
         make_column(self._note, buttons, spacing=8, margins=(16, 8), of=self)
 
-    def show_decision(self, decision: PendingDecision | None, allowed: frozenset[Action]) -> None:
-        self.setVisible(decision is not None)
-        if decision is not None and self._note.text() != decision.note:
-            self._note.setText(decision.note)
+    def show_decision(self, note: str | None, allowed: frozenset[Action]) -> None:
+        """Show the buttons and the note of a run that waits for a decision; None hides the panel."""
+        self.setVisible(note is not None)
+        if note is not None and self._note.text() != note:
+            self._note.setText(note)
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
             set_property(button, "primary", "true" if action is Action.NEXT else "false")

@@ -1,13 +1,7 @@
 """Dialog of the series plan, as text and as progress of each series. It does not block the window."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QDialog,
-    QGridLayout,
-    QPlainTextEdit,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QGridLayout, QPlainTextEdit, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.record.presenter import RecordPresenter

@@ -4,16 +4,7 @@ from dataclasses import asdict
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QGridLayout,
-    QLabel,
-    QPushButton,
-    QSizePolicy,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.presenters.conditions import CONDITION_TITLES
 from app.presenters.record.state import Action, PlanState, RunChoices, RunForm, SeriesProgress
@@ -87,11 +78,8 @@ class RunBar(QFrame):
         hint = gettext("Series of the next run: pullback, contact, added mass")
         self._series.setToolTip(choices.series_hint or hint)
         self._strip.show_plan(plan, choices.series, choosable=choosable)
-        self._plan.setText(
-            gettext("Plan {done}/{planned}", done=plan.done, planned=plan.planned)
-            if plan.planned
-            else gettext("Plan")
-        )
+        planned = gettext("Plan {done}/{planned}", done=plan.done, planned=plan.planned)
+        self._plan.setText(planned if plan.planned else gettext("Plan"))
         self._form.show_form(choices.form, editable=choices.editable)
         self._show_summary()
 
@@ -208,7 +196,8 @@ class PlanStrip(QWidget):
             button.setToolTip(one.description)
             button.setAccessibleName(one.description)
             button.setEnabled(choosable)
-            set_property(button, "state", _series_state(one, series))
+            state = "now" if one.series == series else "full" if one.is_full else "ahead"
+            set_property(button, "state", state)
         self._arrange()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
@@ -221,17 +210,15 @@ class PlanStrip(QWidget):
             button.setVisible(first <= number < end)
         hidden = len(self._progress) - (end - first)
         self._more.setText(f"+{hidden}")
-        self._more.setToolTip(
-            ngettext("One more series is planned", "{count} more series are planned", hidden)
-        )
+        more = ngettext("One more series is planned", "{count} more series are planned", hidden)
+        self._more.setToolTip(more)
         self._more.setVisible(hidden > 0)
         self._empty.setVisible(not self._progress and self._empty.sizeHint().width() <= self.width())
 
     def _fitting(self) -> tuple[int, int]:
         """First and end index of the series that fit: one before the chosen one, it, and those after it."""
-        widths = [
-            button.sizeHint().width() + _STRIP_SPACING for button in self._buttons[: len(self._progress)]
-        ]
+        buttons = self._buttons[: len(self._progress)]
+        widths = [button.sizeHint().width() + _STRIP_SPACING for button in buttons]
         names = [one.series for one in self._progress]
         chosen = names.index(self._series) if self._series in names else 0
         room = self.width() + _STRIP_SPACING
@@ -255,12 +242,6 @@ class PlanStrip(QWidget):
         self._layout.insertWidget(self._layout.count() - 2, made)
 
 
-def _series_state(one: SeriesProgress, series: str) -> str:
-    if one.series == series:
-        return "now"
-    return "full" if one.is_full else "ahead"
-
-
 class RunFormFields(QWidget):
     """Fields of a `RunForm`."""
 
@@ -276,17 +257,16 @@ class RunFormFields(QWidget):
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(8)
         for number, (name, field) in enumerate(self._fields.items()):
-            title, hint = _FORM_FIELDS[name]
+            title_text, hint = _FORM_FIELDS[name]
+            field.setAccessibleName(gettext(title_text))
             field.setPlaceholderText(gettext(hint))
             field.textEdited.connect(self._emit_form)
             field.left.connect(self.left)
-            grid.addLayout(
-                _titled(gettext(title), field),
-                number // _FORM_COLUMNS,
-                number % _FORM_COLUMNS,
-                1,
-                _WIDE.get(name, 1),
-            )
+            title = label(gettext(title_text), TextRole.LABEL, muted=True)
+            title.setBuddy(field)
+            titled = make_column(title, field, spacing=4)
+            row, column = divmod(number, _FORM_COLUMNS)
+            grid.addLayout(titled, row, column, 1, _WIDE.get(name, 1))
         for column in range(_FORM_COLUMNS):
             grid.setColumnStretch(column, 1)
 
@@ -302,10 +282,3 @@ class RunFormFields(QWidget):
 
     def _emit_form(self) -> None:
         self.edited.emit(RunForm(**{name: field.text() for name, field in self._fields.items()}))
-
-
-def _titled(name: str, field: QWidget) -> QVBoxLayout:
-    title = label(name, TextRole.LABEL, muted=True)
-    title.setBuddy(field)
-    field.setAccessibleName(name)
-    return make_column(title, field, spacing=4)

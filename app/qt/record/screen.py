@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
@@ -37,21 +38,10 @@ _COLUMN_WIDTHS = (356, 480)
 
 
 class RecordScreen(QWidget):
-    """Shows `RecordState`; parts that have not changed are not touched.
-
-    Parameters
-    ----------
-    theme : Theme
-    presenter : RecordPresenter
-    connect_device : callable
-        Shows where a device is connected.
-    """
+    """Shows `RecordState`; `connect_device` shows where a device is connected."""
 
     def __init__(
-        self,
-        theme: Theme,
-        presenter: RecordPresenter,
-        connect_device: Callable[[], object] = lambda: None,
+        self, theme: Theme, presenter: RecordPresenter, connect_device: Callable[[], object] = lambda: None
     ) -> None:
         super().__init__()
         self._presenter = presenter
@@ -66,27 +56,26 @@ class RecordScreen(QWidget):
         self._bar = RunBar()
         self._plan: PlanDialog | None = None
         self._sound = CuePlayer()
+        self._parts: dict[str, Callable[[Any], None]] = {
+            "status_bar": self._status_bar.show_status,
+            "guidance": self._guidance.show_guidance,
+            "connected": self._guidance.show_connected,
+            "readings": self._guidance.show_readings,
+            "live_estimate": self._guidance.show_live_estimate,
+            "progress": self._guidance.show_progress,
+            "result": self._show_result,
+        }
         self._lay_out()
         self._connect(connect_device)
 
     def show_state(self, state: RecordState) -> None:
+        """Show the parts of a state that differ from the state shown."""
         old, self._shown = self._shown, state
         focused = QApplication.focusWidget()
-        if old is None or state.status_bar != old.status_bar:
-            self._status_bar.show_status(state.status_bar)
+        for name, show in self._parts.items():
+            if old is None or getattr(state, name) != getattr(old, name):
+                show(getattr(state, name))
         self._plots.show_traces(state.traces)
-        if old is None or state.guidance != old.guidance:
-            self._guidance.show_guidance(state.guidance)
-        if old is None or state.connected != old.connected:
-            self._guidance.show_connected(state.connected)
-        if old is None or state.readings != old.readings:
-            self._guidance.show_readings(state.readings)
-        if old is None or state.live_estimate != old.live_estimate:
-            self._guidance.show_live_estimate(state.live_estimate)
-        if old is None or state.progress != old.progress:
-            self._guidance.show_progress(state.progress)
-        if old is None or state.result != old.result:
-            self._show_result(state.result)
         if old is None or (state.choices, state.plan) != (old.choices, old.plan):
             self._bar.show_choices(state.choices, state.plan)
             if self._plan is not None:
@@ -94,7 +83,8 @@ class RecordScreen(QWidget):
         if old is None or (state.status_message, state.undo) != (old.status_message, old.undo):
             self._status_line.show_status(state.status_message, state.undo)
         if old is None or _actions(state) != _actions(old):
-            self._show_actions(state)
+            self._bar.show_actions(state.allowed, state.primary, keeps=state.decision is not None)
+            self._decision.show_decision(state.decision, state.allowed)
             is_typing = isinstance(focused, QLineEdit) and focused.isVisible()
             if self.isVisible() and not is_typing:
                 self._take_focus()  # a disabled button passes the focus on, perhaps to a field
@@ -114,11 +104,6 @@ class RecordScreen(QWidget):
         decides = self._shown is not None and self._shown.decision is not None
         (self._decision if decides else self._bar).take_focus()
 
-    def _show_actions(self, state: RecordState) -> None:
-        keeps = state.decision is not None
-        self._bar.show_actions(state.allowed, state.primary, keeps=keeps)
-        self._decision.show_decision(state.decision, state.allowed)
-
     def _edit_plan(self) -> None:
         if self._plan is None:
             self._plan = PlanDialog(self._presenter, self)
@@ -128,7 +113,7 @@ class RecordScreen(QWidget):
     def _show_result(self, result: Result | None) -> None:
         if result is not None:
             self._result.show_result(result)
-        self._column.show_second(result is not None)
+        self._column.stack.setCurrentIndex(int(result is not None))
 
     def _connect(self, connect_device: Callable[[], object]) -> None:
         dispatch = self._presenter.dispatch
@@ -162,15 +147,12 @@ class _Column(QFrame):
     def __init__(self, panels: Sequence[QWidget], below: Sequence[QWidget]) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._stack = QStackedWidget()
+        self.stack = QStackedWidget()
         for panel in panels:
             area = make_scroll_area(panel)
             area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            self._stack.addWidget(area)
-        make_column((self._stack, 1), *below, margins=(1, 1), of=self)
-
-    def show_second(self, second: bool) -> None:
-        self._stack.setCurrentIndex(int(second))
+            self.stack.addWidget(area)
+        make_column((self.stack, 1), *below, margins=(1, 1), of=self)
 
 
 _WIDE, _NARROW = 24, 10
@@ -193,14 +175,11 @@ class StatusBarWidget(QFrame):
         left = (self._device, self._rate, self._lost_samples, *self._gauges)
         self._row = make_row(*left, STRETCH, self._run, self._disk, margins=(_MARGIN, 8), of=self)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        for widget, name in (
-            (self._device, gettext("Device")),
-            (self._rate, gettext("Measured sample rate")),
-            (self._lost_samples, gettext("Lost samples")),
-            (self._disk, gettext("Free disk space")),
-            (self._run, gettext("Run of its series")),
-        ):
-            widget.setAccessibleName(name)
+        self._device.setAccessibleName(gettext("Device"))
+        self._rate.setAccessibleName(gettext("Measured sample rate"))
+        self._lost_samples.setAccessibleName(gettext("Lost samples"))
+        self._disk.setAccessibleName(gettext("Free disk space"))
+        self._run.setAccessibleName(gettext("Run of its series"))
 
     def show_status(self, status: StatusBar) -> None:
         show_chip(self._device, replace(status.device, text=gettext(status.device.text)))  # "no device"

@@ -14,10 +14,10 @@ from app.presenters.record.model import RecordModel
 from app.presenters.record.presenter import record_state
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
-    NO_ESTIMATE,
     Action,
     Connecting,
     Disconnected,
+    LiveEstimate,
     RecordEvent,
     StepStatus,
 )
@@ -126,7 +126,7 @@ def test_the_live_estimate_is_of_one_pull_only(screen: Screen) -> None:
     screen.come_to(PullbackState.TAIL)
     assert screen.model.session.live_estimate.rows
     screen.come_to(PullbackState.PULLING)
-    assert screen.model.session.live_estimate == NO_ESTIMATE
+    assert screen.model.session.live_estimate == LiveEstimate()
 
 
 def test_another_connection_takes_no_result_away(screen: Screen) -> None:

@@ -33,7 +33,6 @@ from app.presenters.record.state import (
     Connecting,
     Cue,
     NoteEdited,
-    PendingDecision,
     PlanEdited,
     RunForm,
     ScreenEntered,
@@ -99,7 +98,7 @@ def found(path: str = RUN, note: str = "") -> AnalysedRun:
 def test_keeping_stores_what_was_found_and_counts_again() -> None:
     desk = Desk()
     desk.result()
-    assert desk.record.state.decision == PendingDecision("")
+    assert desk.record.state.decision == ""
     desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
     assert task == KeepRun(RUN, "me", None, has_results=True)
@@ -118,7 +117,7 @@ def test_keeping_stores_what_was_found_and_counts_again() -> None:
 def test_a_new_note_goes_with_the_run_and_an_old_one_is_not_written_again() -> None:
     desk = Desk()
     desk.result(note="third plate")
-    assert desk.record.state.decision == PendingDecision("third plate")
+    assert desk.record.state.decision == "third plate"
     desk.record.dispatch(NoteEdited("third plate, hand trembled"))
     desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()
@@ -144,7 +143,7 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     desk.answer(RestoreFromTrash(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
     state = desk.record.state
     assert desk.tasks() == [CountCompletedRuns("/recordings")], "nothing is decided yet"
-    assert state.decision == PendingDecision("")
+    assert state.decision == ""
     assert state.result is not None
     assert state.result.path == "/recordings/20260112_1FFM0_001-2.h5"
     assert state.status_message.text == "Brought back 20260112_1FFM0_001-2"
@@ -167,7 +166,7 @@ def test_what_was_kept_can_be_decided_about_again() -> None:
     desk.tasks()
     desk.record.dispatch(Action.UNDO)
     again = desk.record.state
-    assert again.decision == PendingDecision("hand trembled")
+    assert again.decision == "hand trembled"
     assert again.result == shown.result
     assert again.traces is shown.traces
     assert (again.allowed, again.status_bar.run.text) == (shown.allowed, shown.status_bar.run.text)
@@ -202,7 +201,7 @@ def test_keeping_is_taken_back_before_it_is_done_too() -> None:
     (task,) = desk.tasks()
     desk.record.dispatch(Action.UNDO)
     desk.answer(task, RUN)
-    assert desk.record.state.decision == PendingDecision("")
+    assert desk.record.state.decision == ""
     assert desk.record.state.status_message.text == ""
     desk.record.dispatch(Action.NEXT)
     assert isinstance(desk.tasks()[-1], KeepRun)
@@ -242,7 +241,7 @@ def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
     desk.record.tick()
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     desk.record.dispatch(Action.UNDO)
-    assert desk.record.state.decision == PendingDecision("")
+    assert desk.record.state.decision == ""
 
 
 def test_closing_waits_until_what_was_decided_is_stored() -> None:
