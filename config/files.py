@@ -27,15 +27,12 @@ from config.schema import (
 
 T = TypeVar("T", bound=msgspec.Struct)
 
+_CHECKS_TITLE = "# Checks of the gauges, added by `slipstand calibrate check`.\n\n"
 _SHIPPED = Path(str(files("config")))
 
 
 def config_directory() -> Path:
-    """Folder of the settings in use.
-
-    `SLIPSTAND_CONFIG` if set; `config/` when run from a checkout; else the user's configuration
-    folder, in which a missing file falls back to the shipped one.
-    """
+    """Folder of the settings in use: `SLIPSTAND_CONFIG`, else `config/` of a checkout, else the user's."""
     override = os.environ.get("SLIPSTAND_CONFIG")
     if override:
         return Path(override).expanduser().resolve()
@@ -70,15 +67,21 @@ def save_calibration(
 ) -> Path:
     """Write a new calibration file: `base` with new values of the gauges named, its comments kept.
 
-    Without a `path` it gets a dated name in the folder of settings, `gauges-2026-01-12.toml`, the next of
-    a day `gauges-2026-01-12-2.toml`. No file is ever overwritten. Returns the path. Raises ConfigError.
+    Without a `path` it gets a dated name in the folder of settings, `gauges-2026-01-12.toml`. No file is ever
+    overwritten. Returns the path. Raises ConfigError.
     """
     import tomlkit  # only needed to write
 
     load_gauges(base)
     document = tomlkit.parse(base.read_text(encoding="utf-8"))
     for name, gauge in gauges.items():
-        _set_gauge(document[name], gauge)
+        section: Any = document[name]
+        for field in msgspec.structs.fields(Gauge):
+            value = getattr(gauge, field.name)
+            if value is None or (value == field.default and field.name not in section):
+                section.pop(field.name, None)  # a default needs no line
+            else:
+                section[field.name] = list(value) if isinstance(value, tuple) else value
     text = tomlkit.dumps(document)
     if path is None:
         return _write_dated(f"gauges-{day.isoformat()}", text)
@@ -111,12 +114,8 @@ def activate_calibration(path: Path, day: datetime.date) -> Path | None:
 
 
 def load_checks(path: Path | None = None) -> GaugeChecks:
-    """Read the history of gauge checks, by default `gauge-checks.toml` beside `gauges.toml`.
-
-    Empty where there is none yet. Raises ConfigError.
-    """
-    path = path or checks_path()
-    return _load(path, GaugeChecks) if path.exists() else GaugeChecks()
+    """Read the history of gauge checks, by default of the lab; empty without a file. Raises ConfigError."""
+    return _load_or_default(path or checks_path(), GaugeChecks)
 
 
 def append_check(check: GaugeCheck) -> Path:
@@ -129,9 +128,7 @@ def append_check(check: GaugeCheck) -> Path:
     entry = {name: list(value) if isinstance(value, tuple) else value for name, value in entry.items()}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        before = (
-            "\n" if path.exists() else "# Checks of the gauges, added by `slipstand calibrate check`.\n\n"
-        )
+        before = "\n" if path.exists() else _CHECKS_TITLE
         _write(path, f"{before}[[check]]\n{tomlkit.dumps(entry)}", "a")
     except OSError as error:
         raise _unwritable(path, error) from None
@@ -150,8 +147,7 @@ def settings_path() -> Path:
 
 def load_settings() -> Settings:
     """Read the person's settings; the defaults where there are none yet. Raises ConfigError."""
-    path = settings_path()
-    return _load(path, Settings) if path.exists() else Settings()
+    return _load_or_default(settings_path(), Settings)
 
 
 def save_settings(settings: Settings, day: datetime.date) -> Path | None:
@@ -164,9 +160,8 @@ def save_settings(settings: Settings, day: datetime.date) -> Path | None:
 
 
 def load_window_layout() -> WindowLayout:
-    """Read how the window was left; nothing known where it never was. Raises ConfigError."""
-    path = config_directory() / "window.toml"
-    return _load(path, WindowLayout) if path.exists() else WindowLayout()
+    """Read how the window was left; the defaults where it never was. Raises ConfigError."""
+    return _load_or_default(config_directory() / "window.toml", WindowLayout)
 
 
 def save_window_layout(place: WindowLayout, day: datetime.date) -> Path | None:
@@ -198,16 +193,6 @@ def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
     except OSError as error:
         raise _unwritable(path, error) from None
     return aside
-
-
-def _set_gauge(section: Any, gauge: Gauge) -> None:
-    """Set what differs from the defaults or stands there already; the rest need not be said."""
-    for field in msgspec.structs.fields(Gauge):
-        value = getattr(gauge, field.name)
-        if value is None or (value == field.default and field.name not in section):
-            section.pop(field.name, None)
-        else:
-            section[field.name] = list(value) if isinstance(value, tuple) else value
 
 
 def _write_dated(stem: str, text: str) -> Path:
@@ -263,17 +248,27 @@ def published_table() -> dict[str, PublishedRow]:
 
 def load_published_rows(path: Path) -> list[PublishedRow]:
     """Read a published table: a CSV file with the columns of the shipped `table1.csv`. Raises ConfigError."""
-    rows = []
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            for line, row in enumerate(csv.DictReader(file), start=2):
-                rows.append(_published_row(path, line, row))
+            texts = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
             "{path}: cannot be read ({fault}). Give a readable UTF-8 CSV file", path=path, fault=error
         ) from None
-    if not rows:
+    if not texts:
         raise ConfigError("{path}: holds no rows. Give a header and a row a series, as in Table 1", path=path)
+    rows = []
+    for line, row in enumerate(texts, start=2):
+        try:
+            rows.append(msgspec.convert(row, PublishedRow, strict=False))
+        except msgspec.ValidationError as error:
+            raise ConfigError(
+                "{path}: line {line}: {fault}. The columns are those of Table 1: {columns}",
+                path=path,
+                line=line,
+                fault=_explain(str(error), row),
+                columns=list(PublishedRow.__struct_fields__),
+            ) from None
     return rows
 
 
@@ -289,17 +284,8 @@ def published_row(series: str) -> PublishedRow:
         ) from None
 
 
-def _published_row(path: Path, line: int, row: dict[str | Any, str | Any]) -> PublishedRow:
-    try:
-        return msgspec.convert(row, PublishedRow, strict=False)
-    except msgspec.ValidationError as error:
-        raise ConfigError(
-            "{path}: line {line}: {fault}. The columns are those of Table 1: {columns}",
-            path=path,
-            line=line,
-            fault=_explain(str(error), row),
-            columns=list(PublishedRow.__struct_fields__),
-        ) from None
+def _load_or_default(path: Path, kind: type[T]) -> T:
+    return _load(path, kind) if path.exists() else kind()
 
 
 def _load(path: Path, kind: type[T]) -> T:
@@ -307,7 +293,9 @@ def _load(path: Path, kind: type[T]) -> T:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ConfigError(
-            "{path}: there is no such file. Give the path of a {kind} file", path=path, kind=_what(kind)
+            "{path}: there is no such file. Give the path of a {kind} file",
+            path=path,
+            kind="stand" if kind is Stand else "calibration",
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
@@ -321,10 +309,6 @@ def _load(path: Path, kind: type[T]) -> T:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
         raise ConfigError("{path}: {fault}", path=path, fault=_explain(str(error), raw)) from None
-
-
-def _what(kind: type) -> str:
-    return "stand" if kind is Stand else "calibration"
 
 
 def _explain(message: str, raw: object) -> str:

@@ -1,6 +1,7 @@
 """What a stand and its gauges are: frozen structs with units in their names, each value checked."""
 
 import datetime
+import itertools
 import math
 import re
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -19,8 +20,9 @@ _MAX_POLYNOMIAL_TERMS = 2
 _NEWTON_STEPS = 8
 """Enough for bends of a tenth of the range."""
 SCALE_MIN, SCALE_MAX = 1.0, 2.0
-_MAX_PIXELS = 100_000
 """How much larger than the system's scaling the window may be."""
+_MAX_PIXELS = 100_000
+"""More than any wall of screens has; larger numbers come from a damaged file."""
 
 
 class ConfigError(MessageError):
@@ -39,24 +41,22 @@ class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return msgspec.structs.replace(self, **changes)
 
 
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} = {value!r} must be a finite number above 0")
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} = {value!r} must be a finite number above 0")
 
 
-def _not_negative(name: str, value: float | None) -> None:
-    if value is not None and not (math.isfinite(value) and value >= 0.0):
-        raise ValueError(f"{name} = {value!r} must be a finite number, 0 or above")
+def _not_negative(**values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise ValueError(f"{name} = {value!r} must be a finite number, 0 or above")
 
 
-def _finite(name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{name} = {value!r} must be a finite number")
-
-
-def _on_some_screen(name: str, pixels: int) -> None:
-    if abs(pixels) > _MAX_PIXELS:
-        raise ValueError(f"{name} = {pixels} is beyond any screen: must be within ±{_MAX_PIXELS} pixels")
+def _finite(**values: float) -> None:
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r} must be a finite number")
 
 
 class Contact(_Checked, frozen=True):
@@ -85,29 +85,24 @@ class Stand(_Checked, frozen=True):
     geometry: dict[str, float] = {}
 
     def __post_init__(self) -> None:
-        _positive("table_mass_kg", self.table_mass_kg)
-        _positive("plate_mass_kg", self.plate_mass_kg)
-        _positive("gravity_m_per_s2", self.gravity_m_per_s2)
-        for name in (
-            "table_mass_standard_uncertainty_kg",
-            "plate_mass_standard_uncertainty_kg",
-            "gravity_standard_uncertainty_m_per_s2",
-        ):
-            _not_negative(name, getattr(self, name))
-        for key, pullback_m in self.pullbacks_m.items():
-            _positive(f"pullbacks_m.{key}", pullback_m)
-        for key, added_kg in self.added_masses_kg.items():
-            _not_negative(f"added_masses_kg.{key}", added_kg)
+        _positive(
+            table_mass_kg=self.table_mass_kg,
+            plate_mass_kg=self.plate_mass_kg,
+            gravity_m_per_s2=self.gravity_m_per_s2,
+            **{f"pullbacks_m.{key}": pullback_m for key, pullback_m in self.pullbacks_m.items()},
+        )
+        _not_negative(
+            table_mass_standard_uncertainty_kg=self.table_mass_standard_uncertainty_kg,
+            plate_mass_standard_uncertainty_kg=self.plate_mass_standard_uncertainty_kg,
+            gravity_standard_uncertainty_m_per_s2=self.gravity_standard_uncertainty_m_per_s2,
+            **{f"added_masses_kg.{key}": added_kg for key, added_kg in self.added_masses_kg.items()},
+        )
 
     @property
     def all_series(self) -> tuple[str, ...]:
         """Codes of all its series, in the order of the paper's Table 1."""
-        return tuple(
-            f"{pullback}{contact}{mass}"
-            for contact in self.contacts
-            for pullback in self.pullbacks_m
-            for mass in self.added_masses_kg
-        )
+        parts = itertools.product(self.contacts, self.pullbacks_m, self.added_masses_kg)
+        return tuple(f"{pullback}{contact}{mass}" for contact, pullback, mass in parts)
 
     def series(self, code: str) -> "Series":
         """Take a series code such as `1FFM0` apart. Raises SeriesError naming what is allowed."""
@@ -173,25 +168,23 @@ class Gauge(_Checked, frozen=True):
     def __post_init__(self) -> None:
         if not math.isfinite(self.gain_m_per_count) or self.gain_m_per_count == 0.0:
             raise ValueError(f"gain_m_per_count = {self.gain_m_per_count!r} must be finite and not 0")
-        _finite("zero_count", self.zero_count)
-        _finite("delay_s", self.delay_s)
-        for name in (
-            "gain_relative_standard_uncertainty",
-            "zero_standard_uncertainty_m",
-            "nonlinearity_m",
-            "delay_standard_uncertainty_s",
-            "hysteresis_m",
-            "repeatability_m",
-        ):
-            _not_negative(name, getattr(self, name))
+        _finite(zero_count=self.zero_count, delay_s=self.delay_s)
+        _not_negative(
+            gain_relative_standard_uncertainty=self.gain_relative_standard_uncertainty,
+            zero_standard_uncertainty_m=self.zero_standard_uncertainty_m,
+            nonlinearity_m=self.nonlinearity_m,
+            delay_standard_uncertainty_s=self.delay_standard_uncertainty_s,
+            hysteresis_m=self.hysteresis_m,
+            repeatability_m=self.repeatability_m,
+        )
         if self.range_m is not None:
-            _positive("range_m", self.range_m)
+            _positive(range_m=self.range_m)
         if len(self.polynomial) > _MAX_POLYNOMIAL_TERMS:
             raise ValueError(
                 f"polynomial has {len(self.polynomial)} terms, {_MAX_POLYNOMIAL_TERMS} at most are used"
             )
         for term in self.polynomial:
-            _finite("polynomial", term)
+            _finite(polynomial=term)
 
     def displacement_m(self, counts: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Displacements (n,) that counts (n,) stand for (m)."""
@@ -258,9 +251,10 @@ class GaugeCheck(_Checked, frozen=True):
     def __post_init__(self) -> None:
         if self.at.tzinfo is None:
             raise ValueError(f"at = {self.at.isoformat()} has no time zone")
-        for name in ("expected_m", "measured_m", "gain_m_per_count"):
-            _finite(name, getattr(self, name))
-        _not_negative("tolerance_m", self.tolerance_m)
+        _finite(
+            expected_m=self.expected_m, measured_m=self.measured_m, gain_m_per_count=self.gain_m_per_count
+        )
+        _not_negative(tolerance_m=self.tolerance_m)
 
     @property
     def deviation_m(self) -> float:
@@ -324,11 +318,16 @@ class WindowLayout(_Checked, frozen=True):
     """By the name of a table: number of the column, from 0, and whether descending."""
 
     def __post_init__(self) -> None:
-        for name in ("x", "y", "width", "height"):
-            _on_some_screen(name, getattr(self, name))
-        for name, widths in self.widths.items():
-            for width in widths:
-                _on_some_screen(f"widths.{name}", width)
+        pixels: dict[str, tuple[int, ...]] = {
+            name: (getattr(self, name),) for name in ("x", "y", "width", "height")
+        }
+        pixels |= {f"widths.{name}": widths for name, widths in self.widths.items()}
+        for name, values in pixels.items():
+            for value in values:
+                if abs(value) > _MAX_PIXELS:
+                    raise ValueError(
+                        f"{name} = {value} is beyond any screen: must be within ±{_MAX_PIXELS} pixels"
+                    )
 
 
 class PublishedRow(_Checked, frozen=True):

@@ -130,6 +130,19 @@ class StreamSource(SampleSource):
                 deadline_s += now_s - before_s
         return received, False
 
+    def await_stream(self, link: Link, is_good: Callable[[bytes], bool], timeout_s: float) -> bytes:
+        """Read until all that came is good. Raises NoDataError, which says what came instead."""
+        received, good = self.await_data(link, timeout_s, is_good)
+        if not good:
+            raise self.no_data_error(received)
+        return received
+
+    def is_same_rate(self, measured_hz: float | None) -> bool:
+        """Whether a measured rate is the one expected, as far as both are known."""
+        if self._rate_hz is None or measured_hz is None:
+            return True
+        return abs(measured_hz / self._rate_hz - 1) <= RATE_TOLERANCE
+
     def request(
         self, link: Link, command: bytes, find: Callable[[bytes], _Answer | None], tries: int = 1
     ) -> _Answer | None:

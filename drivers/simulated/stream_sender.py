@@ -115,14 +115,13 @@ class WireOutput:
 
 @dataclass(frozen=True, slots=True)
 class DeviceClock:
-    """The device's own clock and counter."""
+    """The device's own clock and counter of samples."""
 
     rate_hz: float
-    """Samples a second of this clock."""
     first_sequence: int = 0
-    """Counter of samples at sample 0."""
+    """Counter at sample 0."""
     first_time_s: float = 0.0
-    """Clock at sample 0 (s)."""
+    """Clock at sample 0."""
 
 
 class StreamSender:

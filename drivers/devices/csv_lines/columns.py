@@ -32,6 +32,8 @@ class Column(StrEnum):
 TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
 CHECKSUMS = (Column.XOR, Column.CRC)
 _READINGS = (Column.TABLE, Column.RELATIVE, Column.VALUE)
+SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
+DECIMALS = {"point": ".", "comma": ","}
 _OF_NUMBERS = "0123456789+-."
 _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
@@ -49,7 +51,7 @@ class LineFormat:
     separator: str = ","
     """One character; a blank means any number of blanks."""
     decimal: str = "."
-    """"." or ","."""
+    """Point or comma."""
     comment: str = "#%;/"
     """First characters of lines that are skipped."""
     time_bits: int = 32

@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from drivers.crc import crc16
-from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.devices.csv_lines.columns import DECIMALS, SEPARATORS, TIME_UNIT_S, Column, LineFormat
 from drivers.recognition import is_text
 from messages.message import EMPTY, Message, message
 
@@ -28,8 +28,6 @@ _LINES_EXAMINED = 400
 _ALIKE = 0.8
 """Share of the lines that must have the same form: some may be banners or damaged."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
-_DECIMALS = {"point": ".", "comma": ","}
 _LEAST_VALUES = 5
 """Different values that distinguish a counter from a reading that happens to rise."""
 _STEADY = 0.5
@@ -68,10 +66,10 @@ def infer_columns(data: bytes, duration_s: float | None = None) -> InferredColum
     if not rows:
         return None
     rate_hz = (len(every_line) - 1) / duration_s if duration_s else None
-    columns = _roles(rows, lines, _SEPARATORS[separator], rate_hz)
+    columns = _roles(rows, lines, SEPARATORS[separator], rate_hz)
     if not {Column.TABLE, Column.VALUE} & set(columns):
         return None
-    layout = LineFormat(tuple(columns), _SEPARATORS[separator], _DECIMALS[decimal])
+    layout = LineFormat(tuple(columns), SEPARATORS[separator], DECIMALS[decimal])
     settings = {"columns": ",".join(columns)}
     settings |= {"separator": separator} if separator != "comma" else {}
     settings |= {"decimal": decimal} if decimal != "point" else {}
@@ -90,8 +88,8 @@ def _lines(data: bytes) -> list[str]:
 def _split(lines: list[str]) -> tuple[_Rows, str, str]:
     """Fields of the lines of the same form, with the separator and decimal that give most fields."""
     best: tuple[_Rows, str, str] = ([], "comma", "point")
-    for separator, mark in _SEPARATORS.items():
-        for decimal, point in _DECIMALS.items():
+    for separator, mark in SEPARATORS.items():
+        for decimal, point in DECIMALS.items():
             if mark == point:
                 continue
             rows = _alike([_fields(line, mark, point) for line in lines])

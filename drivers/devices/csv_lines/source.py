@@ -15,18 +15,16 @@ from drivers.devices.csv_lines.codec import (
     rate_from_lines,
     whole_lines_end,
 )
-from drivers.devices.csv_lines.columns import CHECKSUMS, Column, LineFormat
+from drivers.devices.csv_lines.columns import CHECKSUMS, DECIMALS, SEPARATORS, Column, LineFormat
 from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT, find_openscale_format, infer_columns
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.errors import NoDataError, SettingsError
 from drivers.recognition import Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
-from drivers.stream import RATE_TOLERANCE, StreamSource, parse_settings
+from drivers.stream import StreamSource, parse_settings
 from messages.message import EMPTY, Message
 
-_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
-_DECIMALS = {"point": ".", "comma": ","}
 _DOUBTED_BYTES = 1 << 14
 """Some hundred lines, few of which are damaged: if their rate is wrong, the settings are."""
 
@@ -65,8 +63,8 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return OPENSCALE_FORMAT
         return LineFormat(
             columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
-            separator=_SEPARATORS.get(self.separator, self.separator),
-            decimal=_DECIMALS.get(self.decimal, self.decimal),
+            separator=SEPARATORS.get(self.separator, self.separator),
+            decimal=DECIMALS.get(self.decimal, self.decimal),
             comment=self.comment,
             time_bits=self.time_bits,
             sequence_bits=self.sequence_bits,
@@ -105,14 +103,13 @@ class CsvLinesSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Wait for the first good line, and with a time column for as many as show the rate.
 
-        Opening the port resets many Arduinos, which are silent for two seconds after it. Raises NoDataError
-        if no good line came in time, or after it too few to show the rate. Raises SettingsError if the rate
-        asked for is not that of the device's own times.
+        Opening the port resets many Arduinos, which are silent for two seconds after it. Raises SettingsError
+        where the device's own times show another rate than the one asked for.
         """
         self.prepare()
         link.read()  # what waited in the port is old, and some of it may be lost
-        first, good = self.await_data(link, self.timeout_s, self._has_good_line)
-        if not good or self._layout is None:
+        first = self.await_stream(link, self._has_good_line, self.timeout_s)
+        if self._layout is None:
             raise self.no_data_error(first)
         self._check_rate(self._layout)
         if self._layout.time_column is None:
@@ -142,7 +139,7 @@ class CsvLinesSource(StreamSource):
         if measured_hz is None:
             return None
         self._rate_hz = self._rate_hz or measured_hz
-        if abs(measured_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+        if not self.is_same_rate(measured_hz):
             if len(data) < _DOUBTED_BYTES:
                 return None
             raise self._rate_error(measured_hz)

@@ -32,7 +32,7 @@ from drivers.errors import NoDataError, ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import RATE_TOLERANCE, StreamSource, check_gauge_channels, parse_settings
+from drivers.stream import StreamSource, check_gauge_channels, parse_settings
 from messages.message import EMPTY, Message, message
 
 _TRIES = 2
@@ -78,27 +78,18 @@ class GsvSource(StreamSource):
         list(FrameDecoder(layout, 1.0).feed(encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
-        """Stop the device, which sends from power-on, set it up, and wait for the first frames.
-
-        Raises NoDataError if the device does not answer, or no good frames came within 3 s. Raises
-        ProtocolError if the device does not take a setting, or has not the gauges' channels.
-        """
+        """Stop the device, which sends from power-on, set it up, and wait for the first frames."""
         self.prepare()
         self._stop(link)
         self._set_up(link)
         link.write(encode_request(Code.START))
-        received, good = self.await_data(link, self.timeout_s, lambda data: find_layout(data) is not None)
-        if not good:
-            raise self.no_data_error(received)
+        received = self.await_stream(link, lambda data: find_layout(data) is not None, self.timeout_s)
         received = received.removeprefix(encode_response(OK))
         self._set_layout(received)
         return received
 
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
-        """Decoder once the rate is known and `data` tell how frames are laid out.
-
-        Raises ProtocolError if a gauge's channel is not in the frames.
-        """
+        """Decoder once the rate is known and `data` tell how frames are laid out. Raises ProtocolError."""
         if self._rate_hz is None:
             return None
         if self._layout is None:
@@ -154,7 +145,7 @@ class GsvSource(StreamSource):
         actual_hz = rate_from_response(response) if response else None
         if actual_hz is None:
             raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
-        if self._rate_hz is not None and abs(actual_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+        if not self.is_same_rate(actual_hz):
             raise ProtocolError(
                 "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
                 "ask for --rate {actual_hz:g} or one that it can do",

@@ -32,7 +32,7 @@ from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import RATE_TOLERANCE, StreamSource, check_gauge_channels, parse_settings
+from drivers.stream import StreamSource, check_gauge_channels, parse_settings
 from messages.message import EMPTY, Message, message
 
 RATE_HZ = 1000.0
@@ -68,11 +68,7 @@ class HarpSource(StreamSource):
         list(EventDecoder(1.0).feed(encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
-        """Stop the device, identify it, start it, and wait for as many events as show the rate.
-
-        Raises NoDataError if the device does not answer, or too few events came within 3 s. Raises
-        ProtocolError if it is another Harp device, does not start, or sends at another rate.
-        """
+        """Stop the device, identify it, start it, and wait for as many events as show the rate."""
         self.prepare()
         self._identify(link)
         self._write(link, Register.OPERATION, with_active_mode)
@@ -87,7 +83,7 @@ class HarpSource(StreamSource):
         if not good:
             raise self.no_data_error(received)
         measured_hz = rate_from_events(received)
-        if measured_hz is not None and abs(measured_hz / self.rate_hz - 1) > RATE_TOLERANCE:
+        if not self.is_same_rate(measured_hz):
             raise ProtocolError(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
                 "ask for --rate {actual_hz:.4g}",

@@ -135,8 +135,7 @@ class ModbusSource(StreamSource):
     def start(self, link: Link) -> bytes:
         """Wait for a response, zero the device if asked to, and choose or check the rate.
 
-        Raises NoDataError if nothing intelligible comes within 3 s. Raises ProtocolError if the device
-        refuses, another one answers, or it is too slow for the rate.
+        Raises ProtocolError also where the device is too slow for the rate.
         """
         self.prepare()
         self._await_responses(link)

@@ -23,7 +23,7 @@ from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import RATE_TOLERANCE, StreamSource, parse_settings
+from drivers.stream import StreamSource, parse_settings
 from messages.message import Message, message
 
 _TRIES = 4
@@ -56,8 +56,6 @@ class SlipstandBinarySource(StreamSource):
         """Stop the device, set it up, start it, and wait for the first good frame.
 
         A device that does not answer `IDENTIFY` is accepted if its frames come; its rate is then measured.
-        Raises NoDataError if no good frame came within 3 s. Raises ProtocolError if the device does not take
-        the rate, or has not two channels.
         """
         self.prepare()
         deadline_s = time.monotonic() + self.timeout_s
@@ -77,7 +75,7 @@ class SlipstandBinarySource(StreamSource):
             more, _ = self.await_data(link, _RATE_S, lambda data: _has_rate(received + data))
             received += more
         rate_hz = rate_from_frames(received)
-        if self._rate_hz and rate_hz and abs(rate_hz / self._rate_hz - 1) <= RATE_TOLERANCE:
+        if self._rate_hz and rate_hz and self.is_same_rate(rate_hz):
             return received
         return self.start(link)
 
@@ -106,23 +104,17 @@ class SlipstandBinarySource(StreamSource):
         return confirmed
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
-        received, good = self.await_data(link, timeout_s, _has_rate if measure else _has_frame)
-        if not good:
-            raise self.no_data_error(received)
-        if measure:
-            self._set_measured_rate(rate_from_frames(received))
-        return received
-
-    def _set_measured_rate(self, rate_hz: float | None) -> None:
-        if self._rate_hz is None or rate_hz is None:
-            self._rate_hz = rate_hz
-        elif abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+        received = self.await_stream(link, _has_rate if measure else _has_frame, timeout_s)
+        rate_hz = rate_from_frames(received) if measure else None
+        if not self.is_same_rate(rate_hz):
             raise ProtocolError(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is asked for, and cannot be "
                 "set: leave --rate out",
                 actual_hz=rate_hz,
                 rate_hz=self._rate_hz,
             )
+        self._rate_hz = self._rate_hz or rate_hz
+        return received
 
 
 def _has_frame(received: bytes) -> bool:
