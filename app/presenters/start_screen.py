@@ -74,7 +74,6 @@ class StartPresenter(Presenter[StartState]):
         self._update(form=form, form_error="")
 
     def connect(self) -> None:
-        """Connect to the amplifier, or say what is wrong with the form."""
         if self.state.busy:
             return
         try:

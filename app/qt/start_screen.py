@@ -70,7 +70,6 @@ class StartScreen(QWidget):
             button.setEnabled(not state.busy)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """List the ports again: they may have come and gone."""
         super().showEvent(event)
         self._presenter.refresh_ports()
         self._try.setFocus()

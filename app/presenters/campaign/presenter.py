@@ -45,7 +45,6 @@ class CampaignPresenter(Presenter[CampaignState]):
         Series codes of the stand, in the paper's order.
     author : str
         Recorded with each exclusion.
-    navigator : Navigator
     """
 
     def __init__(
@@ -62,15 +61,12 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._collecting: CollectRuns | None = None
 
     def refresh(self) -> None:
-        """Collect new and changed runs of the folder."""
         self._collect(save=False)
 
     def set_author(self, name: str) -> None:
-        """Set the author of later exclusions."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
-        """Collect another folder."""
         self._worker.cancel()
         self._undos, self._data, self._collecting = [], None, None
         self._update(
@@ -83,7 +79,6 @@ class CampaignPresenter(Presenter[CampaignState]):
         self.refresh()
 
     def cancel(self) -> None:
-        """Cancel the work in progress; what is shown stays."""
         self._worker.cancel()
 
     def select_series(self, label: str) -> None:
@@ -92,7 +87,6 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._update(selected=label, selected_runs=runs)
 
     def open_row(self, label: str) -> None:
-        """Show the runs of a row on the Runs screen."""
         row = next((row for row in self.state.rows if row.label == label), None)
         if row is not None and row.runs:
             self.navigator.show_runs(self.state.folder, row.code)
@@ -107,20 +101,16 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._exclude(path, reason.strip())
 
     def include_run(self, path: str) -> None:
-        """Include a run that was excluded."""
         self._exclude(path, "")
 
     def undo(self) -> None:
-        """Undo the last exclusion or inclusion."""
         if self._undos:
             self._submit(self._undos.pop().task)
 
     def save_results(self) -> None:
-        """Save new results in their runs."""
         self._collect(save=True)
 
     def export(self, product: Product, target: str) -> None:
-        """Write a product of the campaign to a file or folder."""
         if self.state.runs:
             self._submit(WriteProduct(self.state.folder, product, target))
 
@@ -130,12 +120,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._submit(SimulateCampaign(folder))
 
     def tick(self) -> None:
-        """Process the events of the worker."""
         for event in self._worker.poll():
             self._on_event(event)
 
     def close(self) -> None:
-        """End the worker."""
         self._worker.close()
 
     def _submit(self, task: CampaignTask) -> None:

@@ -17,27 +17,18 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """Row of Table 1: a series.
-
-    Attributes
-    ----------
-    label : str
-        Unique in the table.
-    code : str
-        Series code; "" for runs without one.
-    runs : int
-        Number of runs that are included.
-    cells : tuple of Cell
-        In the order of the columns.
-    status : Chip
-        Most important warning about the series.
-    """
+    """Row of Table 1: a series."""
 
     label: str
+    """Unique in the table."""
     code: str
+    """Series code; "" for runs without one."""
     runs: int
+    """Number of runs that are included."""
     cells: tuple[Cell, ...]
+    """In the order of the columns."""
     status: Chip = EMPTY_CHIP
+    """Most important warning about the series."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,29 +42,20 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class ContactBars:
-    """Bars of Fig. 2 for one contact: means over its series, and the series.
-
-    Attributes
-    ----------
-    contact, name : str
-        Code and name.
-    static, dynamic : Bar or None
-        None if no series determined it.
-    static_of_series, dynamic_of_series : tuple of Bar
-    static_at_least : tuple of float
-        Lower bounds of f_s, from series without a value.
-    ratio : str
-        f_s over f_d as text; "" if unknown.
-    """
+    """Bars of Fig. 2 for one contact: means over its series, and the series."""
 
     contact: str
+    """Code and name."""
     name: str
     static: Bar | None
+    """None if no series determined it."""
     dynamic: Bar | None
     static_of_series: tuple[Bar, ...] = ()
     dynamic_of_series: tuple[Bar, ...] = ()
     static_at_least: tuple[float, ...] = ()
+    """Lower bounds of f_s, from series without a value."""
     ratio: str = ""
+    """f_s over f_d as text; "" if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,24 +70,15 @@ class EffectRow:
 
 @dataclass(frozen=True, slots=True)
 class RepeatabilityRow:
-    """Repeatability of f_d in a series.
-
-    Attributes
-    ----------
-    label : str
-    runs : int
-    scatter : str
-        Relative standard deviation of the runs.
-    birge_ratio : str
-    status : Chip
-        Outliers, or that the runs differ.
-    """
+    """Repeatability of f_d in a series."""
 
     label: str
     runs: int
     scatter: str
+    """Relative standard deviation of the runs."""
     birge_ratio: str
     status: Chip = EMPTY_CHIP
+    """Outliers, or that the runs differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,45 +114,32 @@ class Product(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CampaignState:
-    """State of the screen.
-
-    Attributes
-    ----------
-    folder : str
-    columns : tuple of (str, str)
-        Symbol and unit of each column.
-    rows : tuple of TableRow
-        Every series of the stand in the paper's order, then other series of the runs.
-    runs, series : int
-        Numbers of included runs and series.
-    selected : str
-        Label of the row whose runs are `selected_runs`.
-    faults : tuple of str
-        A line for each run without a result.
-    warnings : tuple of str
-        Warnings about the runs together.
-    unsaved_count : int
-        Number of runs whose result is not saved in them.
-    undo_text : str
-        Change that undo would undo; empty without one.
-    """
+    """State of the screen."""
 
     folder: str = ""
     columns: tuple[tuple[str, str], ...] = ()
+    """Symbol and unit of each column."""
     rows: tuple[TableRow, ...] = ()
+    """Every series of the stand in the paper's order, then other series of the runs."""
     runs: int = 0
+    """Numbers of included runs and series."""
     series: int = 0
     contacts: tuple[ContactBars, ...] = ()
     effects: tuple[EffectRow, ...] = ()
     repeatability: tuple[RepeatabilityRow, ...] = ()
     next_test: NextTest | None = None
     selected: str = ""
+    """Label of the row whose runs are `selected_runs`."""
     selected_runs: tuple[RunRow, ...] = ()
     excluded: tuple[RunRow, ...] = ()
     faults: tuple[str, ...] = ()
+    """A line for each run without a result."""
     warnings: tuple[str, ...] = ()
+    """Warnings about the runs together."""
     unsaved_count: int = 0
+    """Number of runs whose result is not saved in them."""
     undo_text: str = ""
+    """Change that undo would undo; empty without one."""
     message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False

@@ -69,25 +69,15 @@ CampaignTask = CollectRuns | ExcludeRun | UndoExclusion | WriteProduct | Simulat
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlannedTest:
-    """Expected results of one more test.
-
-    Attributes
-    ----------
-    series : str
-    runs : int
-        Number of existing runs.
-    friction : Quantity
-        With the uncertainty of a single test.
-    pooled_friction : Quantity or None
-        Of the existing runs.
-    residual_displacement_m : float
-    warnings : tuple of str
-    """
+    """Expected results of one more test."""
 
     series: str
     runs: int
+    """Number of existing runs."""
     friction: "Quantity | None"
+    """With the uncertainty of a single test."""
     pooled_friction: "Quantity | None"
+    """Of the existing runs."""
     residual_displacement_m: float
     warnings: tuple[str, ...]
 
@@ -103,32 +93,19 @@ class CampaignRun:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CampaignData:
-    """Summary of the runs of a folder.
-
-    Attributes
-    ----------
-    campaign : Campaign
-    contacts : tuple of ContactFriction
-    contact_names : dict of str
-        By code of the contact.
-    runs : dict of CampaignRun
-        By path.
-    failures : tuple of (str, Message)
-        Path, and why there is no result.
-    warnings : tuple of Message
-    excluded_by_operator : frozenset of str
-        Paths of runs that can be included again.
-    unsaved_count : int
-        Number of runs whose result is not saved in them.
-    next_test : PlannedTest or None
-    """
+    """Summary of the runs of a folder."""
 
     campaign: "Campaign"
     contacts: "tuple[ContactFriction, ...]"
     contact_names: dict[str, str]
+    """By code of the contact."""
     runs: dict[str, CampaignRun]
+    """By path."""
     failures: tuple[tuple[str, Message], ...]
+    """Path, and why there is no result."""
     warnings: tuple[Message, ...]
     excluded_by_operator: frozenset[str]
+    """Paths of runs that can be included again."""
     unsaved_count: int
+    """Number of runs whose result is not saved in them."""
     next_test: PlannedTest | None

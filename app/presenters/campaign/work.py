@@ -56,7 +56,6 @@ class _Cache:
     runs: CollectedRuns = field(default_factory=lambda: RunCollection().collected_runs([], CollectOptions()))
 
     def holds(self, folder: str) -> bool:
-        """Whether all runs of a folder are collected."""
         return self.is_whole and self.folder == folder
 
 

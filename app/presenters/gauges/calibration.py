@@ -60,7 +60,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._file_name = ""
 
     def set_form(self, form: CalibrationForm) -> None:
-        """Replace the form, and fit again if dial or curve changed; points lock the gauge."""
         before = self.state.form
         if self.state.points:
             form = replace(form, gauge=before.gauge)
@@ -85,7 +84,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         )
 
     def undo(self) -> None:
-        """Abandon the current reading; without one, remove the last point."""
         if self._averager.is_active:
             self._averager.stop()
             self._update(reading_status="", message=Chip(gettext("Not taken"), Tone.PLAIN))
@@ -98,12 +96,10 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             self._fit()
 
     def restart(self) -> None:
-        """Remove all points; their file stays."""
         self._averager.stop()
         self._update(points=(), fit=None, can_save=False, reading_status="", message=EMPTY_CHIP)
 
     def save(self) -> None:
-        """Save the calibration, or say which field is wrong."""
         if not self.state.can_save:
             return
         form = self.state.form
@@ -134,7 +130,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             self._update(message=Chip(gettext(CONNECTION_LOST), Tone.WARN))
 
     def tick(self) -> None:
-        """Evaluate the newest samples."""
         if not self._is_connected:
             return
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
@@ -143,12 +138,10 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._poll_reading()
 
     def on_fitted(self, task: FitCalibration, fit: CalibrationFit) -> None:
-        """Show the fit of the current points."""
         if task.points == self.state.points:
             self._update(fit=fit, can_save=True)
 
     def on_saved(self, saved: SavedCalibration) -> None:
-        """Say where the calibration was saved."""
         used = self.state.form.use
         text = gettext("Written to {file}.", file=saved.file)
         if saved.previous:
@@ -156,7 +149,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._is_connected)
 
     def on_failed(self, task: FitCalibration | SaveCalibration, message: Message) -> None:
-        """Show why a task failed; too few points for a curve are no fault."""
         if isinstance(task, SaveCalibration):
             self._update(message=Chip(sentence(message), Tone.BAD), can_save=True)
         elif task.points == self.state.points:
@@ -176,7 +168,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         )
 
     def _poll_reading(self) -> None:
-        """Add the reading once it is complete."""
         average = self._averager.poll(self.state.form.gauge)
         if isinstance(average, AveragedCounts):
             self._add_point(average, self._dial_mm)

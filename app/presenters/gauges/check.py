@@ -37,12 +37,10 @@ class CheckPresenter(Presenter[CheckState]):
         self._rest: AveragedCounts | None = None
 
     def set_form(self, form: CheckForm) -> None:
-        """Replace the form, unless a check is under way."""
         if not self.state.is_started:
             self._update(form=form, message=EMPTY_CHIP)
 
     def advance(self) -> None:
-        """Begin a check, or the reading that is due."""
         if self._gauges is None:
             self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
         elif not self.state.is_started:
@@ -54,18 +52,15 @@ class CheckPresenter(Presenter[CheckState]):
                 self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
 
     def cancel(self) -> None:
-        """Abandon the check; nothing is recorded."""
         if self.state.is_started:
             self._end(Chip(gettext("The check was broken off: nothing is kept")))
 
     def on_connected(self, gauges: Gauges | None, device: str = "") -> None:
-        """Live samples are converted with these calibrations; None: nothing is connected."""
         self._gauges, self._device = gauges, device
         if self.state.is_started:
             self._end(Chip(gettext(CONNECTION_LOST), Tone.WARN))
 
     def tick(self) -> None:
-        """Evaluate the newest samples."""
         if self._gauges is None:
             return
         reading = self._averager.poll(self.state.form.gauge)
@@ -77,7 +72,6 @@ class CheckPresenter(Presenter[CheckState]):
             self._update(reading_status=reading.text)
 
     def on_checked(self, task: CheckGauge, checked: CheckOutcome) -> None:
-        """Show the outcome."""
         name = gettext("Gauge {number}", number=task.form.gauge + 1)
         outcome = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
         if not checked.passed:
@@ -87,7 +81,6 @@ class CheckPresenter(Presenter[CheckState]):
         self._update(outcome=outcome, values=checked.values, warnings=(*checked.warnings, *remedy))
 
     def on_failed(self, message: Message) -> None:
-        """Show why the check could not be evaluated or recorded."""
         self._end(Chip(sentence(message), Tone.BAD))
 
     def _start(self) -> None:

@@ -36,7 +36,6 @@ class PortsPresenter(Presenter[PortsState]):
     ----------
     worker : Worker
         Used for nothing else, because cancelling a probe ends its process. Closed by `close`.
-    navigator : Navigator
     """
 
     def __init__(self, worker: Worker, navigator: Navigator) -> None:
@@ -51,30 +50,25 @@ class PortsPresenter(Presenter[PortsState]):
         self._update(query_silent=query_silent)
 
     def list_ports(self) -> None:
-        """List the ports, unless a probe is running."""
         if not self._is_probing:
             self._worker.submit(LIST_PORTS, ListPorts())
 
     def probe(self) -> None:
-        """Probe all ports but the connected one."""
         if not self._is_probing:
             self._is_probing = True
             self._update(progress=gettext("Looking at the ports"), message=EMPTY_CHIP)
             self._worker.submit(PROBE_PORTS, ProbePorts(self.state.query_silent, self.connected_url))
 
     def cancel(self) -> None:
-        """Cancel the probe."""
         if self._is_probing:
             self._worker.cancel()
 
     def fill_port(self, url: str) -> None:
-        """Show Start with the device on a port filled in."""
         for card in self.state.ports:
             if card.url == url and card.suggested_form is not None:
                 self._navigator.fill_connection(card.suggested_form)
 
     def fill_second_port(self, url: str) -> None:
-        """Show Start with a port as that of gauge 2's own device."""
         self._navigator.fill_second_port(url)
 
     def poll(self) -> None:
@@ -83,7 +77,6 @@ class PortsPresenter(Presenter[PortsState]):
             self._on_event(event)
 
     def close(self) -> None:
-        """End the worker."""
         self._worker.close()
 
     def _on_event(self, event: WorkerEvent) -> None:

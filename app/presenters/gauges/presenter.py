@@ -53,7 +53,6 @@ class GaugesPresenter(Presenter[GaugesState]):
         The second one probes ports. Both are closed by `close`.
     gauges : Gauges
         Calibrations in use at first.
-    navigator : Navigator
     now : callable
         Time of day.
     """
@@ -89,11 +88,9 @@ class GaugesPresenter(Presenter[GaugesState]):
         self.ports.list_ports()
 
     def leave(self) -> None:
-        """Another screen is shown."""
         self._is_shown = False
 
     def set_tab(self, tab: GaugesTab) -> None:
-        """Show another tab."""
         self._update(tab=tab)
 
     def on_connecting(self, port: str) -> None:
@@ -103,14 +100,12 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._stream_gauges = self._gauges
 
     def on_connected(self, event: Connected) -> None:
-        """The device is connected."""
         self._rate_hz = event.rate_hz
         self.calibration.set_connected(True)
         self.check.on_connected(self._stream_gauges, event.device)
         self._update(device=event.device, health_note=gettext(_WAITING))
 
     def on_disconnected(self) -> None:
-        """Nothing is connected."""
         self.ports.connected_url = ""
         self._stream_gauges = None
         self._recent.clear()
@@ -120,11 +115,9 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._update(device="", health=(), health_note=gettext(_NOT_CONNECTED))
 
     def on_rows(self, rows: RingRows) -> None:
-        """Take live samples."""
         self._recent.append(rows)
 
     def tick(self) -> None:
-        """Process events of the workers and the newest samples."""
         for event in self._worker.poll():
             self._on_event(event)
         self.ports.poll()
@@ -138,7 +131,6 @@ class GaugesPresenter(Presenter[GaugesState]):
             self._measure_health(now_s)
 
     def close(self) -> None:
-        """End the workers."""
         self._worker.close()
         self.ports.close()
 

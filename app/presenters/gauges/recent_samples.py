@@ -54,7 +54,6 @@ class RecentSamples:
         return self.end_s - float(self._parts[0].time_s[0]) if self._parts else 0.0
 
     def append(self, rows: RingRows) -> None:
-        """Append rows, and drop those that are too old."""
         if not len(rows):
             return
         self._parts.append(rows)
@@ -62,7 +61,6 @@ class RecentSamples:
             self._parts.popleft()
 
     def clear(self) -> None:
-        """Drop all rows."""
         self._parts.clear()
 
     def since(self, start_s: float) -> RingRows | None:
@@ -120,7 +118,6 @@ class ReadingAverager:
 
     @property
     def is_active(self) -> bool:
-        """Whether a reading is being averaged."""
         return self._windows > 0
 
     def start(self) -> bool:
@@ -131,7 +128,6 @@ class ReadingAverager:
         return True
 
     def stop(self) -> None:
-        """Abandon the reading."""
         self._windows = 0
 
     def poll(self, gauge: int) -> AveragedCounts | InvalidWindow | StillMoving | None:

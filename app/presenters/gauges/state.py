@@ -31,97 +31,61 @@ class GaugesTab(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GaugeCard:
-    """The calibration in use of one gauge.
-
-    Attributes
-    ----------
-    name : str
-    validity : Chip
-        Whether it is valid, and until when.
-    values : tuple of LabelledValue
-    check : Chip
-        Outcome of the last check against a known displacement.
-    """
+    """The calibration in use of one gauge."""
 
     name: str
     validity: Chip
+    """Whether it is valid, and until when."""
     values: tuple[LabelledValue, ...]
     check: Chip = EMPTY_CHIP
+    """Outcome of the last check against a known displacement."""
 
 
 @dataclass(frozen=True, slots=True)
 class GaugesState:
-    """State of the screen, apart from the tabs that have a presenter of their own.
-
-    Attributes
-    ----------
-    cards : tuple of GaugeCard
-        Gauge 1 first.
-    file : str
-        File of the calibrations in use.
-    checks_fault : Chip
-        Why the record of checks cannot be read.
-    tab : GaugesTab
-    device : str
-        The connected device; empty without one.
-    health : tuple of GaugeHealthState
-        Empty while nothing is known.
-    health_note : str
-        Why nothing is known.
-    """
+    """State of the screen, apart from the tabs that have a presenter of their own."""
 
     cards: tuple[GaugeCard, ...]
+    """Gauge 1 first."""
     file: str = ""
+    """File of the calibrations in use."""
     checks_fault: Chip = EMPTY_CHIP
+    """Why the record of checks cannot be read."""
     tab: GaugesTab = GaugesTab.HEALTH
     device: str = ""
+    """The connected device; empty without one."""
     health: "tuple[GaugeHealthState, ...]" = ()
+    """Empty while nothing is known."""
     health_note: str = ""
+    """Why nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
 class PortCard:
-    """A serial port of this computer.
-
-    Attributes
-    ----------
-    url : str
-    identity : str
-        USB chip or board, and USB numbers.
-    status : Chip
-        The device that was recognised, or why none was; empty before the port is probed.
-    description : tuple of str
-        How the device was verified, problems and remedies.
-    suggested_form : ConnectForm, optional
-        Form of the Start screen that connects to the device.
-    """
+    """A serial port of this computer."""
 
     url: str
     identity: str = ""
+    """USB chip or board, and USB numbers."""
     status: Chip = EMPTY_CHIP
+    """The device that was recognised, or why none was; empty before the port is probed."""
     description: tuple[str, ...] = ()
+    """How the device was verified, problems and remedies."""
     suggested_form: ConnectForm | None = None
+    """Form of the Start screen that connects to the device."""
 
 
 @dataclass(frozen=True, slots=True)
 class PortsState:
-    """State of the tab Ports and devices.
-
-    Attributes
-    ----------
-    ports : tuple of PortCard
-    progress : str
-        What the probe is doing; empty while none runs.
-    message : Chip
-        Outcome of the last probe.
-    query_silent : bool
-        Whether the probe sends identification requests to silent devices.
-    """
+    """State of the tab Ports and devices."""
 
     ports: tuple[PortCard, ...] = ()
     progress: str = ""
+    """What the probe is doing; empty while none runs."""
     message: Chip = EMPTY_CHIP
+    """Outcome of the last probe."""
     query_silent: bool = False
+    """Whether the probe sends identification requests to silent devices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,57 +113,36 @@ class CalibrationPoint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationFit:
-    """Curve fitted to the points.
-
-    Attributes
-    ----------
-    dial_mm, residual_um : (n,) float64
-        Dial reading, and dial reading minus curve, in the order of the points.
-    upward : (n,) bool
-        Whether the dial was rising.
-    values : tuple of LabelledValue
-        Gain, zero, linearity and uncertainty.
-    warnings : tuple of str
-    """
+    """Curve fitted to the points."""
 
     dial_mm: Floats
+    """(n,) float64: dial reading, and dial reading minus curve, in the order of the points."""
     residual_um: Floats
     upward: NDArray[np.bool_]
+    """(n,) bool: whether the dial was rising."""
     values: tuple[LabelledValue, ...]
+    """Gain, zero, linearity and uncertainty."""
     warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationState:
-    """State of the tab Calibrate.
-
-    Attributes
-    ----------
-    form : CalibrationForm
-    live_value : str
-        Mean counts now; empty without samples.
-    live_note : str
-        Noise of the counts, or why there are none.
-    points : tuple of CalibrationPoint
-    reading_status : str
-        Progress of the reading being averaged; empty while none is.
-    fit : CalibrationFit, optional
-    message : Chip
-        Outcome of the last action, or what is missing.
-    can_save : bool
-    offers_reconnect : bool
-        Whether the device is still read with the previous calibration.
-    """
+    """State of the tab Calibrate."""
 
     form: CalibrationForm = CalibrationForm()
     live_value: str = ""
+    """Mean counts now; empty without samples."""
     live_note: str = NO_DEVICE
+    """Noise of the counts, or why there are none."""
     points: tuple[CalibrationPoint, ...] = ()
     reading_status: str = ""
+    """Progress of the reading being averaged; empty while none is."""
     fit: CalibrationFit | None = None
     message: Chip = EMPTY_CHIP
+    """Outcome of the last action, or what is missing."""
     can_save: bool = False
     offers_reconnect: bool = False
+    """Whether the device is still read with the previous calibration."""
 
 
 class CheckKind(StrEnum):
@@ -224,30 +167,18 @@ class CheckForm:
 
 @dataclass(frozen=True, slots=True)
 class CheckState:
-    """State of the tab Check: a gauge compared with a known step, in two readings.
-
-    Attributes
-    ----------
-    form : CheckForm
-    is_started : bool
-        Whether a check is under way, which locks the form.
-    instruction : str
-        The operator's next step; empty without one.
-    reading_status : str
-        Progress of the reading being averaged; empty while none is.
-    outcome : Chip
-    values : tuple of LabelledValue
-        Known and measured step, tolerance, and the budget of the tolerance.
-    warnings : tuple of str
-    message : Chip
-        What is missing or failed.
-    """
+    """State of the tab Check: a gauge compared with a known step, in two readings."""
 
     form: CheckForm = CheckForm()
     is_started: bool = False
+    """Whether a check is under way, which locks the form."""
     instruction: str = ""
+    """The operator's next step; empty without one."""
     reading_status: str = ""
+    """Progress of the reading being averaged; empty while none is."""
     outcome: Chip = EMPTY_CHIP
     values: tuple[LabelledValue, ...] = ()
+    """Known and measured step, tolerance, and the budget of the tolerance."""
     warnings: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
+    """What is missing or failed."""

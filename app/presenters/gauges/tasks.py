@@ -40,27 +40,18 @@ class MeasureHealth:
 
 @dataclass(frozen=True, slots=True)
 class FitCalibration:
-    """Write the points to a file, then fit a calibration to them.
-
-    Attributes
-    ----------
-    gauge : int
-        0 or 1.
-    points : tuple of CalibrationPoint
-        In the order in which they were taken.
-    degree : int
-    resolution_m, uncertainty_m : float
-        Of the dial gauge; None: not stated.
-    file_name : str
-        File of the points, in the folder of settings.
-    """
+    """Write the points to a file, then fit a calibration to them."""
 
     gauge: int
+    """0 or 1."""
     points: tuple[CalibrationPoint, ...]
+    """In the order in which they were taken."""
     degree: int
     resolution_m: float
+    """Of the dial gauge; None: not stated."""
     uncertainty_m: float | None
     file_name: str
+    """File of the points, in the folder of settings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,19 +22,13 @@ _RELATIVE_RATE = f"{_PLATE}′ − {_TABLE}′"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlottedQuantity:
-    """A plotted line that cursors read.
-
-    Attributes
-    ----------
-    symbol, unit : str
-        The symbol as rich text.
-    time_s, values : (n,) float64
-        Rising times as in `Curves`; values in `unit`, NaN where missing.
-    """
+    """A plotted line that cursors read."""
 
     symbol: str
+    """The symbol as rich text."""
     unit: str
     time_s: Floats
+    """(n,) float64: rising times as in `Curves`; values in `unit`, NaN where missing."""
     values: Floats
 
     def interpolate(self, at_s: float) -> float:
@@ -80,10 +74,8 @@ def read_cursors(
 
     Parameters
     ----------
-    cursors : Cursors
     time_s : (n,) float64
         Rising.
-    drawn : sequence of DrawnQuantity
     period_s : float, optional
         Identified period.
     """

@@ -51,7 +51,6 @@ class _Shown:
 
     @property
     def origin_s(self) -> float:
-        """Time of the record that is drawn as 0."""
         return plot_data.time_origin_s(self.run)
 
 
@@ -78,19 +77,16 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._classical: ClassicalFigures | None = None
 
     def on_opening(self, path: str) -> None:
-        """A run is being analysed; clear the screen."""
         self._path = path
         self._shown = self._pending = self._next_friction = self._classical = self._span = None
         self.state = IdentifyState(tab=self.state.tab)
         self._update(title=Path(path).name, progress=Progress(gettext("Reading the run")))
 
     def on_progress(self, path: str, progress: Progress) -> None:
-        """Show the progress of the analysis."""
         if path == self._path and self.state.progress is not None:
             self._update(progress=progress)
 
     def on_failed(self, path: str, message: Message) -> None:
-        """Show why the analysis failed; offer the analysis as one mass."""
         if path == self._path:
             self._update(
                 progress=None,
@@ -99,12 +95,10 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             )
 
     def on_analysed(self, run: AnalysedRun, true_friction: float | None = None) -> None:
-        """Show an analysed run, unless another is being opened."""
         if str(run.path) == self._path:
             self._show(_Shown(run, run, AnalysisTask(self._path, kind=run.kind), true_friction))
 
     def on_event(self, event: WorkerEvent) -> None:
-        """Process an event of a task of this screen."""
         task = event.argument
         if task.path != self._path:
             return
@@ -122,16 +116,13 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._on_variant(task, event.answer)
 
     def cancel(self) -> None:
-        """Cancel the analysis in progress."""
         if self.state.progress is not None:
             self._worker.cancel()
 
     def set_tab(self, side: PlotTab) -> None:
-        """Show another tab; cursors keep their times."""
         self._update(tab=side, cursors=self._cursors_on_tab(self.state.cursors, side))
 
     def select_model(self, name: str) -> None:
-        """Show curves and results of another fitted law."""
         shown = self._shown
         if shown is None or self.state.progress is not None or name == _model_of(shown.run):
             return
@@ -146,14 +137,12 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._worker.submit(run_analysis, AnalysisTask(self._path, name))
 
     def analyse_as_alternative(self) -> None:
-        """Analyse as one mass instead of two, or as two instead of one."""
         if self.state.alternative_kind is not None and self.state.progress is None:
             task = AnalysisTask(self._path, kind=self.state.alternative_kind)
             self._update(progress=Progress(gettext("Reading the run")), failure="")
             self._worker.submit(run_analysis, task)
 
     def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
-        """Set the visible span and its width in pixels; repeat the simulation by hand for it."""
         self._span = start_s, end_s, pixels
         if self.state.manual_fit is not None:
             self.set_friction(self.state.manual_fit.friction)
@@ -176,29 +165,24 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         return self._pending is not None
 
     def reset_friction(self) -> None:
-        """Move the handle back to the fitted f_d."""
         self._pending = self._next_friction = None
         self._update(manual_fit=None)
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
-        """Show two cursors within a span, or hide them."""
         if self._shown is None or self.state.cursors is not None:
             self._update(cursors=None)
         else:
             self._set_cursors(first_cursors(*(span or plot_data.time_span(self._shown.run))))
 
     def move_cursor(self, cursor: Cursor, at_s: float) -> None:
-        """Move a cursor to a time."""
         if self.state.cursors is not None:
             self._set_cursors(move_cursor(self.state.cursors, cursor, at_s))
 
     def activate_cursor(self, cursor: Cursor) -> None:
-        """Select the cursor that the keys move."""
         if self.state.cursors is not None:
             self._set_cursors(move_cursor(self.state.cursors, cursor, self.state.cursors.at(cursor)))
 
     def step_cursor(self, samples: int) -> None:
-        """Move the active cursor by a number of samples."""
         if self.state.cursors is not None and self.state.curves is not None:
             self._set_cursors(step_cursor(self.state.cursors, self.state.curves.time_s, samples))
 
@@ -243,7 +227,6 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._show(_Shown(first, run, task, before.true_friction if before is not None else None))
 
     def _on_variant_failed(self, task: AnalysisTask, message: str) -> None:
-        """Show why a variant failed; a run that is shown stays."""
         if self._shown is None:
             self._update(progress=None, failure=message)
             return
@@ -279,7 +262,6 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._update(cursors=self._cursors_on_tab(cursors, self.state.tab))
 
     def _cursors_on_tab(self, cursors: Cursors | None, side: PlotTab) -> Cursors | None:
-        """Cursors with the values of a tab."""
         curves, shown = self.state.curves, self._shown
         if cursors is None or curves is None or shown is None:
             return None

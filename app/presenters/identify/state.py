@@ -30,26 +30,20 @@ class Curves:
 
     Attributes
     ----------
-    time_s : (n,) float64
-        From the release; without one, from the start of the record.
-    time_title : str
-    table : ChannelCurves
-    relative : ChannelCurves or None
     no_relative : str
         Why there is no second gauge; empty if there is one.
-    slips : tuple of (float, float)
-        Start and end of each slip, in the times of `time_s`.
-    noise_um : float or None
-        Standard deviation of the noise of the gauges. The drawn band is ± 2 standard deviations.
     """
 
     time_s: Floats
+    """(n,) float64: from the release; without one, from the start of the record."""
     time_label: str
     table: ChannelCurves
     relative: ChannelCurves | None = None
     no_relative_reason: str = ""
     slips: tuple[tuple[float, float], ...] = ()
+    """Start and end of each slip, in the times of `time_s`."""
     noise_um: float | None = None
+    """Standard deviation of the noise of the gauges. The drawn band is ± 2 standard deviations."""
 
 
 class PlotTab(StrEnum):
@@ -64,22 +58,18 @@ class PlotTab(StrEnum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Motion:
-    """Velocities and accelerations of the fitted motion; times as in `Curves`.
-
-    Attributes
-    ----------
-    time_s : (n,) float64
-    table_mm, relative_mm, table_mm_per_s, plate_mm_per_s, relative_mm_per_s : (n,) float64
-    table_m_per_s2, plate_m_per_s2, relative_m_per_s2 : (n,) float64
-    """
+    """Velocities and accelerations of the fitted motion; times as in `Curves`."""
 
     time_s: Floats
+    """(n,) float64."""
     table_mm: Floats
+    """(n,) float64."""
     relative_mm: Floats
     table_mm_per_s: Floats
     plate_mm_per_s: Floats
     relative_mm_per_s: Floats
     table_m_per_s2: Floats
+    """(n,) float64."""
     plate_m_per_s2: Floats
     relative_m_per_s2: Floats
 
@@ -124,30 +114,21 @@ class Cursor(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Cursors:
-    """Times of the cursors (s), the one that the keys move, and the values there, as text.
-
-    Attributes
-    ----------
-    symbols : tuple of str
-        Symbols of the values on the current tab, as rich text.
-    values : tuple of tuple of float
-        A row each for A and B; NaN beside a line.
-    cells : tuple of tuple of str
-        A row each for A, B and B − A: name, time, and the values with their units.
-    period : str
-        Distance in periods, or its reciprocal.
-    """
+    """Times of the cursors (s), the one that the keys move, and the values there, as text."""
 
     a_s: float
     b_s: float
     active: Cursor = Cursor.B
     symbols: tuple[str, ...] = ()
+    """Symbols of the values on the current tab, as rich text."""
     values: tuple[tuple[float, ...], ...] = ()
+    """A row each for A and B; NaN beside a line."""
     cells: tuple[tuple[str, ...], ...] = ()
+    """A row each for A, B and B − A: name, time, and the values with their units."""
     period: str = ""
+    """Distance in periods, or its reciprocal."""
 
     def at(self, cursor: Cursor) -> float:
-        """Time of a cursor (s)."""
         return self.a_s if cursor is Cursor.A else self.b_s
 
 
@@ -162,23 +143,15 @@ class BudgetRow:
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """One fitted friction law, as text.
-
-    Attributes
-    ----------
-    name, friction : str
-    ratio : str
-        Residual rms over noise rms.
-    status : Chip
-    is_shown : bool
-        Whether its curves and results are shown.
-    """
+    """One fitted friction law, as text."""
 
     name: str
     friction: str
     ratio: str
+    """Residual rms over noise rms."""
     status: Chip
     is_shown: bool = False
+    """Whether its curves and results are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,17 +167,7 @@ class ClassicalRow:
 
 @dataclass(frozen=True, slots=True)
 class IdentifyState:
-    """State of the screen. It is empty without curves, progress and failure.
-
-    Attributes
-    ----------
-    missing_data : Chip
-        Share of missing samples.
-    no_scan_reason : str
-        Why f_d cannot be varied.
-    alternative_kind : AnalysisKind or None
-        The other kind of analysis that is possible.
-    """
+    """State of the screen. It is empty without curves, progress and failure."""
 
     title: str = ""
     curves: Curves | None = None
@@ -215,13 +178,16 @@ class IdentifyState:
     classical: tuple[ClassicalRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
     missing_data: Chip = EMPTY_CHIP
+    """Share of missing samples."""
     no_scan_reason: str = ""
+    """Why f_d cannot be varied."""
     tab: PlotTab = PlotTab.DISPLACEMENT
     motion: Motion | None = None
     scan: Scan | None = None
     manual_fit: ManualFit | None = None
     cursors: Cursors | None = None
     alternative_kind: AnalysisKind | None = None
+    """The other kind of analysis that is possible."""
     progress: Progress | None = None
     failure: str = ""
 
@@ -263,17 +229,11 @@ class DecimatedLine:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ManualSimulation:
-    """Simulation with an f_d set by hand, and its residual.
-
-    Attributes
-    ----------
-    friction : float
-    simulations, residuals : tuple of DecimatedLine
-        Table, then relative displacement if there is a second gauge.
-    """
+    """Simulation with an f_d set by hand, and its residual."""
 
     friction: float
     simulations: tuple[DecimatedLine, ...]
+    """Table, then relative displacement if there is a second gauge."""
     residuals: tuple[DecimatedLine, ...]
 
 

@@ -21,18 +21,15 @@ class AnalysisSummary:
 
     @property
     def done(self) -> tuple[str, ...]:
-        """Runs with an up-to-date saved result."""
         return (*self.analysed, *self.up_to_date)
 
     def add(self, run: RunAnalysed) -> None:
-        """Add the outcome of one run."""
         if run.fault:
             self.faults.append(run.fault)
         else:
             (self.up_to_date if run.is_up_to_date else self.analysed).append(run.path)
 
     def text(self) -> str:
-        """Sentence about the outcome."""
         count = len(self.up_to_date)
         if count and not self.analysed and not self.cancelled:
             return ngettext(
@@ -83,7 +80,6 @@ class AnalysisQueue:
         return self._ended() if any(ended) and not self._pending else None
 
     def cancel(self) -> AnalysisSummary:
-        """Cancel what is not done."""
         self.poll()
         self._summary.cancelled = bool(self._pending)
         self._pending.clear()
@@ -92,11 +88,9 @@ class AnalysisQueue:
         return self._ended()
 
     def close(self) -> None:
-        """End the worker."""
         self._worker.close()
 
     def _on_event(self, event: WorkerEvent) -> bool:
-        """Process an event; True if it ends a task."""
         if isinstance(event, TaskProgress):
             if isinstance(event.progress, RunAnalysed):
                 self._summary.add(event.progress)

@@ -61,7 +61,6 @@ class ExportPresenter(Presenter[ExportState]):
         self._is_output_typed = False
 
     def open(self, runs: tuple[str, ...], folder: str) -> None:
-        """Open the dialog for runs of a folder; the last choices stay."""
         self._folder = Path(folder)
         self._is_output_typed = False
         self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None)
@@ -80,7 +79,6 @@ class ExportPresenter(Presenter[ExportState]):
         self._propose()
 
     def set_content(self, name: str) -> None:
-        """Choose one of the contents of the format."""
         self._update(content=name, message=EMPTY_CHIP)
         self._propose()
 
@@ -90,11 +88,9 @@ class ExportPresenter(Presenter[ExportState]):
         self._update(output=path)
 
     def set_replace(self, allowed: bool) -> None:
-        """Allow existing files to be replaced."""
         self._update(replace=allowed)
 
     def export(self) -> None:
-        """Export, or say what is missing."""
         state = self.state
         if not state.output.strip():
             missing = (
@@ -109,16 +105,13 @@ class ExportPresenter(Presenter[ExportState]):
             self._submit(ExportRuns(state.runs, output, state.format, state.content, state.replace))
 
     def on_progress(self, progress: Progress) -> None:
-        """Show the progress of the export."""
         self._update(progress=progress)
 
     def on_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
-        """Show a preview, unless the choices have changed since."""
         if task == self._preview_task():
             self._update(preview=preview.text)
 
     def on_done(self, outcome: BatchOutcome) -> None:
-        """Show which files were written, and what failed."""
         files = dict.fromkeys(outcome.done)
         text = (
             gettext("Wrote {files}", files=_files(list(files))) if files else gettext("Nothing was written")
@@ -130,7 +123,6 @@ class ExportPresenter(Presenter[ExportState]):
         self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
 
     def on_failed(self, message: Message) -> None:
-        """Show why nothing was written."""
         text = (
             sentence(message)
             .replace("--force", gettext("Replace existing files"))

@@ -42,45 +42,29 @@ _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 @dataclass(frozen=True, slots=True)
 class ImportState:
-    """State of the dialog.
-
-    Attributes
-    ----------
-    path : str
-        The current file; empty without one.
-    pending : int
-        Number of files after it.
-    columns, column_labels : tuple of str
-    first_rows : str
-    is_text : bool
-        Whether delimiter and decimal sign apply.
-    form : ImportForm
-    faults : dict of str to str
-        Faults by name of the field.
-    overlay : Overlay, optional
-        The record as it would be imported.
-    summary : str
-        Its length and rate.
-    busy : str
-        Work in progress; empty without any.
-    message : Chip
-    can_import : bool
-        Whether the file was read with the current form.
-    """
+    """State of the dialog."""
 
     path: str = ""
+    """The current file; empty without one."""
     pending: int = 0
+    """Number of files after it."""
     columns: tuple[str, ...] = ()
     column_labels: tuple[str, ...] = ()
     first_rows: str = ""
     is_text: bool = True
+    """Whether delimiter and decimal sign apply."""
     form: ImportForm = field(default_factory=ImportForm)
     faults: dict[str, str] = field(default_factory=dict)
+    """Faults by name of the field."""
     overlay: Overlay | None = None
+    """The record as it would be imported."""
     summary: str = ""
+    """Its length and rate."""
     busy: str = ""
+    """Work in progress; empty without any."""
     message: Chip = EMPTY_CHIP
     can_import: bool = False
+    """Whether the file was read with the current form."""
 
 
 class ImportPresenter(Presenter[ImportState]):
@@ -103,7 +87,6 @@ class ImportPresenter(Presenter[ImportState]):
         self._stale = False
 
     def open(self, paths: tuple[str, ...], folder: str, operator: str) -> None:
-        """Append files to the queue; runs go to `folder`."""
         self._folder = folder
         self._files += paths
         if not self.state.path:
@@ -112,7 +95,6 @@ class ImportPresenter(Presenter[ImportState]):
         self._update(pending=len(self._files))
 
     def set_form(self, form: ImportForm) -> None:
-        """Replace the form, validate it, and request a new preview if the text_format of the file changed."""
         before, had_faults, path = self.state.form, self.state.faults, self.state.path
         self._update(form=form, faults=validate(form))
         if not path:
@@ -128,22 +110,18 @@ class ImportPresenter(Presenter[ImportState]):
             )
 
     def import_file(self) -> None:
-        """Import the file, and go on with the next."""
         if self.state.can_import and not self.state.busy:
             self._update(busy=gettext("Importing"), message=EMPTY_CHIP, can_import=False)
             self._submit(ImportFile(self.state.path, self.state.form, self._folder))
 
     def skip_file(self) -> None:
-        """Skip the file."""
         self._next()
 
     def close(self) -> None:
-        """Skip all files."""
         self._files.clear()
         self._next()
 
     def on_done(self, task: ImportTask, answer: Any) -> None:
-        """Show the result of a task, unless it is outdated."""
         if isinstance(task, ImportFile):
             self._update(busy="")
             self._next()
@@ -155,7 +133,6 @@ class ImportPresenter(Presenter[ImportState]):
                 self._show_preview(answer, task.form)
 
     def on_failed(self, task: ImportTask, message: Message) -> None:
-        """Show why a task failed, at the field that the message names."""
         words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
         faults = dict.fromkeys(_named_field(str(message)), words)
         if isinstance(task, ImportFile):

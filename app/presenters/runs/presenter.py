@@ -81,17 +81,14 @@ class RunsPresenter(Presenter[RunsState]):
         self._is_listing = False
 
     def refresh(self) -> None:
-        """List the folder again."""
         if not self._is_listing:
             self._is_listing = True
             self._submit(ListRuns(self.state.folder))
 
     def set_author(self, name: str) -> None:
-        """Set the author of later edits."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
-        """Show the runs of another folder."""
         self._undos.clear()
         self._update(
             folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None,
@@ -101,7 +98,6 @@ class RunsPresenter(Presenter[RunsState]):
         self.refresh()
 
     def set_filter(self, run_filter: RunFilter) -> None:
-        """Filter the table."""
         self._update(filter=run_filter)
         self._show_rows()
 
@@ -112,7 +108,6 @@ class RunsPresenter(Presenter[RunsState]):
         self._show_rows()
 
     def select(self, paths: tuple[str, ...]) -> None:
-        """Select runs: preview them, and show their editable metadata."""
         if paths == self.state.selected:
             return
         self._update(selected=paths, metadata=self._library.metadata(paths))
@@ -124,7 +119,6 @@ class RunsPresenter(Presenter[RunsState]):
             self._update(overlay=Overlay(message=sentence(words)) if paths else None)
 
     def open_selected(self) -> None:
-        """Show the first selected run on Identify."""
         if self.state.selected:
             self._open_run(self.state.selected[0])
 
@@ -144,7 +138,6 @@ class RunsPresenter(Presenter[RunsState]):
         self._submit(EditRuns(paths, field, value, self._author))
 
     def undo(self) -> None:
-        """Undo the last edit or move to the trash."""
         task = self._undos.pop()
         if task is not None:
             self._submit(task)
@@ -168,7 +161,6 @@ class RunsPresenter(Presenter[RunsState]):
         return bool(runs)
 
     def cancel(self) -> None:
-        """Cancel the work whose progress is shown; what is done stays."""
         if self._analyses.progress is None:
             self._worker.cancel()
         else:
@@ -185,7 +177,6 @@ class RunsPresenter(Presenter[RunsState]):
         return bool(others)
 
     def tick(self) -> None:
-        """Process the events of the workers."""
         for event in self._worker.poll():
             self._on_event(event)
         summary = self._analyses.poll()
@@ -195,7 +186,6 @@ class RunsPresenter(Presenter[RunsState]):
             self._on_analyses_ended(summary)
 
     def close(self) -> None:
-        """End the workers."""
         self._worker.close()
         self._analyses.close()
 
@@ -284,11 +274,9 @@ class RunsPresenter(Presenter[RunsState]):
         self.refresh()
 
     def _show_progress(self) -> None:
-        """Show the progress of the analyses, else that of other work."""
         self._update(progress=self._analyses.progress or self._progress)
 
     def _show_outcome(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
-        """Show the outcome of work, with a line for each fault."""
         self._set_message(outcome_chip(words, done, faults), faults)
 
     def _set_message(self, message: Chip, details: tuple[str, ...] = ()) -> None:

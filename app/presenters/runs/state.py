@@ -69,21 +69,15 @@ class MetadataForm:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
-    """One run of the overlay: both gauges (mm), decimated for drawing; NaN breaks the line.
-
-    Attributes
-    ----------
-    name : str
-    time_s : (n,) float64
-        From release; from the start of the record where no release is known.
-    table : (n,) float64
-    relative : (n,) float64 or None
-    """
+    """One run of the overlay: both gauges (mm), decimated for drawing; NaN breaks the line."""
 
     name: str
     time_s: NDArray[np.float64]
+    """(n,) float64: from release; from the start of the record where no release is known."""
     table: NDArray[np.float64]
+    """(n,) float64."""
     relative: NDArray[np.float64] | None
+    """(n,) float64 or None."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,23 +92,13 @@ class Overlay:
 
 @dataclass(frozen=True, slots=True)
 class RunsState:
-    """State of the screen.
-
-    Attributes
-    ----------
-    rows : tuple of RunRow
-        Runs that match the filter, sorted.
-    total : int
-        Number of runs in the folder.
-    message : Chip
-        Outcome of the last work; `details` holds a line for each fault.
-    undo_text : str
-        Change that undo would undo; empty without one.
-    """
+    """State of the screen."""
 
     folder: str = ""
     rows: tuple[RunRow, ...] = ()
+    """Runs that match the filter, sorted."""
     total: int = 0
+    """Number of runs in the folder."""
     is_listed: bool = False
     all_series: tuple[str, ...] = ()
     filter: RunFilter = RunFilter()
@@ -125,5 +109,7 @@ class RunsState:
     overlay: Overlay | None = None
     progress: Progress | None = None
     message: Chip = EMPTY_CHIP
+    """Outcome of the last work; `details` holds a line for each fault."""
     details: tuple[str, ...] = ()
     undo_text: str = ""
+    """Change that undo would undo; empty without one."""

@@ -38,11 +38,9 @@ class RunList:
         self._rows: dict[str, tuple[RunSummary, RunRow]] = {}
 
     def set_runs(self, runs: "Sequence[RunSummary]") -> None:
-        """Replace all runs."""
         self._by_path = {run.path: run for run in runs}
 
     def rows(self, run_filter: RunFilter, by: Column, *, descending: bool) -> tuple[RunRow, ...]:
-        """Rows of the runs that match a filter, sorted by a column."""
         kept = select_runs(self._by_path.values(), run_filter, by, descending=descending)
         return tuple(self._row(run) for run in kept)
 
@@ -51,7 +49,6 @@ class RunList:
         return metadata_form([self._by_path[path] for path in paths])
 
     def readable(self, paths: Sequence[str]) -> tuple[str, ...]:
-        """Paths of the runs that can be read."""
         return tuple(path for path in paths if not self._by_path[path].fault)
 
     def fault(self, path: str) -> Message:

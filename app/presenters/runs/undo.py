@@ -34,7 +34,6 @@ class UndoStack:
 
     @property
     def text(self) -> str:
-        """Description of the change on top; empty without one."""
         return self._undos[-1].text if self._undos else ""
 
     def push(self, undo: UndoAction | None) -> None:
@@ -43,11 +42,9 @@ class UndoStack:
             self._undos.append(undo)
 
     def pop(self) -> UndoEdits | RestoreRuns | None:
-        """Remove and return the task on top; None without one."""
         return self._undos.pop().task if self._undos else None
 
     def clear(self) -> None:
-        """Remove all actions."""
         self._undos.clear()
 
 

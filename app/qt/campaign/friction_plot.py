@@ -41,7 +41,6 @@ class FrictionPlot(QWidget):
         self._draw()
 
     def show_contacts(self, contacts: tuple[ContactBars, ...]) -> None:
-        """Draw these."""
         self._contacts = contacts
         said = "; ".join(_spoken(one) for one in contacts)
         self.setAccessibleName(gettext("Friction by contact: {said}", said=said or gettext("nothing yet")))
@@ -64,7 +63,6 @@ class FrictionPlot(QWidget):
         plot.set_value_range(0.0, _HEADROOM * max(_tops(self._contacts), default=1.0))
 
     def _name(self) -> None:
-        """Write codes below the bars, with what they stand for where there is room."""
         has_room = self.width() > _ROOM * max(len(self._contacts), 1)
         ticks = [(place, _named(one, has_room=has_room)) for place, one in enumerate(self._contacts)]
         self._stack.plots[0].bottom.setTicks([ticks])

@@ -39,13 +39,7 @@ _TARGETS = {
 
 
 class CampaignScreen(QWidget):
-    """Draws `CampaignState`.
-
-    Parameters
-    ----------
-    theme : Theme
-    presenter : CampaignPresenter
-    """
+    """Draws `CampaignState`."""
 
     def __init__(self, theme: Theme, presenter: CampaignPresenter) -> None:
         super().__init__()
@@ -69,7 +63,6 @@ class CampaignScreen(QWidget):
         self._connect()
 
     def show_state(self, state: CampaignState) -> None:
-        """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         self._show_head(state)
         is_empty = not state.runs and not state.faults
@@ -116,7 +109,6 @@ class CampaignScreen(QWidget):
         dialog.open()
 
     def _ask_for_target(self, product: Product) -> None:
-        """Let the operator say where a product goes; the dialog waits for nobody."""
         kinds, name = _TARGETS[product]
         dialog = QFileDialog(self, gettext("Export"), self._start_folder())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -208,7 +200,6 @@ class _Working(QWidget):
         layout.addStretch(0)
 
     def show_progress(self, progress: Progress | None) -> None:
-        """Show how far it is; None empties it."""
         for part in self._parts:
             part.setVisible(progress is not None)
         if progress is not None:
@@ -250,7 +241,6 @@ class _Empty(QFrame):
         layout.addStretch(1)
 
     def show_state(self, state: CampaignState) -> None:
-        """Say which folder is empty, or being looked through."""
         self._folder = state.folder
         for button in self._buttons:
             button.setVisible(state.progress is None)

@@ -31,7 +31,6 @@ class SelectedRuns(QWidget):
         self.hide()
 
     def show_runs(self, series: str, runs: tuple[RunRow, ...]) -> None:
-        """Show the runs of a series; none hide it all."""
         self.setVisible(bool(runs))
         self._title.setText(gettext("Runs of {series}", series=series))
         while (item := self._lines.takeAt(0)) is not None:
@@ -41,7 +40,6 @@ class SelectedRuns(QWidget):
             self._lines.addWidget(self._line(run))
 
     def clear_reason(self) -> None:
-        """Forget what was typed."""
         self._reason.clear()
 
     def _line(self, run: RunRow) -> QWidget:

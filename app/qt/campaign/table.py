@@ -50,7 +50,6 @@ class SeriesTable(QTableWidget):
         self.itemDoubleClicked.connect(lambda _: self._open())
 
     def show_columns(self, columns: tuple[tuple[str, str], ...]) -> None:
-        """Name the columns, with their units below."""
         self.setColumnCount(1 + len(columns))
         titles = [f"{symbol}\n{unit}" for symbol, unit in columns]
         for column, title in enumerate([gettext("series"), *titles]):
@@ -60,7 +59,6 @@ class SeriesTable(QTableWidget):
             self.setHorizontalHeaderItem(column, head)
 
     def show_rows(self, rows: tuple[TableRow, ...]) -> None:
-        """Show these; what was selected stays so."""
         chosen = self._chosen()
         self._rows = rows
         self.blockSignals(True)
@@ -77,19 +75,16 @@ class SeriesTable(QTableWidget):
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Fill the width."""
         super().resizeEvent(event)
         self._fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Enter opens the runs of the row."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self._open()
         else:
             super().keyPressEvent(event)
 
     def _fit(self) -> None:
-        """Share what room is left; scroll sideways only where there is none."""
         header, count = self.horizontalHeader(), self.columnCount()
         hints = [max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in range(count)]
         spare = max(0, self.viewport().width() - sum(hints)) // max(1, count)
@@ -116,13 +111,11 @@ class _TwoLines(QStyledItemDelegate):
         self._theme = theme
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: _Index) -> QSize:  # noqa: N802
-        """As wide as the wider line."""
         lines = zip(_lines(index), _fonts(index), strict=True)
         widths = (_width(text, used) for text, used in lines)
         return QSize(max(widths) + 2 * _PADDING, _ROW_HEIGHT)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
-        """Draw ground and both lines."""
         widget = option.widget
         style = widget.style()
         style.drawPrimitive(QStyle.PrimitiveElement.PE_PanelItemViewItem, option, painter, widget)

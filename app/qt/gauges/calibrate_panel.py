@@ -79,7 +79,6 @@ class CalibratePanel(QScrollArea):
         self._connect(reconnect)
 
     def show_state(self, state: CalibrationState) -> None:
-        """Draw what differs."""
         self._form = state.form
         self._readings.show_state(state)
         self._degree.setCurrentIndex(state.form.degree - 1)

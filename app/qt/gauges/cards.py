@@ -35,7 +35,6 @@ class CardsColumn(QScrollArea):
         self.setAccessibleName(gettext("Calibrations in use"))
 
     def show_state(self, state: GaugesState) -> None:
-        """Draw both cards."""
         for shown, card in zip(self._cards, state.cards, strict=True):
             shown.show_card(card)
         show_chip(self._fault, state.checks_fault)

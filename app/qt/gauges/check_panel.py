@@ -53,7 +53,6 @@ class CheckPanel(QWidget):
         self._connect()
 
     def show_state(self, state: CheckState) -> None:
-        """Draw what differs."""
         self._form = state.form
         self._gauge.setCurrentIndex(state.form.gauge)
         self._kind.setCurrentIndex(list(CheckKind).index(state.form.kind))

@@ -33,7 +33,6 @@ class HealthPanel(QStackedWidget):
 
     Parameters
     ----------
-    theme : Theme
     connect_device : callable
         Leads to where a device is connected.
     """
@@ -52,7 +51,6 @@ class HealthPanel(QStackedWidget):
         self.addWidget(self._filled())
 
     def show_state(self, state: GaugesState) -> None:
-        """Draw what differs."""
         self._words.setText(state.health_note)
         self._go.setVisible(not state.device)
         self.setCurrentIndex(1 if state.health else 0)

@@ -37,7 +37,6 @@ class PortsPanel(QWidget):
         self._lay_out()
 
     def show_state(self, state: PortsState) -> None:
-        """Draw what differs."""
         self._look.setEnabled(not state.progress)
         self._stop.setEnabled(bool(state.progress))
         self._query_silent.setChecked(state.query_silent)
@@ -95,7 +94,6 @@ class PortsPanel(QWidget):
         return row
 
     def _second_button(self, url: str) -> QPushButton:
-        """Button for a stand with a device for each gauge."""
         second = QPushButton(gettext("Use for gauge 2"))
         second.setToolTip(
             gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)

@@ -28,7 +28,6 @@ class ResidualPlot(PlotStack):
         self.show_fit(None)
 
     def show_fit(self, fitted: CalibrationFit | None) -> None:
-        """Draw the residuals; None takes them away."""
         (plot,) = self.plots
         if fitted is None:
             for marks in self._marks:

@@ -27,13 +27,7 @@ _KEYS = {
 
 
 class GaugesScreen(QWidget):
-    """Draws `GaugesState`.
-
-    Parameters
-    ----------
-    theme : Theme
-    presenter : GaugesPresenter
-    """
+    """Draws `GaugesState`."""
 
     def __init__(self, theme: Theme, presenter: GaugesPresenter) -> None:
         super().__init__()
@@ -53,20 +47,17 @@ class GaugesScreen(QWidget):
         presenter.check.attach(self._check)
 
     def show_state(self, state: GaugesState) -> None:
-        """Draw what differs from what is shown."""
         self._tabs.setCurrentIndex(list(GaugesTab).index(state.tab))
         self._pages.setCurrentIndex(self._tabs.currentIndex())
         self._cards.show_state(state)
         self._health.show_state(state)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Give the cards their share of the width."""
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._cards.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Let the tabs be the first that the keyboard meets."""
         super().showEvent(event)
         self._tabs.setFocus()
 

@@ -21,7 +21,6 @@ class ValueGrid(QWidget):
         self._grid.setVerticalSpacing(2)
 
     def show_values(self, facts: Sequence[LabelledValue]) -> None:
-        """One column of values."""
         self._show(
             {
                 (row, column): text
@@ -31,7 +30,6 @@ class ValueGrid(QWidget):
         )
 
     def show_columns(self, titles: Sequence[str], columns: Sequence[Sequence[LabelledValue]]) -> None:
-        """Several columns of values with titles; the facts of all bear the same names."""
         texts = {(0, number): title for number, title in enumerate(titles, start=1)}
         for row, facts in enumerate(zip(*columns, strict=True), start=1):
             texts[row, 0] = facts[0].label

@@ -34,7 +34,6 @@ class CursorBar(QWidget):
         self.hide()
 
     def show_cursors(self, cursors: Cursors | None) -> None:
-        """Write what is read; None hides it all."""
         self.setVisible(cursors is not None)
         if cursors is None:
             return
@@ -49,7 +48,6 @@ class CursorBar(QWidget):
         self._period.setText(cursors.period)
 
     def _cell(self, row: int, column: int) -> QLabel:
-        """The label there, made when it is first wanted: tabs read different numbers of quantities."""
         if (row, column) not in self._labels:
             made = label(role=TextRole.STRONG if column == 0 else TextRole.TEXT)
             if row == 0:

@@ -25,7 +25,6 @@ class CursorLines(QObject):
         }
 
     def show_cursors(self, cursors: Cursors | None) -> None:
-        """Put the lines where the cursors stand; None takes them away."""
         for cursor, lines in self._lines.items():
             for line in lines:
                 line.setVisible(cursors is not None)
@@ -33,7 +32,6 @@ class CursorLines(QObject):
                     line.setValue(cursors.at(cursor))
 
     def restyle(self, tokens: Tokens) -> None:
-        """Take these colours: A dashed, B solid, both with their letters on top."""
         for cursor, dashes in ((Cursor.A, (6.0, 3.0)), (Cursor.B, ())):
             for line in self._lines[cursor]:
                 line.setPen(pen(tokens.accent, dashes=dashes))

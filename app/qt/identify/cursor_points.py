@@ -28,14 +28,12 @@ class CursorPoints:
         self._points = {cursor: [_Point(plot, cursor) for plot in plots] for cursor in Cursor}
 
     def show_cursors(self, cursors: Cursors | None) -> None:
-        """Mark both moments; None takes the marks away."""
         for row, points in enumerate(self._points.values()):
             for number, point in enumerate(points):
                 place = (np.nan, np.nan) if cursors is None else cursors.values[row][2 * number :][:2]
                 point.put(*place)
 
     def restyle(self, tokens: Tokens) -> None:
-        """Take these colours: A hollow, B filled, both with their letters."""
         for point in self._points[Cursor.A]:
             point.restyle(tokens.text, tokens.surface)
         for point in self._points[Cursor.B]:

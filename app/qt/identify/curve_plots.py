@@ -75,7 +75,6 @@ class CurvePlots(QWidget):
         self._restyle()
 
     def show_curves(self, curves: Curves) -> None:
-        """Draw a run from a second before its release."""
         self._curves = curves
         self._stack.set_time_title(curves.time_label)
         channels = (curves.table, curves.relative)
@@ -93,7 +92,6 @@ class CurvePlots(QWidget):
         self._stack.set_time_range(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
 
     def show_manual_fit(self, hand: ManualFit | None) -> None:
-        """Draw the simulation with f_d set by hand over the record; None gives the fitted one back."""
         for fitted in (*self._simulations, *self._residuals):
             fitted.setVisible(hand is None)
         simulated = () if hand is None else hand.simulations_mm
@@ -116,7 +114,6 @@ class CurvePlots(QWidget):
         self.span_changed.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
 
     def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
-        """Tell lines apart; a plot without any is left out, with its title to say why."""
         fitted = any(c is not None and c.residual_um is not None for c in channels)
         keys = [gettext(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
         of_residual = _OF_TABLE if channels[1] is None else _OF_RESIDUAL
@@ -152,7 +149,6 @@ class CurvePlots(QWidget):
             self._stack.set_time_title(self._curves.time_label)
 
     def _read_out(self, at_s: float) -> None:
-        """Time and values under the pointer."""
         for row in range(len(_NAMES)):
             self._stack.set_readout(row, self._readout(row, at_s))
 

@@ -24,7 +24,6 @@ class TimePlots(QWidget):
 
     Parameters
     ----------
-    theme : Theme
     titles : sequence of (str, str)
         Rich text and unit of each plot.
     colours : sequence of sequence of str
@@ -120,11 +119,9 @@ class MotionTabs:
 
     @property
     def widgets(self) -> tuple["TimePlots | PhasePlots", ...]:
-        """In the order of the tabs."""
         return self.velocities, self.accelerations, self.relative, self.phase
 
     def show_motion(self, motion: Motion, slips: tuple[tuple[float, float], ...]) -> None:
-        """Draw a motion in all of them."""
         self.velocities.show_lines(
             motion.time_s,
             ((motion.table_mm_per_s, motion.plate_mm_per_s), (motion.relative_mm_per_s,)),
@@ -160,7 +157,6 @@ class PhasePlots(QWidget):
         self._restyle()
 
     def show_motion(self, motion: Motion) -> None:
-        """Draw a motion."""
         both = ((motion.table_mm, motion.table_mm_per_s), (motion.relative_mm, motion.relative_mm_per_s))
         for stack, curve, (across, up) in zip(self._stacks, self._curves, both, strict=True):
             curve.setData(across, up)

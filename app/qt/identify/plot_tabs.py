@@ -48,7 +48,6 @@ class PlotTabs(QStackedWidget):
         )
 
     def show_tab(self, side: PlotTab, cursors: Cursors | None) -> None:
-        """Show a page, and on it the cursors, if any."""
         page = self._pages[side]
         page.cursors.show_cursors(cursors)
         self.setCurrentWidget(page)
@@ -61,7 +60,6 @@ class PlotTabs(QStackedWidget):
         return page.span() if isinstance(page, CurvePlots | TimePlots) else None
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Arrows move a cursor, with Shift further; A and B choose which one."""
         key = Qt.Key(event.key())
         if key in _KEYS:
             many = event.modifiers() & Qt.KeyboardModifier.ShiftModifier

@@ -18,7 +18,6 @@ class ResultsPanel(QWidget):
 
     Parameters
     ----------
-    state : IdentifyState
     show_model : callable
         Told which law's curves are wanted.
     """
@@ -45,7 +44,6 @@ class ResultsPanel(QWidget):
         layout.addWidget(label(break_path(state.result.path), TextRole.LABEL, muted=True, wrap=True))
 
     def show_classical(self, rows: tuple[ClassicalRow, ...]) -> None:
-        """Put the classical figures beside the fitted ones; without any there is no such section."""
         self._checks.setVisible(bool(rows))
         if rows and self._checks.layout() is None:
             layout = QVBoxLayout(self._checks)

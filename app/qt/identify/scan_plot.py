@@ -27,7 +27,6 @@ class ScanPlot(QFrame):
 
     Parameters
     ----------
-    theme : Theme
     look : callable
         Takes in what has been simulated; tells whether more is awaited.
     """
@@ -71,7 +70,6 @@ class ScanPlot(QFrame):
         self._restyle()
 
     def show_scan(self, scan: Scan | None) -> None:
-        """Draw another run's; None hides it."""
         self._scan = scan
         self._timer.stop()
         self.setVisible(scan is not None)
@@ -89,7 +87,6 @@ class ScanPlot(QFrame):
         self.show_manual_fit(None)
 
     def show_manual_fit(self, hand: ManualFit | None) -> None:
-        """Put the handle where the hand has it; None takes it back to the fit."""
         if self._scan is None:
             return
         self._words.setText(gettext(_WORDS) if hand is None else hand.description)
@@ -98,7 +95,6 @@ class ScanPlot(QFrame):
             self._handle.setValue(self._scan.fitted if hand is None else hand.friction)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Arrows move the handle, with Shift further; Home takes it back."""
         direction = _KEYS.get(Qt.Key(event.key()))
         if event.key() == Qt.Key.Key_Home:
             self.reset_requested.emit()
@@ -111,7 +107,6 @@ class ScanPlot(QFrame):
             self._tell()
 
     def _tell(self, *_: object) -> None:
-        """Ask for the simulation with the handle's f_d, and look for it until it is there."""
         self.friction_set.emit(float(self._handle.value()))
         self._timer.start()
 

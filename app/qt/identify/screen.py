@@ -43,8 +43,6 @@ class IdentifyScreen(QWidget):
 
     Parameters
     ----------
-    theme : Theme
-    presenter : IdentifyPresenter
     ask_for_run : callable
         Lets the operator choose a recording.
     """
@@ -80,7 +78,6 @@ class IdentifyScreen(QWidget):
         self._connect(presenter)
 
     def show_state(self, state: IdentifyState) -> None:
-        """Draw a run, or say why there is none."""
         self._title.setText(state.title or gettext("No recording is open"))
         old, self._shown = self._shown, state
         filled = state.curves is not None and state.progress is None
@@ -105,7 +102,6 @@ class IdentifyScreen(QWidget):
         self._stack.setCurrentIndex(1)
 
     def _show_run(self, state: IdentifyState) -> None:
-        """Draw what comes new with a run, a law or a kind."""
         if state.curves is None:
             return
         self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
@@ -223,7 +219,6 @@ class _Waiting(QFrame):
         layout.addStretch(1)
 
     def show_state(self, state: IdentifyState) -> None:
-        """Say what goes on, with a bar; or what is missing, with what can be done about it."""
         progress = state.progress
         show_chip(self._words, _words(state))
         self._open.setVisible(progress is None)

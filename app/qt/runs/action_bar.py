@@ -25,7 +25,6 @@ class ActionBar(QFrame):
 
     Parameters
     ----------
-    presenter : RunsPresenter
     ask_for_export : callable
         Opens the dialog.
     """
@@ -67,7 +66,6 @@ class ActionBar(QFrame):
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), screen)
 
     def show_state(self, state: RunsState) -> None:
-        """Draw what belongs here."""
         some = bool(state.selected)
         for button in (self._open, self._trash):
             button.setEnabled(some)

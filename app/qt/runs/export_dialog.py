@@ -48,7 +48,6 @@ class ExportDialog(QDialog):
         self._connect()
 
     def show_state(self, state: ExportState) -> None:
-        """Draw the state."""
         old, self._shown = self._shown, state
         count = len(state.runs)
         what = Path(state.runs[0]).stem if count == 1 else ngettext("{count} run", "{count} runs", count)

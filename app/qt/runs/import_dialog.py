@@ -48,7 +48,6 @@ class ImportDialog(QDialog):
         self._connect()
 
     def show_state(self, state: ImportState) -> None:
-        """Draw what differs."""
         old, self._shown = self._shown, state
         name = Path(state.path).name
         self._title.setText(
@@ -67,7 +66,6 @@ class ImportDialog(QDialog):
         self._leave.setEnabled(bool(state.path))
 
     def reject(self) -> None:
-        """Close, by whatever means, and leave out what was not imported."""
         self._presenter.close()
         super().reject()
 

@@ -114,7 +114,6 @@ class ImportFields(QWidget):
         self._connect()
 
     def show_state(self, state: ImportState) -> None:
-        """Draw what differs."""
         old, self._shown = self._shown, state
         if (state.columns, state.column_labels) != (old.columns, old.column_labels):
             self._offer_columns(state)
@@ -135,7 +134,6 @@ class ImportFields(QWidget):
             self._show_faults(state.faults)
 
     def fill(self) -> None:
-        """Tell what stands in the fields, the one that is being typed in too."""
         chosen = {name: box.currentData() or "" for name, box in self._boxes().items()}
         texts = {name: field.text() for name, field in self._texts.items()}
         of_reading = {name: chosen.pop(name) for name in _OF_READING}

@@ -45,7 +45,6 @@ class MetadataEditor(QWidget):
             grid.addWidget(field, line, 1)
 
     def show_metadata(self, metadata: MetadataForm | None) -> None:
-        """Show metadata; None disables the fields."""
         self._metadata = metadata
         for name, field in self._fields.items():
             field.setEnabled(metadata is not None)

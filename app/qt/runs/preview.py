@@ -52,7 +52,6 @@ class RunsPreview(QWidget):
         self.show_overlay(None)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
-        """Draw runs; without any, say how to get them."""
         self._overlay = overlay or Overlay(
             message=gettext("Select runs to see them here, several to compare them.")
         )

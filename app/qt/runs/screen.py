@@ -42,7 +42,6 @@ class RunsScreen(QWidget):
 
     Parameters
     ----------
-    theme : Theme
     presenter : RunsPresenter
         Told what the operator does.
     dialogs : Dialogs
@@ -72,7 +71,6 @@ class RunsScreen(QWidget):
         self.setAcceptDrops(True)
 
     def show_state(self, state: RunsState) -> None:
-        """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
             self._series.addItems([gettext(_ALL_SERIES), *state.all_series])
@@ -89,35 +87,29 @@ class RunsScreen(QWidget):
         self._actions.show_state(state)
 
     def _show_wanted(self, wanted: RunFilter) -> None:
-        """Another screen may have asked for certain runs."""
         self._series.setCurrentText(wanted.series or _ALL_SERIES)
         self._status.setCurrentText(wanted.status.value)
         if self._text.text() != wanted.text:
             self._text.setText(wanted.text)
 
     def focus_search(self) -> None:
-        """Let the operator type what to look for."""
         self._text.setFocus()
         self._text.selectAll()
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Let the table be the first that the keyboard meets."""
         super().showEvent(event)
         self._table.setFocus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Give the column its share of the width."""
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._side.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
-        """Take files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
-        """Hand on the files that were dropped."""
         paths = tuple(url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile())
         if paths:
             self._take_files(paths)

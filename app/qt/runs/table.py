@@ -77,7 +77,6 @@ class RunsTable(QTableView):
         theme.changed.connect(self.viewport().update)
 
     def show_rows(self, rows: tuple[RunRow, ...], selected: tuple[str, ...]) -> None:
-        """Show lines, and select those of `selected`."""
         model = self.selectionModel()
         model.blockSignals(True)
         if rows is not self._model.rows:
@@ -100,7 +99,6 @@ class RunsTable(QTableView):
             model.setCurrentIndex(selection.indexes()[0], QItemSelectionModel.SelectionFlag.NoUpdate)
 
     def show_order(self, column: Column, *, descending: bool) -> None:
-        """Mark the column that the lines are sorted by."""
         order = Qt.SortOrder.DescendingOrder if descending else Qt.SortOrder.AscendingOrder
         self._order = column, order
         self.horizontalHeader().setSortIndicator(_COLUMNS.index(column), order)
