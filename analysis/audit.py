@@ -176,7 +176,6 @@ def audit(
 
     Parameters
     ----------
-    rows : sequence of PublishedRow
     table_mass_kg, gravity_m_per_s2 : float
         m1 and g.
     pullbacks_m : mapping of str to float

@@ -26,21 +26,14 @@ class Place(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """Symbol of the paper: a letter, and an index as subscript.
-
-    Attributes
-    ----------
-    letter, index : str
-    ascii : str
-        What a terminal shows in place of letter and index where those are not ASCII.
-    relation : str
-        ≥ or ≤ where the quantity is a bound, else "".
-    """
+    """Symbol of the paper: a letter, and an index as subscript."""
 
     letter: str
     index: str = ""
     ascii: str = ""
+    """What a terminal shows in place of letter and index where those are not ASCII."""
     relation: str = ""
+    """≥ or ≤ where the quantity is a bound, else ""."""
 
     @property
     def text(self) -> str:
@@ -80,21 +73,14 @@ _LATEX_LETTERS: Final = {"δ": r"\delta", "μ": r"\mu", "α": r"\alpha", "ζ": r
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Unit in which a quantity is shown.
-
-    Attributes
-    ----------
-    symbol : str
-        "" for pure numbers.
-    scale : float
-        How many of it make one SI unit.
-    latex : str
-        The same for LaTeX, where it differs.
-    """
+    """Unit in which a quantity is shown."""
 
     symbol: str
+    """"" for pure numbers."""
     scale: float = 1.0
+    """How many of it make one SI unit."""
     latex: str = ""
+    """The same for LaTeX, where it differs."""
 
     @property
     def in_latex(self) -> str:
@@ -104,60 +90,39 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """What the campaign's table needs to know of a quantity.
-
-    Attributes
-    ----------
-    position : int
-        In the paper's Table 1, from 1; columns of our own follow.
-    published : str
-        Attribute of a published row; "" where the paper does not print the quantity.
-    is_proportional : bool
-        Runs differ by a share of the value rather than by an amount.
-    is_of_stand : bool
-        A property of the stand: its scatter is the same whatever rubs on it.
-    missing : str
-        Why no run may have determined it.
-    """
+    """What the campaign's table needs to know of a quantity."""
 
     position: int
+    """In the paper's Table 1, from 1; columns of our own follow."""
     published: str = ""
+    """Attribute of a published row; "" where the paper does not print the quantity."""
     is_proportional: bool = True
+    """Runs differ by a share of the value rather than by an amount."""
     is_of_stand: bool = False
+    """A property of the stand: its scatter is the same whatever rubs on it."""
     missing: str = ""
+    """Why no run may have determined it."""
 
 
 @dataclass(frozen=True, slots=True)
 class QuantityDefinition:
-    """One row of the catalogue.
-
-    Attributes
-    ----------
-    name : str
-        Key in JSON, with the SI unit.
-    symbol : Symbol
-    unit : str
-        SI, as in JSON; "1" for pure numbers.
-    description : str
-        A few words for people; English, marked for translation.
-    display : Unit
-        In which it is shown.
-    display_at : dict of Place to Unit
-        Where another unit is shown.
-    column : TableColumn or None
-        None for quantities that the campaign's table does not hold.
-    is_minor : bool
-        Listed in reports only.
-    """
+    """One row of the catalogue."""
 
     name: str
+    """Key in JSON, with the SI unit."""
     symbol: Symbol
     unit: str
+    """SI, as in JSON; "1" for pure numbers."""
     description: str
+    """A few words for people; English, marked for translation."""
     display: Unit
+    """In which it is shown."""
     display_at: dict[Place, Unit] = field(default_factory=dict)
+    """Where another unit is shown."""
     column: TableColumn | None = None
+    """None for quantities that the campaign's table does not hold."""
     is_minor: bool = False
+    """Listed in reports only."""
 
     def unit_at(self, place: Place, unit: str = "") -> Unit:
         """Unit shown at a place; a `unit` other than that of the catalogue is shown as it is.

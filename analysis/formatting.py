@@ -29,20 +29,13 @@ _PREFIXES = ("", "m", "µ", "n", "p")
 
 @dataclass(frozen=True, slots=True)
 class FormattedValue:
-    """A value and its standard uncertainty, rounded to the same decimal place.
-
-    Attributes
-    ----------
-    value : str
-    uncertainty : str
-        "" where there is none to speak of.
-    unit : str
-        "" for pure numbers.
-    """
+    """A value and its standard uncertainty, rounded to the same decimal place."""
 
     value: str
     uncertainty: str = ""
+    """"" where there is none to speak of."""
     unit: str = ""
+    """"" for pure numbers."""
 
     def __str__(self) -> str:
         """`0.10030 ± 0.00064 m/s`."""

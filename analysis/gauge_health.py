@@ -38,23 +38,15 @@ class GaugeHealthError(AnalysisError, ValueError):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GaugeSamples:
-    """Consecutive samples of one gauge.
-
-    Attributes
-    ----------
-    displacement_m : (n,) float64
-        By its calibration (m); NaN where a sample is missing or damaged.
-    overloaded : (n,) bool
-        Flagged by the device.
-    rate_hz : float
-    range_m : float, optional
-        It reads from -range_m to range_m.
-    """
+    """Consecutive samples of one gauge."""
 
     displacement_m: Floats
+    """(n,) float64: by its calibration (m); NaN where a sample is missing or damaged."""
     overloaded: NDArray[np.bool_]
+    """(n,) bool: flagged by the device."""
     rate_hz: float
     range_m: float | None = None
+    """It reads from -range_m to range_m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,53 +67,38 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GaugeHealth:
-    """Figures of a gauge at rest; all displacements in m.
-
-    Attributes
-    ----------
-    samples : int
-        Looked at, absent ones included.
-    seconds : float
-    mean_m : float
-        Where the gauge stands.
-    noise_rms_m : float
-        Standard deviation of a sample about a straight line, without the hum but with the swing.
-    drift_m_per_min, drift_standard_uncertainty : float
-        Slope of that line, and how sure it is by the scatter of ten means.
-    hum : tuple of Hum
-        At 50 and 60 Hz.
-    swing_m : float
-        Amplitude of the strongest line below 25 Hz where it is most of what is seen, else 0: the table moves.
-    step_m : float
-        Smallest difference between readings: the converter's step.
-    values : int
-        Different readings.
-    farthest_m : float
-        Largest distance of a reading from the calibration's zero.
-    range_m : float, optional
-        Of the gauge, to either side.
-    absent_share, overloaded_share, clipped_share, repeated_share : float
-        Of the samples: missing or damaged; flagged; at the very largest or smallest reading; equal to the
-        one before, where the converter is fine enough to tell.
-    spectrum : Spectrum
-    """
+    """Figures of a gauge at rest; all displacements in m."""
 
     samples: int
+    """Looked at, absent ones included."""
     duration_s: float
     mean_m: float
+    """Where the gauge stands."""
     noise_rms_m: float
+    """Standard deviation of a sample about a straight line, without the hum but with the swing."""
     drift_m_per_min: float
+    """Slope of that line."""
     drift_standard_uncertainty_m_per_min: float
+    """From the scatter of ten means."""
     hum: tuple[Hum, ...]
+    """At 50 and 60 Hz."""
     oscillation_amplitude_m: float
+    """Of the strongest line below 25 Hz if it is most of the signal (the table moves), otherwise 0."""
     resolution_m: float
+    """Smallest difference between readings: the converter's step."""
     distinct_values: int
     largest_reading_m: float
+    """Largest distance of a reading from the calibration's zero."""
     range_m: float | None
+    """Of the gauge, to either side."""
     missing_fraction: float
+    """Fraction of the samples that are missing or damaged."""
     overload_fraction: float
+    """Fraction that the device flagged."""
     clipped_fraction: float
+    """Fraction at the very largest or smallest reading."""
     repeated_fraction: float
+    """Fraction equal to the sample before, where the converter is fine enough to tell."""
     spectrum: Spectrum
 
     @property
@@ -281,20 +258,13 @@ class HealthGrade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Symptom:
-    """A fault of a gauge at rest.
-
-    Attributes
-    ----------
-    code : str
-        Stable name, for programs.
-    grade : HealthGrade
-    message, remedy : Message
-        What is wrong, and what to do.
-    """
+    """A fault of a gauge at rest."""
 
     code: str
+    """Stable name, for programs."""
     grade: HealthGrade
     message: Message
+    """What is wrong, and what to do."""
     remedy: Message
 
 

@@ -51,23 +51,6 @@ _TESTS_MAX = 1000
 class PlannedTest:
     """A planned test, with the stated uncertainties of stand and gauges.
 
-    Attributes
-    ----------
-    parameters : TwoMassParameters
-        Expected stand, contact and pullback.
-    rate_hz, duration_s, hold_s : float
-        Sampling rate, and recorded time after and before the release.
-    noise_m : float
-        Standard deviation of the readings of both gauges; at least 0.1 µm.
-    table_mass_uncertainty_kg, plate_mass_uncertainty_kg, gravity_uncertainty_m_per_s2 : float
-        Standard uncertainties.
-    clock_scale_uncertainty : float
-        Relative standard uncertainty of the device's rate.
-    table_gauge, relative_gauge : GaugeUncertainty
-        Of the calibration.
-    gauge_2_measures_plate : bool
-        Gauge 2 measures against the base instead of the table.
-
     Raises
     ------
     AnalysisError
@@ -75,17 +58,23 @@ class PlannedTest:
     """
 
     parameters: TwoMassParameters
+    """Expected stand, contact and pullback."""
     rate_hz: float = 1000.0
     duration_s: float = 10.0
+    """Recorded after the release."""
     hold_s: float = 1.0
+    """Recorded before the release."""
     noise_m: float = 2e-5
+    """Standard deviation of the readings of both gauges; at least 0.1 µm."""
     table_mass_uncertainty_kg: float = 0.0
     plate_mass_uncertainty_kg: float = 0.0
     gravity_uncertainty_m_per_s2: float = 0.0
     clock_scale_uncertainty: float = CLOCK_UNCERTAINTY
+    """Relative standard uncertainty of the device's rate."""
     table_gauge: GaugeUncertainty = _NOTHING_STATED
     relative_gauge: GaugeUncertainty = _NOTHING_STATED
     gauge_2_measures_plate: bool = False
+    """Gauge 2 measures against the base instead of the table."""
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "duration_s", "hold_s", "noise_m"):
@@ -153,34 +142,21 @@ class RangeUse:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """Expected outcome of a test.
-
-    Attributes
-    ----------
-    law : Model
-    motion : Motion
-    msk64_degree : str
-        Of the table's largest velocity.
-    rest_s : float or None
-        Time after the release at which the swing is as small as the noise; None without damping.
-    table_use, relative_use : GaugeUse
-        Gauge 2 from a centred plate.
-    tests_in_a_row : int or None
-        Tests that fit the range of gauge 2 without re-centring the plate; None for any number.
-    results : dict of Quantity
-        friction_dynamic, and friction_static of a law that has one; absent where undetermined.
-    budget : list of BudgetLine
-    cautions : list of Caution
-    """
+    """Expected outcome of a test."""
 
     law: FrictionLaw
     motion: Motion
     msk64_degree: str
+    """Of the table's largest velocity."""
     rest_s: float | None
+    """Time after the release at which the swing is as small as the noise; None without damping."""
     table_use: RangeUse
+    """Gauge 2 from a centred plate."""
     relative_use: RangeUse
     tests_without_recentring: int | None
+    """Tests that fit the range of gauge 2 without re-centring the plate; None for any number."""
     results: dict[str, Quantity]
+    """friction_dynamic, and friction_static of a law that has one; absent where undetermined."""
     budget: list[BudgetLine]
     warnings: list[ResultWarning]
 

@@ -10,22 +10,15 @@ from messages.message import Message, message
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A measured quantity.
-
-    Attributes
-    ----------
-    value, standard_uncertainty : float
-        In `unit`.
-    interval_95 : (float, float)
-        95 % coverage interval in `unit`, not necessarily symmetric.
-    unit : str
-        "1" for pure numbers.
-    """
+    """A measured quantity."""
 
     value: float
+    """In `unit`."""
     standard_uncertainty: float
     interval_95: tuple[float, float]
+    """95 % coverage interval in `unit`, not necessarily symmetric."""
     unit: str
+    """"1" for pure numbers."""
 
     @classmethod
     def normal(cls, value: float, standard_uncertainty: float, unit: str) -> "Quantity":
@@ -36,18 +29,12 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class ResultWarning:
-    """A fact that limits what a result is worth.
-
-    Attributes
-    ----------
-    code : str
-        Stable name, for programs.
-    message : Message
-        Sentence for people.
-    """
+    """A fact that limits what a result is worth."""
 
     code: str
+    """Stable name, for programs."""
     message: Message
+    """Sentence for people."""
 
 
 class SharedBy(Enum):
@@ -61,14 +48,7 @@ class SharedBy(Enum):
 
 
 class BudgetSource(Enum):
-    """Source of uncertainty. The value is its name in JSON and on screens.
-
-    Attributes
-    ----------
-    shared_by : SharedBy
-    is_rectangular : bool
-        The error has a rectangular distribution instead of a normal one.
-    """
+    """Source of uncertainty. The value is its name in JSON and on screens."""
 
     NOISE = N_("noise"), SharedBy.NONE
     TABLE_MASS = N_("table mass")
@@ -96,6 +76,7 @@ class BudgetSource(Enum):
 
     shared_by: SharedBy
     is_rectangular: bool
+    """The error has a rectangular distribution instead of a normal one."""
 
     def __new__(cls, name: str, shared_by: SharedBy = SharedBy.STAND, is_rectangular: bool = False) -> Self:
         """Make a member whose value is its name."""
@@ -117,15 +98,10 @@ class BudgetSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class OtherLaw:
-    """The chance that another friction law than the chosen one is true: a source of uncertainty of its own.
-
-    Attributes
-    ----------
-    law : str
-        Name of that law.
-    """
+    """The chance that a friction law other than the chosen one is true: a source of uncertainty."""
 
     law: str
+    """Name of that law."""
 
     @property
     def shared_by(self) -> SharedBy:
@@ -166,17 +142,10 @@ _SOURCES = {source.value: source for source in BudgetSource}
 
 @dataclass(frozen=True, slots=True)
 class BudgetLine:
-    """Contribution of one source to the standard uncertainty of one result.
-
-    Attributes
-    ----------
-    source : Source
-    contribution_to : str
-        Name of the result.
-    standard_uncertainty : float
-        In the unit of the result. NaN where the source matters but its uncertainty is not stated.
-    """
+    """Contribution of one source to the standard uncertainty of one result."""
 
     source: Source
     contribution_to: str
+    """Name of the result."""
     standard_uncertainty: float
+    """In the unit of the result. NaN where the source matters but its uncertainty is not stated."""

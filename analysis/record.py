@@ -19,26 +19,18 @@ class RecordError(AnalysisError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class GaugeUncertainty:
-    """What is known of one gauge beyond its readings; None means "not stated".
-
-    Attributes
-    ----------
-    gain_relative : float or None
-        Relative standard uncertainty of the gain (1).
-    nonlinearity_m : float
-        Largest deviation from the calibration line (m); taken as a rectangular half-width.
-    delay_s, delay_s_uncertainty : float
-        Known lateness of this channel (s, positive: its samples are older than their time stamp)
-        and its standard uncertainty (s).
-    range_m : float or None
-        Readings beyond +-range_m are clipped (m).
-    """
+    """What is known of one gauge beyond its readings; None means "not stated"."""
 
     gain_relative: float | None = None
+    """Relative standard uncertainty of the gain (1)."""
     nonlinearity_m: float = 0.0
+    """Largest deviation from the calibration line (m); taken as a rectangular half-width."""
     delay_s: float = 0.0
+    """Known lateness of this channel (s, positive: its samples are older than their time stamp) and its
+    standard uncertainty (s)."""
     delay_s_uncertainty: float = 0.0
     range_m: float | None = None
+    """Readings beyond +-range_m are clipped (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,40 +47,29 @@ class StandMasses:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One pullback test, ready for analysis.
-
-    Attributes
-    ----------
-    time_s : (n,) float64
-        Strictly increasing, not necessarily even, seconds on the device's or nominal clock.
-    table_displacement_m : (n,) float64
-        Gauge 1, table against base (m); NaN where absent.
-    relative_displacement_m : (n,) float64 or None
-        Gauge 2, plate against table (m); NaN where absent; None without a second gauge.
-    masses : StandMasses
-    pullback_m : float or None
-        Nominal pullback of the series (m), where one is known.
-    table_overload, relative_overload : (n,) bool or None
-        True where the device flagged the channel as overloaded: such samples are not fitted.
-    clock_scale, clock_scale_uncertainty : float
-        True seconds for one second of `time_s`, and its standard uncertainty.
-    table_gauge, relative_gauge : GaugeUncertainty
-    gauge_2_measures_plate : bool
-        True when gauge 2 measures the plate against the base instead of against the table.
-    """
+    """One pullback test, ready for analysis."""
 
     time_s: NDArray[np.float64]
+    """(n,) float64: strictly increasing, not necessarily even, seconds on the device's or nominal clock."""
     table_displacement_m: NDArray[np.float64]
+    """(n,) float64: gauge 1, table against base (m); NaN where absent."""
     relative_displacement_m: NDArray[np.float64] | None
+    """(n,) float64 or None: gauge 2, plate against table (m); NaN where absent; None without a second
+    gauge."""
     masses: StandMasses
     pullback_m: float | None = None
+    """Nominal pullback of the series (m), where one is known."""
     table_overload: NDArray[np.bool_] | None = None
+    """(n,) bool or None: true where the device flagged the channel as overloaded: such samples are not
+    fitted."""
     relative_overload: NDArray[np.bool_] | None = None
     clock_scale: float = 1.0
+    """True seconds for one second of `time_s`, and its standard uncertainty."""
     clock_scale_uncertainty: float = 0.0
     table_gauge: GaugeUncertainty = GaugeUncertainty()
     relative_gauge: GaugeUncertainty = GaugeUncertainty()
     gauge_2_measures_plate: bool = False
+    """True when gauge 2 measures the plate against the base instead of against the table."""
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""

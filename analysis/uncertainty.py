@@ -36,18 +36,12 @@ _CORRELATED = 3.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParameterUncertainty:
-    """Linearised distribution of the parameters about a fit.
-
-    Attributes
-    ----------
-    columns : dict of (16,) float64
-        Shift of every parameter by one standard uncertainty of a source.
-    noise : (16, 16) float64
-        Covariance from the noise of the readings.
-    """
+    """Linearised distribution of the parameters about a fit."""
 
     shifts: dict[Source, Floats]
+    """(16,) float64 by source: shift of every parameter by one standard uncertainty of the source."""
     noise_covariance: Floats
+    """(16, 16) float64: covariance from the noise of the readings."""
 
     def standard_uncertainty(self, weights: Floats) -> float:
         """Standard uncertainty of a linear form of the parameters."""

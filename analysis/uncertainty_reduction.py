@@ -39,22 +39,14 @@ class Measure(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ReductionOption:
-    """One measure, and whether it halves the standard uncertainty of f_d.
-
-    Attributes
-    ----------
-    measure : Measure
-    value : float or None
-        Rate (Hz), number of tests, pullback (m), or the allowed share of today's calibration uncertainties;
-        None where this measure does not suffice.
-    standard_uncertainty : float
-        Of f_d with that value, or the least that this measure reaches.
-    message : Message
-    """
+    """One measure, and whether it halves the standard uncertainty of f_d."""
 
     measure: Measure
     value: float | None
+    """Rate (Hz), number of tests, pullback (m), or the allowed share of today's calibration uncertainties;
+    None where this measure does not suffice."""
     standard_uncertainty: float
+    """Of f_d with that value, or the least that this measure reaches."""
     message: Message
 
 

@@ -20,22 +20,14 @@ _REACH = 0.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationCurve:
-    """A polynomial displacement(count), fitted by least squares.
-
-    Attributes
-    ----------
-    polynomial : Polynomial
-        m of count.
-    covariance : (p, p) float64
-        Of the coefficients in the window of the polynomial, for a scatter of 1 m.
-    scatter_m : float
-        Standard deviation of the points about the curve, with `freedom` degrees of freedom (m).
-    freedom : int
-    """
+    """A polynomial displacement(count), fitted by least squares."""
 
     polynomial: Polynomial
+    """m of count."""
     covariance: Floats
+    """(p, p) float64: of the coefficients in the window of the polynomial, for a scatter of 1 m."""
     scatter_m: float
+    """Standard deviation of the points about the curve, with `freedom` degrees of freedom (m)."""
     degrees_of_freedom: int
 
     @property
@@ -130,25 +122,17 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Calibratio
 
 @dataclass(frozen=True, slots=True)
 class GaugeCharacteristics:
-    """Performance characteristics of a gauge (m); None where the readings do not determine them.
-
-    Attributes
-    ----------
-    nonlinearity_m : float
-        Largest deviation from the curve at any step on the way up or down, averaged over the rounds. It
-        includes the hysteresis.
-    hysteresis_m : float, optional
-        Largest difference between the ways up and down at one step, averaged over the rounds.
-    repeatability_m : float, optional
-        Standard deviation of readings at one step in one direction from round to round, pooled.
-    zero_drift_m : float, optional
-        Difference between the last and the first reading at the lowest step.
-    """
+    """Performance characteristics of a gauge (m); None where the readings do not determine them."""
 
     nonlinearity_m: float
+    """Largest deviation from the curve at any step on the way up or down, averaged over the rounds. It
+    includes the hysteresis."""
     hysteresis_m: float | None
+    """Largest difference between the ways up and down at one step, averaged over the rounds."""
     repeatability_m: float | None
+    """Standard deviation of readings at one step in one direction from round to round, pooled."""
     zero_drift_m: float | None
+    """Difference between the last and the first reading at the lowest step."""
 
 
 def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> GaugeCharacteristics:
@@ -206,18 +190,12 @@ _NORMAL_95: Final = 1.959963984540054
 
 @dataclass(frozen=True, slots=True)
 class DialGauge:
-    """Dial gauge that measures the displacements.
-
-    Attributes
-    ----------
-    resolution_m : float
-        To which it is read (m); the reading error is rectangular, ± half of it.
-    standard_uncertainty_m : float, optional
-        Of its certificate (m): the reproducible error at each position. None: not stated.
-    """
+    """Dial gauge that measures the displacements."""
 
     resolution_m: float = 1e-5
+    """To which it is read (m); the reading error is rectangular, ± half of it."""
     standard_uncertainty_m: float | None = None
+    """Of its certificate (m): the reproducible error at each position. None: not stated."""
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -239,40 +217,25 @@ class DialGauge:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Calibration:
-    """displacement = x + polynomial[0] x^2 + polynomial[1] x^3, with x = gain (count - zero).
-
-    Attributes
-    ----------
-    gain_m_per_count, zero_count : Quantity
-        The 95 % intervals count the degrees of freedom (JCGM 100, G.4).
-    polynomial : tuple of float
-        1/m, 1/m^2; empty for a line.
-    zero_standard_uncertainty_m : float
-        Of the displacement at `zero_count`.
-    displacement_standard_uncertainty_m : float
-        Largest combined one of a displacement within the readings (m), without sources that are not
-        stated.
-    merits : Merits
-    scatter_m : float
-        Standard deviation of the steps about the curve (m).
-    readings : Readings
-    residual_m : (n,) float64
-        Dial reading minus curve (m).
-    budget : tuple of BudgetLine
-        Of `gain_m_per_count` (relative), `zero` and `displacement` (m).
-    cautions : tuple of Caution
-    """
+    """displacement = x + polynomial[0] x^2 + polynomial[1] x^3, with x = gain (count - zero)."""
 
     gain_m_per_count: Quantity
+    """The 95 % intervals count the degrees of freedom (JCGM 100, G.4)."""
     zero_count: Quantity
     polynomial: tuple[float, ...]
+    """1/m, 1/m^2; empty for a line."""
     zero_standard_uncertainty_m: float
+    """Of the displacement at `zero_count`."""
     displacement_standard_uncertainty_m: float
+    """Largest combined one of a displacement within the readings (m), without sources that are not stated."""
     characteristics: GaugeCharacteristics
     scatter_m: float
+    """Standard deviation of the steps about the curve (m)."""
     points: CalibrationPoints
     residual_m: Floats
+    """(n,) float64: dial reading minus curve (m)."""
     budget: tuple[BudgetLine, ...]
+    """Of `gain_m_per_count` (relative), `zero` and `displacement` (m)."""
     warnings: tuple[ResultWarning, ...]
 
     @property

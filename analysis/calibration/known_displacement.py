@@ -19,23 +19,15 @@ _MEASURED: Final = "measured_m"
 
 @dataclass(frozen=True, slots=True)
 class MeanReading:
-    """Mean reading of a gauge at rest.
-
-    Attributes
-    ----------
-    displacement_m : float
-        Mean (m).
-    noise_m : float
-        Standard deviation of one sample (m).
-    samples : int
-    creep_m : float
-        Mean of the second half minus that of the first (m).
-    """
+    """Mean reading of a gauge at rest."""
 
     displacement_m: float
+    """Mean (m)."""
     noise_m: float
+    """Standard deviation of one sample (m)."""
     samples: int
     creep_m: float = 0.0
+    """Mean of the second half minus that of the first (m)."""
 
     @property
     def standard_uncertainty_m(self) -> float:
@@ -45,40 +37,26 @@ class MeanReading:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationClaim:
-    """Stated uncertainties of a calibration; None is "not stated".
-
-    Attributes
-    ----------
-    gain_relative : float, optional
-        Relative standard uncertainty of the gain (1).
-    nonlinearity_m : float, optional
-        Largest deviation from the curve (m).
-    repeatability_m : float, optional
-        Standard deviation from round to round (m).
-    """
+    """Stated uncertainties of a calibration; None is "not stated"."""
 
     gain_relative: float | None = None
+    """Relative standard uncertainty of the gain (1)."""
     nonlinearity_m: float | None = None
+    """Largest deviation from the curve (m)."""
     repeatability_m: float | None = None
+    """Standard deviation from round to round (m)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceDisplacement:
-    """Known displacement, or the one that a shunt resistor simulates.
-
-    Attributes
-    ----------
-    displacement_m : float
-        With its sign (m).
-    standard_uncertainty_m : float, optional
-        Of that (m); None: not stated.
-    is_electric : bool
-        A shunt: the gauge does not move, so non-linearity and repeatability do not contribute.
-    """
+    """Known displacement, or the one that a shunt resistor simulates."""
 
     displacement_m: float
+    """With its sign (m)."""
     standard_uncertainty_m: float | None = None
+    """Of that (m); None: not stated."""
     is_electric: bool = False
+    """A shunt: the gauge does not move, so non-linearity and repeatability do not contribute."""
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.displacement_m) or self.displacement_m == 0.0:
@@ -95,23 +73,15 @@ class ReferenceDisplacement:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementCheck:
-    """Result of the check.
-
-    Attributes
-    ----------
-    expected_m, measured_m : float
-        Known displacement, and that of the gauge: its reading there minus the one at rest.
-    standard_uncertainty_m : float
-        Combined, of their difference, from stated sources (m).
-    budget : tuple of BudgetLine
-        Of `measured_m` minus `expected_m` (m); NaN where not stated.
-    cautions : tuple of Caution
-    """
+    """Result of the check."""
 
     expected_m: float
+    """Known displacement, and that of the gauge: its reading there minus the one at rest."""
     measured_m: float
     standard_uncertainty_m: float
+    """Combined, of their difference, from stated sources (m)."""
     budget: tuple[BudgetLine, ...]
+    """Of `measured_m` minus `expected_m` (m); NaN where not stated."""
     warnings: tuple[ResultWarning, ...]
 
     @property

@@ -25,24 +25,16 @@ class CalibrationError(AnalysisError, ValueError):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationPoints:
-    """Readings in the order in which they were taken; build them with `from_readings`.
-
-    Attributes
-    ----------
-    counts : (n,) float64
-        Averages of the device's counts while the table stood still.
-    dial_m : (n,) float64
-        Readings of the dial gauge (m).
-    direction : (n,) int64
-        +1 on the way up (dial readings grow), -1 on the way down.
-    round_number : (n,) int64
-        Number of the way up and down, from 1.
-    """
+    """Readings in the order in which they were taken; build them with `from_readings`."""
 
     counts: Floats
+    """(n,) float64: averages of the device's counts while the table stood still."""
     dial_m: Floats
+    """(n,) float64: readings of the dial gauge (m)."""
     direction: IntArray
+    """(n,) int64: +1 on the way up (dial readings grow), -1 on the way down."""
     round_number: IntArray
+    """(n,) int64: number of the way up and down, from 1."""
 
     def __len__(self) -> int:
         return len(self.counts)

@@ -23,29 +23,18 @@ class Excluded:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Campaign:
-    """Summary of all runs.
-
-    Attributes
-    ----------
-    rows : tuple of SeriesRow
-        In the paper's order.
-    effects : Effects
-        Dependence of f_d on mass, pullback, velocity and contact.
-    ratios : tuple of ContactRatio
-        f_s / f_d by contact.
-    msk64_degrees : tuple of str
-        Degrees that the table reached, each once, lowest first.
-    excluded : tuple of Excluded
-        In the order given.
-    cautions : tuple of Caution
-        Of the campaign; a row carries those of its series.
-    """
+    """Summary of all runs."""
 
     rows: tuple[SeriesRow, ...]
+    """In the paper's order."""
     effects: Effects
+    """Dependence of f_d on mass, pullback, velocity and contact."""
     ratios: tuple[ContactRatio, ...]
+    """f_s / f_d by contact."""
     msk64_degrees: tuple[str, ...]
+    """Degrees that the table reached, each once, lowest first."""
     excluded: tuple[Excluded, ...]
+    """In the order given."""
     warnings: tuple[ResultWarning, ...]
 
 

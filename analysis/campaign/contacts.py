@@ -20,26 +20,18 @@ _DYNAMIC, _STATIC = "friction_dynamic", "friction_static"
 
 @dataclass(frozen=True, slots=True)
 class ContactFriction:
-    """Friction of one contact over its series.
-
-    Attributes
-    ----------
-    contact : str
-        Code, "" where it is not known.
-    dynamic, static : Quantity or None
-        Mean over the series, with the scatter between series and shared errors; None where undetermined.
-    dynamic_of_series, static_of_series : dict of Quantity
-        By the labels of the series; f_s is the middle of its bounds where no law determined it.
-    static_at_least : dict of float
-        Lower bounds, by the labels of series without an upper one.
-    """
+    """Friction of one contact over its series."""
 
     contact: str
+    """Code, "" where it is not known."""
     dynamic: Quantity | None
+    """Mean over the series, with the scatter between series and shared errors; None where undetermined."""
     static: Quantity | None
     dynamic_of_series: dict[str, Quantity]
+    """By the labels of the series; f_s is the middle of its bounds where no law determined it."""
     static_of_series: dict[str, Quantity]
     static_at_least: dict[str, float]
+    """Lower bounds, by the labels of series without an upper one."""
 
 
 def friction_by_contact(rows: Sequence[SeriesRow]) -> tuple[ContactFriction, ...]:
@@ -99,26 +91,17 @@ def _static(row: SeriesRow) -> PooledQuantity | None:
 
 @dataclass(frozen=True, slots=True)
 class ContactRatio:
-    """f_s / f_d of one contact.
-
-    Attributes
-    ----------
-    contact : str
-    ratio : Quantity or None
-        Mean over the series that determined f_s, with their scatter; None without any.
-    series : int
-        Number of these series.
-    between_series : float or None
-        Standard deviation of the ratio between series; None with fewer than two.
-    bounds : (float or None, float or None)
-        Smallest lower and largest upper bound of the other series; None where there are none.
-    """
+    """f_s / f_d of one contact."""
 
     contact: str
     ratio: Quantity | None
+    """Mean over the series that determined f_s, with their scatter; None without any."""
     series: int
+    """Number of these series."""
     between_series: float | None
+    """Standard deviation of the ratio between series; None with fewer than two."""
     bounds: tuple[float | None, float | None]
+    """Smallest lower and largest upper bound of the other series; None where there are none."""
 
 
 def friction_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[ContactRatio, ...]:

@@ -57,50 +57,32 @@ class EffectSize:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One cause, tested with all others in the model.
-
-    Attributes
-    ----------
-    cause : Cause
-    found : bool or None
-        Whether f_d depends on it, at the 5 % level; None where the campaign cannot tell.
-    sentence : Message
-    statistic, p_value : float or None
-        Of the F test.
-    degrees_of_freedom : (int, int) or None
-    sizes : tuple of EffectSize
-        The sentence names the first.
-    size_seen : float or None
-        Relative change of f_d, for the step of the first size, that is found with a chance of 80 %.
-    """
+    """One cause, tested with all others in the model."""
 
     cause: Cause
     found: bool | None
+    """Whether f_d depends on it, at the 5 % level; None where the campaign cannot tell."""
     sentence: Message
     statistic: float | None = None
+    """Of the F test."""
     p_value: float | None = None
     degrees_of_freedom: tuple[int, int] | None = None
     sizes: tuple[EffectSize, ...] = ()
+    """The sentence names the first."""
     size_seen: float | None = None
+    """Relative change of f_d, for the step of the first size, that is found with a chance of 80 %."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """All causes in the order of `Cause`.
-
-    Attributes
-    ----------
-    effects : tuple of Effect
-    scatter : float or None
-        Relative standard deviation of the series about the model beyond their uncertainties; None where
-        undetermined.
-    series : int
-        Number of rows used.
-    """
+    """All causes in the order of `Cause`."""
 
     effects: tuple[Effect, ...]
     scatter: float | None
+    """Relative standard deviation of the series about the model beyond their uncertainties; None where
+    undetermined."""
     series: int
+    """Number of rows used."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,43 +18,30 @@ _FARTHEST = 1e6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Observations:
-    """Values of the model, with the covariance of their errors.
-
-    Attributes
-    ----------
-    values : (n,) float64
-    variances : (n,) float64
-        Of the independent errors, from repeats.
-    shared : (n, n) float64
-        Covariance of the shared errors.
-    degrees_of_freedom : int
-        Of `variances`; 0 where they come from single runs.
-    """
+    """Values of the model, with the covariance of their errors."""
 
     values: Floats
+    """(n,) float64."""
     variances: Floats
+    """(n,) float64: of the independent errors, from repeats."""
     shared: Floats
+    """(n, n) float64: covariance of the shared errors."""
     degrees_of_freedom: int
+    """Of `variances`; 0 where they come from single runs."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearFit:
-    """A model fitted by generalised least squares.
-
-    Attributes
-    ----------
-    coefficients : (p,) float64
-    covariance : (p, p) float64
-    degrees_of_freedom : int
-        Of the variance used in tests.
-    beyond : float
-        Standard deviation of the values about the model beyond their uncertainties.
-    """
+    """A model fitted by generalised least squares."""
 
     coefficients: Floats
+    """(p,) float64."""
     covariance: Floats
+    """(p, p) float64."""
     degrees_of_freedom: int
+    """Of the variance used in tests."""
     excess_deviation: float
+    """Standard deviation of the values about the model beyond their uncertainties."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +68,6 @@ def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | 
     ----------
     design : (n, p) float64
         Of full rank.
-    measured : Measured
 
     Returns
     -------
@@ -103,7 +89,6 @@ def f_test(fitted: LinearFit, combinations: Floats, patterns: Floats) -> FTest:
 
     Parameters
     ----------
-    fitted : Fitted
     combinations : (k, p) float64
         Of rank k.
     patterns : (m, k) float64
@@ -179,29 +164,20 @@ _VAGUE: Final = 1e100
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DesignMatrix:
-    """Design matrix of ln f_d: combination of contact and pullback, plate mass, velocity.
-
-    Attributes
-    ----------
-    cells : tuple of (str, float)
-        Contact and pullback (m) of each combination.
-    matrix : (n, p) float64
-        One column for each combination, then plate mass (kg) and velocity (m/s) about their means, where
-        they are not confounded.
-    mass, velocity : int or None
-        Indices of their columns; None where confounded.
-    velocity_follows : bool
-        The velocity varies only with contact, pullback and plate mass.
-    velocities : (float, float)
-        Least and largest (m/s).
-    """
+    """Design matrix of ln f_d: combination of contact and pullback, plate mass, velocity."""
 
     cells: tuple[tuple[str, float], ...]
+    """Contact and pullback (m) of each combination."""
     matrix: Floats
+    """(n, p) float64: one column for each combination, then plate mass (kg) and velocity (m/s) about their
+    means, where they are not confounded."""
     mass: int | None
+    """Indices of their columns; None where confounded."""
     velocity: int | None
     velocity_follows: bool
+    """The velocity varies only with contact, pullback and plate mass."""
     velocities: tuple[float, float]
+    """Least and largest (m/s)."""
 
     @property
     def contacts(self) -> tuple[str, ...]:

@@ -21,17 +21,11 @@ _LARGEST = 1e100
 
 @dataclass(frozen=True, slots=True)
 class SharedError:
-    """An error that several values have in common.
-
-    Attributes
-    ----------
-    source : Source
-    shared_by : str
-        Identity of the calibration, stand or series.
-    """
+    """An error that several values have in common."""
 
     source: Source
     shared_by: str
+    """Identity of the calibration, stand or series."""
 
     def __str__(self) -> str:
         """Name in JSON: `gauge 1 gain of A`."""
@@ -40,26 +34,16 @@ class SharedError:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunValue:
-    """A quantity of one run, with its uncertainty split by what repeats average.
-
-    Attributes
-    ----------
-    run : str
-    value : float
-    repeatable : float
-        Standard uncertainty of this run alone; above 0.
-    common : dict of float
-        Standard uncertainties of errors shared with other runs.
-    reach : (float, float)
-        Of the 95 % interval, below and above the value.
-    unit : str
-    """
+    """A quantity of one run, with its uncertainty split by what repeats average."""
 
     run: str
     value: float
     repeatable: float
+    """Standard uncertainty of this run alone; above 0."""
     common: dict[SharedError, float]
+    """Standard uncertainties of errors shared with other runs."""
     half_widths: tuple[float, float]
+    """Of the 95 % interval, below and above the value."""
     unit: str
 
 
@@ -138,40 +122,27 @@ def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, 
 
 @dataclass(frozen=True, slots=True)
 class PooledQuantity:
-    """One quantity of one series, pooled over its runs.
-
-    Attributes
-    ----------
-    quantity : Quantity
-        Weighted mean; its uncertainty includes errors that repeats share.
-    runs : int
-        Number of runs that determined it.
-    repeatable : float
-        Part of the standard uncertainty that repeats reduce.
-    common : dict of float
-        Other parts, by shared error.
-    between_runs : float or None
-        Standard deviation between runs beyond the noise of the readings; None without repeats.
-    scatter : float or None
-        Standard deviation of the runs' values; None without repeats.
-    birge_ratio : float or None
-        Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that
-        each run states for itself; None without repeats.
-    degrees_of_freedom : float
-        Of the scatter used for this series: its own plus those lent by its contact; 0 without repeats.
-    outliers : tuple of str
-        Runs too far from the others; they are not left out.
-    """
+    """One quantity of one series, pooled over its runs."""
 
     quantity: Quantity
+    """Weighted mean; its uncertainty includes errors that repeats share."""
     runs: int
+    """Number of runs that determined it."""
     repeatable: float
+    """Part of the standard uncertainty that repeats reduce."""
     common: dict[SharedError, float]
+    """Other parts, by shared error."""
     between_runs: float | None
+    """Standard deviation between runs beyond the noise of the readings; None without repeats."""
     scatter: float | None
+    """Standard deviation of the runs' values; None without repeats."""
     birge_ratio: float | None
+    """Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that each
+    run states for itself; None without repeats."""
     degrees_of_freedom: float
+    """Of the scatter used for this series: its own plus those lent by its contact; 0 without repeats."""
     outliers: tuple[str, ...] = ()
+    """Runs too far from the others; they are not left out."""
 
 
 def pool(
@@ -186,8 +157,6 @@ def pool(
 
     Parameters
     ----------
-    series : sequence of sequence of Reading
-    proportional : bool
     kinds : sequence of str, optional
         Kind of each series; by default all are of one kind.
 

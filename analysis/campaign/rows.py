@@ -23,25 +23,15 @@ _CHANCE = 0.01
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SeriesRow:
-    """A row of the table.
-
-    Attributes
-    ----------
-    label : str
-        Code of the series, with the difference where it has several rows; unique in a campaign.
-    series : SeriesKey
-    quantities : dict of Pooled
-        By name, for every column of the table and both bounds of f_s; absent where no run determined it.
-    msk64_degree : str
-        Of the pooled v_max; two with a slash where its interval crosses a bound; "" without v_max.
-    runs : tuple of str
-    cautions : tuple of Caution
-    """
+    """A row of the table."""
 
     label: str
+    """Code of the series, with the difference where it has several rows; unique in a campaign."""
     series: SeriesKey
     quantities: dict[str, PooledQuantity]
+    """By name, for every column of the table and both bounds of f_s; absent where no run determined it."""
     msk64_degree: str
+    """Of the pooled v_max; two with a slash where its interval crosses a bound; "" without v_max."""
     runs: tuple[str, ...]
     warnings: tuple[ResultWarning, ...] = ()
 

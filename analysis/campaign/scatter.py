@@ -18,22 +18,15 @@ _PRECISION = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RepeatedValues:
-    """Values of one quantity from several series.
-
-    Attributes
-    ----------
-    values, variances : (n,) float64
-        Variances are those of each run by itself.
-    scales : (n,) float64
-        Size of a unit deviation between runs, for each value.
-    series : (n,) int
-        Index of the series of each value, from 0 without gaps.
-    """
+    """Values of one quantity from several series."""
 
     values: Floats
+    """(n,) float64: variances are those of each run by itself."""
     variances: Floats
     scales: Floats
+    """(n,) float64: size of a unit deviation between runs, for each value."""
     series: NDArray[np.intp]
+    """(n,) int: index of the series of each value, from 0 without gaps."""
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -90,21 +83,14 @@ _LOG_HALVES = (-15.0, 20.0)
 
 @dataclass(frozen=True, slots=True)
 class SeriesScatter:
-    """Scatter of the runs of one series.
-
-    Attributes
-    ----------
-    between : float
-        Standard deviation between runs, in scales, from all series of the kind.
-    factor : float
-        Multiplies the variances with `between` for this series.
-    degrees_of_freedom : float
-        0 where there are no repeats.
-    """
+    """Scatter of the runs of one series."""
 
     between: float
+    """Standard deviation between runs, in scales, from all series of the kind."""
     factor: float
+    """Multiplies the variances with `between` for this series."""
     degrees_of_freedom: float
+    """0 where there are no repeats."""
 
 
 def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter]]:

@@ -10,24 +10,16 @@ from messages.message import message
 
 @dataclass(frozen=True, slots=True)
 class SeriesKey:
-    """Properties that all repeats of a series have in common.
-
-    Attributes
-    ----------
-    code : str
-        As in the paper, for example "1FFM0"; "" for runs without a series.
-    contact : str
-        Code of the pair of surfaces, for example "FF", or any other name; "" where unknown.
-    pullback_m : float or None
-        Nominal; None where unknown.
-    plate_mass_kg, table_mass_kg : float
-        m2 with its added mass, and m1.
-    """
+    """Properties that all repeats of a series have in common."""
 
     code: str
+    """As in the paper, for example "1FFM0"; "" for runs without a series."""
     contact: str
+    """Code of the pair of surfaces, for example "FF", or any other name; "" where unknown."""
     pullback_m: float | None
+    """Nominal; None where unknown."""
     plate_mass_kg: float
+    """m2 with its added mass, and m1."""
     table_mass_kg: float
 
     @property
@@ -54,40 +46,25 @@ class SeriesKey:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunResult:
-    """Result of one run.
-
-    Attributes
-    ----------
-    name : str
-        Path or label of the run.
-    series : SeriesKey
-    results : dict of Quantity
-        By name; absent where undetermined. `plate_mass_kg` may be among them.
-    budget : tuple of BudgetLine
-        Lines of all results.
-    calibration : str
-        Runs with the same calibrations share their errors.
-    stand : str
-        Runs on the same stand share the errors of masses, gravity and clock.
-    adequate : bool or None
-        The friction law explains the record; None where no law was fitted.
-    msk64_degree : str
-        "" where unknown.
-    excluded : str
-        Why the run does not count; "" when it does.
-    cautions : tuple of Caution
-        Of the analysis of this run.
-    """
+    """Result of one run."""
 
     name: str
+    """Path or label of the run."""
     series: SeriesKey
     results: dict[str, Quantity]
+    """By name; absent where undetermined. `plate_mass_kg` may be among them."""
     budget: tuple[BudgetLine, ...] = ()
+    """Lines of all results."""
     calibration_id: str = ""
+    """Runs with the same calibrations share their errors."""
     stand_id: str = ""
+    """Runs on the same stand share the errors of masses, gravity and clock."""
     adequate: bool | None = None
+    """The friction law explains the record; None where no law was fitted."""
     msk64_degree: str = ""
+    """"" where unknown."""
     excluded: str = ""
+    """Why the run does not count; "" when it does."""
     warnings: tuple[ResultWarning, ...] = ()
 
 

@@ -26,26 +26,18 @@ _FAR = 1e12
 
 
 class Parameters(NamedTuple):
-    """What is fitted: ``offset + d^r/dt^r free_decay``, r = 0, 1, 2 for displacement, velocity, acceleration.
-
-    Attributes
-    ----------
-    turning_s, turning : float
-        Time (s) and displacement of the last turning point before the fitted stretch.
-    omega_rad_per_s, damping_n_per_s : float
-        Damped frequency and viscous damping constant.
-    coulomb : float
-        x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left.
-    offset : float
-        Zero of the readings, in their own unit.
-    """
+    """Parameters of ``offset + d^r/dt^r free_decay``, r = 0, 1, 2 (displacement, velocity, acceleration)."""
 
     turning_s: float
+    """Time (s) and displacement of the last turning point before the fitted stretch."""
     turning: float
     omega_rad_per_s: float
+    """Damped frequency and viscous damping constant."""
     damping_n_per_s: float
     coulomb: float
+    """x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left."""
     offset: float
+    """Zero of the readings, in their own unit."""
 
     @property
     def period_s(self) -> float:
@@ -76,29 +68,19 @@ class Parameters(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class OneMassFit:
-    """A fitted decay.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    covariance : (6, 6) float64
-        Type A, for white residuals; zero in rows of what was held.
-    channel : Channel
-        Readings that were fitted.
-    residual : (n,) float64
-        Reading minus curve, in the unit of the readings.
-    cost : float
-        Sum of squared residuals.
-    order : int
-        Derivative of the displacement that the readings are.
-    """
+    """A fitted decay."""
 
     parameters: Parameters
     covariance: Floats
+    """(6, 6) float64: type A, for white residuals; zero in rows of what was held."""
     channel: Channel
+    """Readings that were fitted."""
     residual: Floats
+    """(n,) float64: reading minus curve, in the unit of the readings."""
     cost: float
+    """Sum of squared residuals."""
     order: int
+    """Derivative of the displacement that the readings are."""
 
     @property
     def rms(self) -> float:

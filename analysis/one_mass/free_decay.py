@@ -39,36 +39,24 @@ _ROUNDED_LINE = 1.0 / 3.0
 
 @dataclass(frozen=True, slots=True)
 class SpectralLine:
-    """A line that stands out of the spectrum of residuals.
-
-    Attributes
-    ----------
-    frequency_hz, amplitude : float
-        By the median sampling interval; as a steady sine, in the unit of the residuals.
-    """
+    """A line that stands out of the spectrum of residuals."""
 
     frequency_hz: float
+    """By the median sampling interval; as a steady sine, in the unit of the residuals."""
     amplitude: float
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualAssessment:
-    """What was found in residuals.
-
-    Attributes
-    ----------
-    adequate : bool
-        They are noise, or the rounding of the converter.
-    rms, noise : float
-        Their root mean square, and that of their part which neighbours do not share.
-    line : Line or None
-        The strongest line, if noise does not explain it.
-    """
+    """What was found in residuals."""
 
     adequate: bool
+    """They are noise, or the rounding of the converter."""
     rms: float
+    """Their root mean square, and that of their part which neighbours do not share."""
     noise: float
     line: SpectralLine | None
+    """The strongest line, if noise does not explain it."""
 
 
 def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:
@@ -163,27 +151,17 @@ _GAP_PERIODS_MAX = 1000.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FreeDecayFit:
-    """The fitted decay and what is to be said about it.
-
-    Attributes
-    ----------
-    fit : OneMassFit
-        With viscous and Coulomb damping.
-    viscous : OneMassFit
-        The same readings without Coulomb damping.
-    verdict : ResidualVerdict
-    adequate : bool
-        The residuals are noise, and nothing moves after the motion should have ended.
-    unit : str
-        Of the readings, and of what is left of them.
-    warnings : list of ResultWarning
-    """
+    """The fitted decay and what is to be said about it."""
 
     fit: OneMassFit
+    """With viscous and Coulomb damping."""
     viscous: OneMassFit
+    """The same readings without Coulomb damping."""
     verdict: ResidualAssessment
     adequate: bool
+    """The residuals are noise, and nothing moves after the motion should have ended."""
     unit: str
+    """Of the readings, and of what is left of them."""
     warnings: list[ResultWarning]
 
 

@@ -20,44 +20,29 @@ _CLASSICAL_SHARE = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoints:
-    """Extremes of a decay that were seen.
-
-    Attributes
-    ----------
-    number : (k,) int64
-        Half cycles since the first; increasing, not necessarily without gaps.
-    time_s, value : (k,) float64
-        Time (s) and reading there.
-    side : (k,) float64
-        +1 for a maximum, -1 for a minimum.
-    noise_gain : (k,) float64
-        Standard uncertainty of `value` per unit of noise in a reading.
-    """
+    """Extremes of a decay that were seen."""
 
     number: "np.ndarray[tuple[int], np.dtype[np.int64]]"
+    """(k,) int64: half cycles since the first; increasing, not necessarily without gaps."""
     time_s: Floats
+    """(k,) float64: time (s) and reading there."""
     value: Floats
     side: Floats
+    """(k,) float64: +1 for a maximum, -1 for a minimum."""
     noise_gain: Floats
+    """(k,) float64: standard uncertainty of `value` per unit of noise in a reading."""
 
 
 @dataclass(frozen=True, slots=True)
 class HalfCycleRegression:
-    """Line through neighbouring turning points, ``|X_(i+1)| = b |X_i| - loss``.
-
-    Attributes
-    ----------
-    ratio : float
-        b = exp(-n T / 2) (1).
-    loss : float
-        (1 + b) x_k, in the unit of the readings.
-    offset : float
-        Middle of the rest band.
-    """
+    """Line through neighbouring turning points, ``|X_(i+1)| = b |X_i| - loss``."""
 
     ratio: float
+    """b = exp(-n T / 2) (1)."""
     loss: float
+    """(1 + b) x_k, in the unit of the readings."""
     offset: float
+    """Middle of the rest band."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +56,7 @@ class Crossings:
 def find_crossings(channel: Channel) -> Crossings:
     """Find the passages through the middle of the swing, with a dead band against noise.
 
-    Raises
-    ------
-    RecordError
-        When there are fewer than three.
+    Raises RecordError when there are fewer than three.
     """
     smooth = median_of_three(channel)
     away = smooth.value_m - _middle(smooth.value_m)

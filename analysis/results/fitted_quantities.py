@@ -169,45 +169,30 @@ _STEPS = 8
 
 @dataclass(frozen=True, slots=True)
 class ProfileInterval:
-    """Distribution of a parameter about which chi-square is no parabola.
-
-    Attributes
-    ----------
-    below, above : float
-        From the fitted value to the ends of the shortest 95 % interval.
-    deviation : float
-        Standard deviation.
-    """
+    """Distribution of a parameter about which chi-square is no parabola."""
 
     below: float
+    """From the fitted value to the ends of the shortest 95 % interval."""
     above: float
     deviation: float
+    """Standard deviation."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Chi-square along one parameter, the others refined; those with prior knowledge stay as fitted.
-
-    Attributes
-    ----------
-    problem : Problem
-    parameters : (16,) float64
-        The fit.
-    follow : (16,) float64
-        How the others follow a step of one in the parameter, by a parabola.
-    deviation : float
-        Standard uncertainty of the parameter by the noise, the known parameters being as fitted.
-    white : float
-        Its variance over that by white noise as stated.
-    """
+    """Chi-square along one parameter, the others refined; those with prior knowledge stay as fitted."""
 
     problem: FitProblem
     law: FrictionLaw
     parameter: int
     parameters: Floats
+    """(16,) float64: the fit."""
     follow: Floats
+    """(16,) float64: how the others follow a step of one in the parameter, by a parabola."""
     deviation: float
+    """Standard uncertainty of the parameter by the noise, the known parameters being as fitted."""
     white: float
+    """Its variance over that by white noise as stated."""
 
     @classmethod
     def from_fit(cls, problem: FitProblem, fit: Fit, parameter: int, white: float) -> Self:

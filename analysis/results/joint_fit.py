@@ -31,26 +31,15 @@ _GRAVITY_POWERS = {Parameter.FRICTION_DYNAMIC: -1.0, Parameter.FRICTION_STATIC: 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointFit:
-    """The chosen law fitted to both gauges, and what results are computed from.
-
-    Attributes
-    ----------
-    record : Record
-    decay : FreeDecay
-    problem : FitProblem
-    chosen : Fit
-        The likeliest law (lowest BIC) among `candidates`.
-    candidates : list of Fit
-        Fits of the laws whose parameters the record identifies.
-    uncertainty : ParameterUncertainty
-    selection : ModelSelection
-    """
+    """The chosen law fitted to both gauges, and what results are computed from."""
 
     record: Record
     decay: FreeDecay
     problem: FitProblem
     chosen: Fit
+    """The likeliest law (lowest BIC) among `candidates`."""
     candidates: list[Fit]
+    """Fits of the laws whose parameters the record identifies."""
     uncertainty: ParameterUncertainty
     selection: ModelSelection
 

@@ -30,22 +30,14 @@ NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))
 
 
 class FigureFile(msgspec.Struct, frozen=True):
-    """A written figure.
-
-    Attributes
-    ----------
-    figure : str
-        Number in the paper.
-    file : str
-    caption : str
-    run : str
-        Path of its run; "" for a figure of all runs.
-    """
+    """A written figure."""
 
     figure: str
+    """Number in the paper."""
     file: str
     caption: str
     run: str = ""
+    """Path of its run; "" for a figure of all runs."""
 
 
 class FigureFolder(msgspec.Struct, frozen=True):
@@ -108,12 +100,8 @@ def write_figures(
 
     Parameters
     ----------
-    folder : FigureFolder
     numbers : sequence of str
         Of the figures wanted.
-    chosen : sequence of Path
-    campaign : Campaign
-    stands : iterable of Stand
     progress : callable (float, str)
         Called with the share done and the name of the run that is drawn.
 

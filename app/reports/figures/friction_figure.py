@@ -35,7 +35,6 @@ def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str
 
     Parameters
     ----------
-    contacts
     names
         What each contact's code stands for.
     """

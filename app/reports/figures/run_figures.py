@@ -28,27 +28,18 @@ _JUST_BEFORE_S = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunFigureData:
-    """Curves of a run. Displacements are from rest, and from the position of the plate before the pull.
-
-    Attributes
-    ----------
-    time_s : (n,) float64
-        Times of the readings since the release.
-    table_m : (n,) float64
-    relative_m : (n,) float64 or None
-        Plate against table; None without a second gauge.
-    motion : MotionSamples or None
-        Of the fitted law; None without one.
-    slip_end_s : float or None
-        Seconds since the release.
-    results : dict of Quantity
-    """
+    """Curves of a run. Displacements are from rest, and from the position of the plate before the pull."""
 
     time_s: Floats
+    """(n,) float64: times of the readings since the release."""
     table_m: Floats
+    """(n,) float64."""
     relative_m: Floats | None
+    """(n,) float64 or None: plate against table; None without a second gauge."""
     motion: MotionSamples | None
+    """Of the fitted law; None without one."""
     slip_end_s: float | None
+    """Seconds since the release."""
     results: dict[str, Quantity]
 
     @classmethod
@@ -159,23 +150,15 @@ Draw = Callable[[Axes, RunFigureData], None]
 
 @dataclass(frozen=True, slots=True)
 class RunFigure:
-    """One of the paper's figures.
-
-    Attributes
-    ----------
-    number : str
-        In the paper: "3a".
-    caption : str
-    draw : callable
-        Draws it.
-    simulated : bool
-        It shows the fitted motion, and needs one.
-    """
+    """One of the paper's figures."""
 
     number: str
+    """In the paper: "3a"."""
     caption: str
     draw: Draw
+    """Draws it."""
     simulated: bool = True
+    """It shows the fitted motion, and needs one."""
 
     def render(self, run: RunFigureData, title: str = "") -> Figure | None:
         """Draw the figure within `print_style`; None where the run has nothing to show in it."""

@@ -22,23 +22,14 @@ class PublishedRowComparison:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TableContent:
-    """Content of a table.
-
-    Attributes
-    ----------
-    campaign : Campaign
-    cautions : tuple of Caution
-        Beside those of the campaign and its rows.
-    failures : tuple of (str, str)
-        Runs without a result, with the reason.
-    published : dict of Printed or None
-        By the labels of the rows; None where not asked for.
-    """
+    """Content of a table."""
 
     campaign: Campaign
     warnings: tuple[ResultWarning, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
+    """Runs without a result, with the reason."""
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
+    """By the labels of the rows; None where not asked for."""
 
     def all_warnings(self) -> list[ResultWarning]:
         """Warnings of the runs, of the campaign, and of its rows."""

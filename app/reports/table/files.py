@@ -55,9 +55,7 @@ def write_text(text: str, path: Path, *, replace: bool = False) -> None:
 def write_workbook(content: TableContent, path: Path, *, replace: bool = False) -> None:
     """Write a workbook: table, numbers, repeats, notes, and the published table if asked for.
 
-    Raises
-    ------
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError.
     """
     said = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {

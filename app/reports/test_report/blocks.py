@@ -94,22 +94,13 @@ class Section(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """Content of a report.
-
-    Attributes
-    ----------
-    title, subtitle : str
-    laboratory : str
-        "" where unknown.
-    date : str
-        ISO date of the report, the only difference between two reports of the same runs.
-    software : str
-    sections : list of Section
-    """
+    """Content of a report."""
 
     title: str
     subtitle: str
     laboratory: str
+    """"" where unknown."""
     date: str
+    """ISO date of the report, the only difference between two reports of the same runs."""
     software: str
     sections: list[Section]

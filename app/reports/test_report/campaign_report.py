@@ -52,25 +52,16 @@ _ALWAYS_SAID: Final = ("Runs that do not count", "Runs without a result")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CampaignReportInput:
-    """What a report of a campaign is made of.
-
-    Attributes
-    ----------
-    content : TableContent
-    gathered : Gathered
-    prints : sequence of Fingerprint
-        Of every run that was read, in the order of `gathered.runs`.
-    shown : sequence of Analysis
-        Runs whose motion is drawn.
-    folder : str
-        That all runs lie in; paths are told from there.
-    """
+    """What a report of a campaign is made of."""
 
     content: TableContent
     gathered: CollectedRuns
     prints: Sequence[Fingerprint]
+    """Of every run that was read, in the order of `gathered.runs`."""
     shown: Sequence[Analysis]
+    """Runs whose motion is drawn."""
     folder: str
+    """That all runs lie in; paths are told from there."""
 
 
 def campaign_sections(material: CampaignReportInput) -> list[Section]:
