@@ -35,7 +35,7 @@ def recover(
                 one, lambda journal, share: update(share, journal.name), original_folder=folder
             )
     if as_json:
-        out.print_json(msgspec.to_builtins(found))
+        out.print_json([msgspec.to_builtins(one) | {"message": str(one.message)} for one in found])
     elif not found:
         out.print_line(f"No journals in {folder}: nothing was left unfinished there")
     for recovery in found:
@@ -55,7 +55,7 @@ def recovery_text(recovery: Recovery) -> str:
         case RecoveryState.EMPTY:
             return f"{recovery.journal}: no byte had come yet; removed"
         case RecoveryState.BEING_RECORDED:
-            return recovery.message
+            return str(recovery.message)
     aside = f"; what was there before is now {recovery.kept}" if recovery.kept else ""
     return f"{recovery.run}: {recovery.samples} samples recovered, ended: {recovery.ended}{aside}"
 

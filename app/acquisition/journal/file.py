@@ -1,6 +1,7 @@
-"""The file of a journal, which goes on in another place when its own no longer takes anything."""
+"""The file of a journal, which moves to another folder when its own takes no more."""
 
 import contextlib
+import logging
 import os
 import queue
 import threading
@@ -12,9 +13,11 @@ from app.runs.disk import has_free_space, sync_folder
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 
+_log = logging.getLogger(__name__)
+
 _PIECE_BYTES = 1 << 20
 _ROOM_BYTES = 32 << 20
-"""A refuge with less is none: it would be full just as soon."""
+"""Least free space of a fallback folder beyond what is copied: with less it would be full as soon."""
 
 
 class Syncer:
@@ -45,19 +48,15 @@ class Syncer:
         self._is_idle.wait()
 
     def take_failure(self) -> OSError | None:
-        """How a sync has failed since this was asked the last time; None if none has."""
+        """Error of a sync since the last call; None if none has failed."""
         failure, self._failure = self._failure, None
         return failure
 
-    def stop(self) -> None:
-        """End the thread, when the last sync is done."""
-        self.request_stop()
-        if self._thread is not None:
-            self._thread.join()
-
-    def request_stop(self) -> None:
-        """As `stop`, without waiting; how the last sync goes is of no interest any more."""
+    def stop(self, *, wait: bool = True) -> None:
+        """End the thread when the last sync is done; wait for that."""
         self._handles.put(None)
+        if self._thread is not None and wait:
+            self._thread.join()
 
     def _work(self) -> None:
         while (handle := self._handles.get()) is not None:
@@ -73,20 +72,19 @@ class Syncer:
 class JournalFile:
     """Whole records, one after another; make it with `create_journal_file`.
 
-    When the disk is full, the network share gone, or the folder no longer to be written to, all that was
-    written moves to the first of the refuges that takes it, and the rest is appended there. What can no
-    longer be read stays where it is; the new file then begins with the first record, which says of which
-    run it is.
+    When the disk is full, the network share gone, or the folder read-only, all that was written moves to the
+    first of the fallback folders that takes it, and the rest is appended there. What can no longer be read
+    stays where it is; the new file then begins with the first record, which identifies the run.
 
     Parameters
     ----------
     file
         Unbuffered, at its end; written by nobody else.
     first : bytes
-        What stands in it: the magic and the first record.
+        Its content: the magic and the first record.
     lock : FileLock
         Held for the file.
-    refuges : sequence of Path
+    fallback_folders : sequence of Path
         Folders to move to; they need not exist.
     """
 
@@ -96,45 +94,37 @@ class JournalFile:
         self.path = path
         """Where it is now."""
         self.move_cause: OSError | None = None
-        """What drove it from its place."""
+        """Error for which it moved."""
         self._file = file
         self._first = first
-        self._size = len(first)
+        self.size = len(first)
+        """Bytes of all whole records."""
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._syncer = Syncer()
 
-    @property
-    def size(self) -> int:
-        """Bytes of all whole records."""
-        return self._size
-
     def append(self, record: bytes) -> None:
-        """Hand a record to the system. Raises OSError where no place takes it."""
-        while not self._has_taken(record):
-            pass
-        self._size += len(record)
-
-    def _has_taken(self, record: bytes) -> bool:
-        """Write a record; False where that failed, and another place is to be tried."""
-        try:
-            _write_all(self._file, record)
-        except OSError as error:
-            self._move(error)
-            return False
-        return True
+        """Write a record. Raises OSError where no folder takes it."""
+        while True:
+            try:
+                _write_all(self._file, record)
+            except OSError as error:
+                self._move(error)
+            else:
+                self.size += len(record)
+                return
 
     def begin_sync(self) -> None:
-        """Bring to disk what is there, in a thread: what comes meanwhile need not wait for a slow disk.
+        """Begin a sync in a thread, so that new records need not wait for a slow disk.
 
-        Does nothing while the last one is not done. Raises OSError where no place takes it.
+        Does nothing while the last one is not done. Raises OSError where no folder takes the records.
         """
         if self._syncer.is_idle:
             self._check_sync()
             self._syncer.begin(self._file.fileno())
 
     def sync(self) -> None:
-        """Bring all to disk, and wait for it. Raises OSError where no place takes it."""
+        """Bring everything to disk, and wait for it. Raises OSError where no folder takes it."""
         self._syncer.wait()
         self._check_sync()
         try:
@@ -158,18 +148,20 @@ class JournalFile:
             self.path.unlink()
 
     def release(self) -> None:
-        """Let go of it: if it is still there, a recovery may take it."""
+        """Release the lock: if the file is still there, a recovery may take it."""
         with contextlib.suppress(OSError):
             self._lock.release()
 
     def _move(self, error: OSError) -> None:
         while self._fallback_folders:
             folder = self._fallback_folders.pop(0)
-            if has_free_space(folder, self._size + _ROOM_BYTES):
+            if has_free_space(folder, self.size + _ROOM_BYTES):
                 with contextlib.suppress(OSError, LockHeldError):
                     self._move_to(folder / self.path.name)
                     self.move_cause = self.move_cause or error
+                    _log.warning("journal moved to %s: %s", self.path, error)
                     return
+        _log.error("%s cannot be written: %s", self.path, error)
         raise error
 
     def _move_to(self, path: Path) -> None:
@@ -188,12 +180,12 @@ class JournalFile:
             lock.release()
             raise
         self._leave_old(copied)
-        self._syncer.request_stop()  # a sync of the old file that fails now says nothing of the new one
+        self._syncer.stop(wait=False)  # a sync of the old file that fails now does not concern the new one
         self._syncer = Syncer()
         self.path, self._file, self._lock = path, file, lock
 
     def _copy_to(self, file: IO[bytes]) -> bool:
-        """Bring what there is to another file; False where only the first record could be had."""
+        """Copy all records to another file; False where only the first one could be had."""
         is_readable = True
         try:
             for piece in self._pieces():
@@ -203,7 +195,7 @@ class JournalFile:
             file.seek(0)
             file.truncate()
             _write_all(file, self._first)
-            self._size = len(self._first)
+            self.size = len(self._first)
         os.fsync(file.fileno())
         with contextlib.suppress(OSError):
             sync_folder(self.path.parent)
@@ -211,7 +203,7 @@ class JournalFile:
 
     def _pieces(self) -> Iterator[bytes]:
         """All whole records, some at a time. Raises _UnreadableError."""
-        left = self._size
+        left = self.size
         try:
             with self.path.open("rb") as old:
                 while left:
@@ -224,7 +216,7 @@ class JournalFile:
             raise _UnreadableError from None
 
     def _leave_old(self, copied: bool) -> None:
-        """Free the room that the old file takes, which its run file may need, if nothing in it is missed."""
+        """Remove the old file if everything was copied: its run file may need the space."""
         with contextlib.suppress(OSError):
             self._file.close()
         if copied:
@@ -239,16 +231,9 @@ class _UnreadableError(Exception):
 def create_journal_file(
     path: Path, first_record: bytes, fallback_folders: Sequence[Path] = ()
 ) -> JournalFile:
-    """Create a journal with its first record; its folder is made if there is none.
+    """Create a journal with its first record, in one write; its folder is made if there is none.
 
-    Both are written in one piece, so that a kill hardly ever leaves one without the other.
-
-    Raises
-    ------
-    OSError
-        FileExistsError among them: nothing is overwritten.
-    LockHeldError
-        Another program writes it.
+    Raises OSError (FileExistsError: nothing is overwritten), or LockHeldError if another program writes it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     lock, first = recording_lock(path).acquire(), MAGIC + first_record

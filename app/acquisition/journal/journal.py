@@ -1,12 +1,13 @@
 """The journal of one run: every byte that came, with its time, on disk within a tenth of a second.
 
-A thread of its own writes and syncs, so that a slow disk delays nobody. Each record is handed to the
-system at once: what a killed engine has appended is in the file, only a power cut can take what was not
-synced. From the journal a run can be built anew after a crash (`recovery`); it is removed when the run
-file is closed, verified and on disk. A lock beside it tells that its engine lives.
+A thread of its own writes and syncs, so that a slow disk delays nobody. Each record is passed to the system
+at once: what a killed engine has appended is in the file, and only a power cut can lose what was not synced.
+After a crash, `recovery` rebuilds the run from its journal. The journal is removed when the run file is
+closed, verified and on disk. A lock beside it shows that its engine lives.
 """
 
 import contextlib
+import logging
 import queue
 import threading
 import time
@@ -21,6 +22,8 @@ from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
 from messages.message import EMPTY, Message, message
 
+_log = logging.getLogger(__name__)
+
 
 class Journal:
     """An open journal, see `create_journal`. Any thread appends; `close` waits for the disk.
@@ -28,7 +31,7 @@ class Journal:
     Parameters
     ----------
     file : JournalFile
-        Open, with its first record. `remove` and `leave` give its lock back.
+        Open, with its first record. `remove` and `release` release its lock.
     identifier : str
         Of the run.
     """
@@ -36,13 +39,15 @@ class Journal:
     _QUEUE_RECORDS = 4096
     _SYNC_S = 0.1
     _CLOSE_S = 60.0
-    """A disk that has taken nothing of the rest for so long hangs."""
+    """A disk that has taken none of the remaining records for so long hangs."""
 
     def __init__(self, file: JournalFile, identifier: str = "") -> None:
         self.identifier = identifier
         self._file = file
-        self._end = file.size
-        self._written = file.size
+        self.size = file.size
+        """Bytes that it has, or will have once all is written."""
+        self.written = file.size
+        """Bytes that the system took; a record that begins at a later one is not in the file."""
         self._appending = threading.Lock()
         # Bounded by `append`: a queue that bounds itself takes five times as long for each record.
         self._records: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
@@ -53,22 +58,12 @@ class Journal:
 
     @property
     def path(self) -> Path:
-        """Where it is now: it moves when its place no longer takes anything."""
+        """Where it is now: it moves when its folder takes no more."""
         return self._file.path
 
     @property
-    def size(self) -> int:
-        """Bytes that it has, or will have once all is written."""
-        return self._end
-
-    @property
-    def written(self) -> int:
-        """Bytes of it that the system took; a record that begins at a later one is not in the file."""
-        return self._written
-
-    @property
     def move_message(self) -> Message:
-        """Why and whereto the journal has moved; empty if it has not."""
+        """Why and where the journal has moved; empty if it has not."""
         error = self._file.move_cause
         if error is None:
             return EMPTY
@@ -103,11 +98,11 @@ class Journal:
         record = encode_record(data, arrival_ns, kind)
         with self._appending:
             self._records.put(record)
-            start, self._end = self._end, self._end + len(record)
+            start, self.size = self.size, self.size + len(record)
         return start
 
     def append_metadata(self, note: MetadataRecord) -> None:
-        """Append what has become known of the run. Raises like `append`."""
+        """Append metadata of the run. Raises like `append`."""
         self.append(encode_metadata_record(note), time.monotonic_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
@@ -128,9 +123,9 @@ class Journal:
         self.release()
 
     def release(self) -> None:
-        """Let go of a closed journal; where it was not removed, a recovery may take it.
+        """Release the lock of a closed journal; where it was not removed, a recovery may take it.
 
-        One that hangs may still be written: it is let go of when this process ends.
+        One that hangs may still be written: its lock is released when this process ends.
         """
         if not self._thread.is_alive():
             self._file.release()
@@ -146,12 +141,13 @@ class Journal:
                 pass
             self._file.close()
         except Exception as error:  # a journal that ends unseen would be taken for a slow disk
+            _log.error("the journal %s has failed: %s", self.path, error)
             with contextlib.suppress(OSError):
                 self._file.close()
             self._failure = (
                 error if isinstance(error, OSError) else OSError(f"{type(error).__name__}: {error}")
             )
-            while not self._is_ending:  # nobody must wait for a dead writer
+            while not self._is_ending:  # keep the queue empty
                 self._next()
 
     def _next(self, timeout_s: float | None = None) -> bytes | None:
@@ -166,7 +162,7 @@ class Journal:
         deadline = time.monotonic() + duration_s
         while record is not None:
             self._file.append(record)
-            self._written += len(record)
+            self.written += len(record)
             try:
                 record = self._next(max(0.0, deadline - time.monotonic()))
             except queue.Empty:
@@ -183,10 +179,7 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
 
     Raises JournalError if the folder cannot be made or written to, or the name is taken.
 
-    Parameters
-    ----------
-    refuges : sequence of Path
-        Folders to move to when that of `path` fails.
+    It moves to one of the `fallback_folders` when the folder of `path` fails.
     """
     record = encode_record(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
@@ -195,6 +188,7 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
         raise JournalError("{path} is being written by another program. Record again", path=path) from None
     except OSError as error:
         raise _error(path, error) from None
+    _log.info("journal %s begun", path)
     return Journal(file, header.identifier)
 
 

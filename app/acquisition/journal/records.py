@@ -1,8 +1,9 @@
-"""What a journal says of its run beside the bytes: written as it becomes known, read by `recovery`."""
+"""Metadata records of a journal: written as facts of the run become known, read by `recovery`."""
 
 import datetime
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -15,7 +16,7 @@ from drivers.clock import TimeBase
 
 
 class JournalHeader(msgspec.Struct, frozen=True, tag=True):
-    """First record of a journal: what is needed to make samples of the bytes that follow."""
+    """First record of a journal: what is needed to decode the bytes that follow."""
 
     port: PortSettings
     run: RunSettings
@@ -27,7 +28,7 @@ class JournalHeader(msgspec.Struct, frozen=True, tag=True):
 
 
 class Known(msgspec.Struct, frozen=True):
-    """What was found of the pullback, as sample indices and displacements (m); None where it was not yet."""
+    """Measurement of the pullback until then, as sample indices and displacements (m); None where unknown."""
 
     zero_m: float | None = None
     relative_zero_m: float | None = None
@@ -40,10 +41,10 @@ class Known(msgspec.Struct, frozen=True):
 
 
 class Mark(msgspec.Struct, frozen=True, tag=True):
-    """How far the stream had come with so many reads of the journal, and what was known of the run then."""
+    """Checkpoint: how far the stream had come after so many reads, and what was known of the run then."""
 
     next_index: int
-    """Of the sample that comes next, counted from the first one of the stream."""
+    """Index of the next sample, counted from the first one of the stream."""
     armed_index: int
     known: Known
     time_base: TimeBase
@@ -52,7 +53,7 @@ class Mark(msgspec.Struct, frozen=True, tag=True):
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
-    """The run file is begun: the run is sure."""
+    """The run file is begun: the run is confirmed."""
 
     start_index: int
     """Sample that is stored first."""
@@ -79,28 +80,22 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 
 
 MetadataRecord = JournalHeader | Mark | Opened | Named | Ended
-_NOTES: msgspec.json.Decoder[MetadataRecord] = msgspec.json.Decoder(MetadataRecord)
+_DECODER: msgspec.json.Decoder[MetadataRecord] = msgspec.json.Decoder(MetadataRecord)
 
 
 def encode_metadata_record(note: MetadataRecord) -> bytes:
-    """Data of a record of kind `RecordKind.NOTE`."""
+    """Encode the data of a record of kind `RecordKind.NOTE`."""
     return msgspec.json.encode(note)
 
 
 def decode_metadata_record(data: bytes) -> MetadataRecord:
-    """Read what `encode_note` wrote. Raises msgspec.DecodeError, or ValueError from what it holds."""
-    return _NOTES.decode(data)
+    """Decode the data of such a record. Raises msgspec.DecodeError, or ValueError from what it holds."""
+    return _DECODER.decode(data)
 
 
 @dataclass(frozen=True)
 class JournalSummary:
-    """The notes of a journal; None for what its engine did not live to write.
-
-    Attributes
-    ----------
-    mark : Mark or None
-        The last one.
-    """
+    """The last metadata record of each kind in a journal; None for those that its engine could not write."""
 
     path: Path
     """Of the journal."""
@@ -121,14 +116,11 @@ class JournalSummary:
 
 
 def read_summary(path: Path) -> JournalSummary:
-    """Read the notes of a journal.
+    """Read the metadata records of a journal.
 
-    Raises
-    ------
-    RecoveryError
-        It cannot be read, is no journal, or was cut off before anything could be told.
+    Raises RecoveryError if it cannot be read, is no journal, or was cut off before its first sample.
     """
-    notes: dict[type[MetadataRecord], MetadataRecord] = {}
+    records: dict[type[MetadataRecord], Any] = {}
     wire_bytes, end = 0, 0
     try:
         for record in read_journal(path):
@@ -136,8 +128,8 @@ def read_summary(path: Path) -> JournalSummary:
             if record.kind is RecordKind.WIRE:
                 wire_bytes += len(record.data)
             else:
-                note = _note(path, record)
-                notes[type(note)] = note
+                decoded = _decode(path, record)
+                records[type(decoded)] = decoded
         is_torn = path.stat().st_size > end
     except OSError as error:
         raise RecoveryError(
@@ -147,15 +139,24 @@ def read_summary(path: Path) -> JournalSummary:
         raise RecoveryError(
             "{path} is not a journal of Slipstand. Nothing was done to it", path=path
         ) from None
-    header = notes.get(JournalHeader)
-    if not isinstance(header, JournalHeader) or not header.metadata.rate_hz:
+    header: JournalHeader | None = records.get(JournalHeader)
+    if header is None or not header.metadata.rate_hz:
         raise RecoveryError(
             "{path} was cut off before its first sample. Delete it, it holds no data", path=path
         )
-    return _story(path, header, notes, wire_bytes, is_torn)
+    return JournalSummary(
+        path,
+        header,
+        checkpoint=records.get(Mark),
+        opened=records.get(Opened),
+        named=records.get(Named),
+        ended=records.get(Ended),
+        wire_bytes=wire_bytes,
+        is_torn=is_torn,
+    )
 
 
-def _note(path: Path, record: JournalRecord) -> MetadataRecord:
+def _decode(path: Path, record: JournalRecord) -> MetadataRecord:
     try:
         return decode_metadata_record(record.data)
     except msgspec.DecodeError as error:
@@ -165,23 +166,3 @@ def _note(path: Path, record: JournalRecord) -> MetadataRecord:
             path=path,
             fault=fault,
         ) from None
-
-
-def _story(
-    path: Path,
-    header: JournalHeader,
-    notes: dict[type[MetadataRecord], MetadataRecord],
-    wire_bytes: int,
-    is_torn: bool,
-) -> JournalSummary:
-    mark, opened, named, ended = (notes.get(kind) for kind in (Mark, Opened, Named, Ended))
-    return JournalSummary(
-        path=path,
-        header=header,
-        checkpoint=mark if isinstance(mark, Mark) else None,
-        opened=opened if isinstance(opened, Opened) else None,
-        named=named if isinstance(named, Named) else None,
-        ended=ended if isinstance(ended, Ended) else None,
-        wire_bytes=wire_bytes,
-        is_torn=is_torn,
-    )

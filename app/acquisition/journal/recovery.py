@@ -1,10 +1,11 @@
-"""Runs from journals whose engine died.
+"""Recovers runs from journals whose engine died.
 
-Each is built anew, verified and put in its place, and only then its journal goes. A journal whose engine
-lives is not touched; one that cannot be read stays.
+Each run is rebuilt, verified and put in its place; then its journal is removed. A journal whose engine lives
+is not touched; one that cannot be read stays.
 """
 
 import contextlib
+import logging
 import os
 import shutil
 import time
@@ -31,6 +32,9 @@ from app.runs.file_operations import (
 from app.runs.journal import find_journals
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.schema import SUFFIX
+from messages.message import EMPTY, Message, as_message, message, message_of
+
+_log = logging.getLogger(__name__)
 
 Progress = Callable[[float], None]
 
@@ -62,7 +66,7 @@ class Recovery(msgspec.Struct, frozen=True):
     ended: str = ""
     kept: str = ""
     """Where the earlier file of the run is now, if it held anything that the new one does not."""
-    message: str = ""
+    message: Message = EMPTY
 
 
 def recover_folder(
@@ -73,32 +77,24 @@ def recover_folder(
 ) -> list[Recovery]:
     """Recover all journals in a folder and those below it; one that fails does not stop the rest.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Told each journal, and the share of it that is done.
-    home : Path, optional
-        Where runs go that were meant for it, but whose journals had to move to `folder`.
-
-    Raises
-    ------
-    RecoveryError
-        There is no such folder.
+    `progress` receives each journal, and the fraction of it that is done. Runs that were meant for
+    `original_folder`, but whose journals had to move to `folder`, go to the former. Raises RecoveryError if
+    there is no such folder.
     """
     if not folder.is_dir():
         raise RecoveryError("{folder}: there is no such folder. Give a folder with runs", folder=folder)
     done = []
     for journal in find_journals(folder):
 
-        def tell(share: float, journal: Path = journal) -> None:
+        def report(share: float, journal: Path = journal) -> None:
             if progress is not None:
                 progress(journal, share)
 
         try:
-            done.append(recover_journal(journal, tell, original_folder=original_folder))
+            done.append(recover_journal(journal, report, original_folder=original_folder))
         except (RecoveryError, RunError, OSError) as error:
-            message = " ".join(str(error).split())
-            done.append(Recovery(str(journal), RecoveryState.FAILED, message=message))
+            _log.warning("%s cannot be recovered: %s", journal, error)
+            done.append(Recovery(str(journal), RecoveryState.FAILED, message=message_of(error)))
     remove_abandoned(folder)
     return done
 
@@ -106,23 +102,17 @@ def recover_folder(
 def recover_journal(
     journal: Path, progress: Progress = lambda _: None, *, original_folder: Path | None = None
 ) -> Recovery:
-    """Build the run of one journal, put it in its place, and remove the journal.
+    """Rebuild the run of one journal, put it in its place, and remove the journal.
 
-    Its place is beside the journal, or `home` where it was meant for that, and that takes it.
-
-    Raises
-    ------
-    RecoveryError
-        No run can be built from it; it stays.
-    RunError
-        The run cannot be written; the journal stays.
+    Its place is beside the journal, or `original_folder` if it was meant for that, and that takes it. Raises
+    RecoveryError if no run can be rebuilt, or RunError if it cannot be written; the journal stays then.
     """
     if is_being_recorded(journal):
         return _being_recorded(journal)
     try:
         with recording_lock(journal):
-            story = read_summary(journal)
-            recovered = _recover(story, _place(story, original_folder), progress)
+            summary = read_summary(journal)
+            recovered = _recover(summary, _place(summary, original_folder), progress)
             journal.unlink()
             sync_folder(journal.parent)
     except LockHeldError:
@@ -133,41 +123,42 @@ def recover_journal(
 
 
 def _being_recorded(journal: Path) -> Recovery:
-    message = f"{journal} is being recorded. Wait until that run has ended"
-    return Recovery(str(journal), RecoveryState.BEING_RECORDED, message=message)
+    wait = message("{journal} is being recorded. Wait until that run has ended", journal=journal)
+    return Recovery(str(journal), RecoveryState.BEING_RECORDED, message=wait)
 
 
-def _place(story: JournalSummary, home: Path | None) -> Path:
-    """Folder for the run. What the journal says of it is only compared, never followed."""
-    if home is not None and home.is_dir() and Path(story.header.run.directory).absolute() == home.absolute():
-        size = story.path.stat().st_size
-        if os.access(home, os.W_OK) and has_free_space(home, _ROOM_RATIO * size):
-            return home
-    return story.path.parent
+def _place(summary: JournalSummary, original_folder: Path | None) -> Path:
+    """Folder for the run. The path in the journal is only compared, never followed."""
+    wanted = Path(summary.header.run.directory).absolute()
+    if original_folder is not None and original_folder.is_dir() and wanted == original_folder.absolute():
+        size = summary.path.stat().st_size
+        if os.access(original_folder, os.W_OK) and has_free_space(original_folder, _ROOM_RATIO * size):
+            return original_folder
+    return summary.path.parent
 
 
-def _recover(story: JournalSummary, place: Path, progress: Progress) -> Recovery:
-    if not story.wire_bytes and not story.is_torn:
-        return Recovery(str(story.path), RecoveryState.EMPTY)
-    _await_writer(story, place)
-    earlier = _earlier_file(story, place)
-    with _workshop(place, story.path.stem) as folder:
-        made = folder / (earlier.name if earlier else f"{_stem(story)}_001{SUFFIX}")
-        rebuilt = rebuild(story, made, progress)
+def _recover(summary: JournalSummary, place: Path, progress: Progress) -> Recovery:
+    if not summary.wire_bytes and not summary.is_torn:
+        return Recovery(str(summary.path), RecoveryState.EMPTY)
+    _await_writer(summary, place)
+    earlier = _earlier_file(summary, place)
+    with _workshop(place, summary.path.stem) as folder:
+        made = folder / (earlier.name if earlier else f"{_stem(summary)}_001{SUFFIX}")
+        rebuilt = rebuild(summary, made, progress)
         if rebuilt is None:
             raise RecoveryError(
                 "{path} holds {bytes} bytes but no sample. Delete it if it is not needed",
-                path=story.path,
-                bytes=story.wire_bytes,
+                path=summary.path,
+                bytes=summary.wire_bytes,
             )
-        return _placed(story, place, rebuilt, earlier)
+        return _placed(summary, place, rebuilt, earlier)
 
 
-def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Path | None) -> Recovery:
+def _placed(summary: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Path | None) -> Recovery:
     made, path, kept = Path(rebuilt.stored.path), earlier, None
     if not rebuilt.stored.raw_bytes_stored:
         raise RecoveryError(
-            "{path}: its bytes did not fit into the run. Free some space on the disk", path=story.path
+            "{path}: its bytes did not fit into the run. Free some space on the disk", path=summary.path
         )
     state = RecoveryState.RECOVERED
     if path is None:
@@ -181,28 +172,28 @@ def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Pa
             has_own = before is None or not holds_all or before.has_additions
             kept = replace_by_recovered(made, path, keep=has_own)
     return Recovery(
-        journal=str(story.path),
+        journal=str(summary.path),
         state=state,
         run=str(path),
         samples=rebuilt.stored.samples,
         ended=rebuilt.ending.ended,
         kept=str(kept or ""),
-        message=rebuilt.ending.message,
+        message=as_message(rebuilt.ending.message),
     )
 
 
 def _is_whole(before: ExistingRun, rebuilt: RebuiltRun) -> bool:
-    """Tell whether the run was closed as it should, so that only its journal was left over."""
+    """Tell whether the run was closed regularly, so that only its journal was left over."""
     return before.samples == rebuilt.stored.samples and before.end == rebuilt.ending
 
 
-def _earlier_file(story: JournalSummary, folder: Path) -> Path | None:
-    """The run file that the engine's writer began; known by its UUID, whatever the journal calls it."""
-    if story.opened is None:
+def _earlier_file(summary: JournalSummary, folder: Path) -> Path | None:
+    """The run file that the engine's writer began, recognised by its UUID."""
+    if summary.opened is None:
         return None
-    identifier = story.header.identifier
-    if story.named is not None:
-        beside = folder / Path(story.named.path).name  # no other path of a file is followed
+    identifier = summary.header.identifier
+    if summary.named is not None:
+        beside = folder / Path(summary.named.path).name  # no other path of a file is followed
         if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
             return beside
     return find_run_by_uuid(folder, identifier)
@@ -214,37 +205,36 @@ def _identifier(path: Path) -> str:
     return earlier.identifier if earlier else ""
 
 
-def _await_writer(story: JournalSummary, folder: Path) -> None:
+def _await_writer(summary: JournalSummary, folder: Path) -> None:
     """Wait for the writer, which outlives its engine until its file is closed. Raises RecoveryError."""
     deadline = time.monotonic() + _WRITER_S
-    while story.opened is not None and _is_being_written(story, folder):
+    while summary.opened is not None and _is_being_written(summary, folder):
         if time.monotonic() > deadline:
             raise RecoveryError(
-                "{path}: its run file is still being written. Try again in a minute", path=story.path
+                "{path}: its run file is still being written. Try again in a minute", path=summary.path
             )
         time.sleep(0.05)
 
 
-def _is_being_written(story: JournalSummary, folder: Path) -> bool:
-    if story.named is not None:
-        return is_being_recorded(folder / Path(story.named.path).name)
-    runs = folder.glob(f"{_stem(story)}_*{SUFFIX}")
+def _is_being_written(summary: JournalSummary, folder: Path) -> bool:
+    if summary.named is not None:
+        return is_being_recorded(folder / Path(summary.named.path).name)
+    runs = folder.glob(f"{_stem(summary)}_*{SUFFIX}")
     return any(is_being_recorded(run) for run in runs)
 
 
-def _stem(story: JournalSummary) -> str:
+def _stem(summary: JournalSummary) -> str:
     """Begin of the name that the writer gives to the run file."""
-    metadata = story.header.metadata
-    start = story.opened.start_time if story.opened else metadata.start_time
+    metadata = summary.header.metadata
+    start = summary.opened.start_time if summary.opened else metadata.start_time
     return "_".join(part for part in (start.strftime("%Y%m%dT%H%M%S"), metadata.series) if part)
 
 
 @contextlib.contextmanager
 def _workshop(place: Path, journal: str) -> Iterator[Path]:
-    """A hidden folder on the same disk, so that what is made there can be moved at once.
+    """Make a hidden folder on the same disk, so that the new file can be moved at once.
 
-    It is named after the journal, whose lock is held: one that is there was left by a recovery that was
-    ended before it was done.
+    It is named after the journal, whose lock is held: an existing one was left by an interrupted recovery.
     """
     folder = place / f".recovering-{journal}"
     shutil.rmtree(folder, ignore_errors=True)

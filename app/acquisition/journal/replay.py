@@ -1,4 +1,4 @@
-"""The reads of a journal once more, with their samples, numbered as they were while they came."""
+"""Decodes the reads of a journal again, with their samples numbered as in the live stream."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -8,7 +8,6 @@ import numpy as np
 
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.records import JournalSummary, Mark, Opened, decode_metadata_record
-from app.acquisition.messages import PortSettings
 from app.acquisition.stream.connection import create_source
 from app.acquisition.stream.live_stream import losses_between
 from app.runs.blocks import CalibratedBlock, calibrate
@@ -23,12 +22,12 @@ _READS_MAX = 4096
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReplayedReads:
-    """A read of the journal, or several that stand together in the midst of the run."""
+    """A read of the journal, or several consecutive ones from within the run."""
 
     rows: CalibratedBlock | None
-    """The samples that they completed, with the numbers that these had in the stream; None without any."""
+    """Samples that they completed, with their numbers in the stream; None without any."""
     losses: Losses
-    """What they added to the account of the stream."""
+    """What they added to the losses of the stream."""
     start: int
     """Byte of the journal at which the first record begins."""
     is_in_run: bool
@@ -36,23 +35,23 @@ class ReplayedReads:
 
 
 class Replay:
-    """Decodes a journal by the very code that decoded its bytes live. Iterate over it once.
+    """Decodes a journal by the code that decoded its bytes live. Iterate over it once.
 
-    A journal may begin amid a stream, so its samples are counted anew; the first mark tells by how many
-    that is too few. Later ones are compared: `differs` tells whether one did not agree. A mark stands
-    behind the reads that it speaks of, and maybe behind some that came while those were decoded.
+    A journal may begin amid a stream, so its samples are counted anew; the first checkpoint gives the offset.
+    `differs` is set when a later one does not agree. A checkpoint stands behind the reads that it counts, and
+    maybe behind some that came while those were decoded.
     """
 
-    def __init__(self, story: JournalSummary) -> None:
+    def __init__(self, summary: JournalSummary) -> None:
         self.differs = False
-        self._story = story
-        self._source = _source(story)
+        self._summary = summary
+        self._source = _source(summary)
         self._losses = Losses()
         self._offset: int | None = None
         self._reads = 0
         self._counted: deque[tuple[int, int]] = deque()
-        """Reads, and samples with these, not yet overtaken by a mark."""
-        self._opened_after: int | None = story.opened.reads if story.opened else None
+        """Reads, and samples up to these, that no checkpoint has passed yet."""
+        self._opened_after: int | None = summary.opened.reads if summary.opened else None
 
     @property
     def _is_in_run(self) -> bool:
@@ -61,17 +60,17 @@ class Replay:
 
     def __iter__(self) -> Iterator[ReplayedReads]:
         waiting: list[ReplayedReads] = []
-        for reads in self._stretches(read_journal(self._story.path)):
+        for reads in self._groups(read_journal(self._summary.path)):
             waiting.append(self._replayed(reads))
             if self._offset is not None:
                 yield from (_numbered(read, self._offset) for read in waiting)
                 waiting.clear()
         yield from (_numbered(read, self._offset or 0) for read in waiting)
 
-    def _stretches(self, records: Iterable[JournalRecord]) -> Iterator[list[JournalRecord]]:
-        """Each read alone until the run is begun, since it may begin after any; then those between two notes.
+    def _groups(self, records: Iterable[JournalRecord]) -> Iterator[list[JournalRecord]]:
+        """Single reads until the run is begun, since it may begin after any; then those between two notes.
 
-        A note is taken when all reads before it are decoded.
+        Metadata are processed when all reads before them are decoded.
         """
         reads: list[JournalRecord] = []
         for record in records:
@@ -82,23 +81,23 @@ class Replay:
                 yield reads
                 reads = []
             if not is_read:
-                self._take_note(record.data)
+                self._on_metadata(record.data)
         if reads:
             yield reads
 
     def _replayed(self, reads: list[JournalRecord]) -> ReplayedReads:
-        """Each read is decoded with its own time; what follows is done for all together, for speed alone."""
+        """Decode each read with its own time, then calibrate the samples of all together, for speed."""
         is_in_run = self._is_in_run
         try:
             blocks = [block for read in reads for block in self._decoded(read)]
         except DriverError as error:
             raise RecoveryError(
                 "{path}: its bytes make no sense ({error}). It stays as it is",
-                path=self._story.path,
+                path=self._summary.path,
                 error=error,
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
-        rows = calibrate(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
+        rows = calibrate(_joined(blocks), self._summary.header.metadata.gauges) if blocks else None
         return ReplayedReads(rows, losses_between(self._losses, before), reads[0].start, is_in_run)
 
     def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
@@ -111,16 +110,16 @@ class Replay:
         return blocks
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """How much later gauge 2 was read than gauge 1 in these samples; None if they were read at once."""
+        """Delay of gauge 2 against gauge 1 in these samples; None if they were read at once."""
         offset = self._offset or 0
         return self._source.skew(first_index - offset, end_index - offset)
 
-    def _take_note(self, data: bytes) -> None:
-        note = decode_metadata_record(data)
-        if isinstance(note, Opened) and note.reads is None:
+    def _on_metadata(self, data: bytes) -> None:
+        record = decode_metadata_record(data)
+        if isinstance(record, Opened) and record.reads is None:
             self._opened_after = self._reads
-        elif isinstance(note, Mark) and (samples := self._samples_after(note.reads)):
-            ahead = note.next_index - samples
+        elif isinstance(record, Mark) and (samples := self._samples_after(record.reads)):
+            ahead = record.next_index - samples
             self.differs = self.differs or self._offset not in (None, ahead)
             self._offset = ahead if self._offset is None else self._offset
 
@@ -149,21 +148,17 @@ def _numbered(read: ReplayedReads, offset: int) -> ReplayedReads:
     return replace(read, rows=replace(read.rows, first_index=read.rows.first_index + offset))
 
 
-def _source(story: JournalSummary) -> SampleSource:
-    header = story.header
+def _source(summary: JournalSummary) -> SampleSource:
+    """Create a source at the rate of the run, or one that measures it where no device can be set to it."""
+    port, facts = summary.header.port, summary.header.metadata.device.settings
     try:
-        source = _made(header.port, story.rate_hz, header.metadata.device.settings)
+        try:
+            source = create_source(port, summary.rate_hz, facts)
+        except SettingsError:
+            source = create_source(port, port.rate_hz, facts)
         source.prepare()
     except DriverError as error:
         raise RecoveryError(
-            "{path} cannot be decoded ({error}). It stays as it is", path=story.path, error=error
+            "{path} cannot be decoded ({error}). It stays as it is", path=summary.path, error=error
         ) from None
     return source
-
-
-def _made(port: PortSettings, rate_hz: float, facts: dict[str, str]) -> SampleSource:
-    """A source at the rate of the run, or one that measures it again where no device can be set to it."""
-    try:
-        return create_source(port, rate_hz, facts)
-    except SettingsError:
-        return create_source(port, port.rate_hz, facts)

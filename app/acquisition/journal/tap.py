@@ -1,4 +1,4 @@
-"""From the thread that reads the port into the journal, before anything is decoded."""
+"""Writes reads and checkpoints of a run into its journal."""
 
 import contextlib
 from collections import deque
@@ -18,7 +18,7 @@ _EVERY_S = 1.0
 
 
 class JournalTap:
-    """Puts each read into a journal as it comes, and knows where it stands once it is decoded."""
+    """Puts each read into a journal as it comes, and knows its place there once it is decoded."""
 
     def __init__(self, journal: Journal) -> None:
         self.decoded_reads = 0
@@ -30,43 +30,35 @@ class JournalTap:
         """Index after the last sample of a read, and the byte of the journal at which that begins."""
 
     def on_read(self, read: RawRead) -> None:
-        """Put a read into the journal, as a tap of the intake; after a failure no more: none is skipped."""
+        """Put a read into the journal, as tap of the queue; none after a failure, so that none is skipped."""
         try:
             if self._failure is None:
                 self._starts.append(self._journal.append(read.data, read.arrival_ns))
         except JournalError as error:
             self._failure = error
 
-    def note_decoded(self, chunk: DecodedRead, oldest_index: int) -> None:
-        """Note the samples of the next read, in the order in which they came.
+    def note_decoded(self, read: DecodedRead, oldest_index: int) -> None:
+        """Note the samples of the next read, in order; no run begins before `oldest_index` any more.
 
-        Parameters
-        ----------
-        oldest_index : int
-            No run begins before this sample any more.
-
-        Raises
-        ------
-        JournalError
-            The read did not get into the journal.
+        Raises JournalError if the read did not get into the journal.
         """
         if not self._starts and self._failure is not None:
             raise self._failure
         self.decoded_reads += 1
         end_before = self._places[-1][0] if self._places else 0
-        end_index = chunk.rows[-1].end_index if chunk.rows else end_before
+        end_index = read.rows[-1].end_index if read.rows else end_before
         self._places.append((end_index, self._starts.popleft()))
         while len(self._places) > 1 and self._places[1][0] < oldest_index and self._is_held(1):
             self._places.popleft()
 
     @property
     def journaled_index(self) -> int:
-        """Sample before which the journal's file has all that was decoded, 0 where it has none."""
+        """Sample before which the file of the journal has all that was decoded; 0 where it has none."""
         held = (place for place in range(len(self._places) - 1, -1, -1) if self._is_held(place))
         return next((self._places[place][0] for place in held), 0)
 
     def _is_held(self, place: int) -> bool:
-        """Tell whether a read is in the file: records are written one after another, each as a whole."""
+        """Tell whether a read is in the file: records are written whole, one after another."""
         return self._places[place][1] < self._journal.written
 
     def offset_of(self, index: int) -> int:
@@ -97,12 +89,12 @@ class CheckpointWriter:
         self._known: Known | None = None
         self._due = 0
 
-    def update(self, reads: int, next_index: int, facts: PullbackMeasurement) -> None:
+    def update(self, reads: int, next_index: int, measurement: PullbackMeasurement) -> None:
         """Take what is known after so many reads of the journal; `next_index` is of the sample after theirs.
 
-        A journal that fails says so at the next bytes.
+        A failure of the journal is reported at the next read.
         """
-        known = msgspec.convert(facts, Known, from_attributes=True)
+        known = msgspec.convert(measurement, Known, from_attributes=True)
         if known == self._known and next_index < self._due:
             return
         self._known, self._due = known, next_index + self._every
