@@ -1,32 +1,41 @@
-"""The latest readings of both gauges, asked about in seconds."""
+"""Short averages of both gauges over a sliding window: level, noise, drift, and the zero."""
 
+import itertools
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.pullback.stationarity import SlidingWindow, StationaryLevel, drift, stationary_level
-
 Floats = NDArray[np.float64]
 
 BIN_S = 0.002
+"""Length of a short average: a longer one has less noise, and a release is noticed later."""
+_KEPT_S = 1.6
+"""A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
+_PARTS = 4
+_START_GRID = 200
+_NORMAL_MEDIAN = 0.6744897501960817
+"""Median of |x| for a standard normal x."""
+_RESOLUTION_M = 0.5e-6
+"""Least value of the noise: readings of a coarse or quiet gauge repeat exactly."""
+_LEVEL_ERRORS = 6.0
+"""Standard errors by which the quarters of a stretch that stands still may differ."""
+_DRIFT_ERRORS = 4.0
+"""Standard errors above which a drift is taken as real."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BinAverages:
-    """Averages over consecutive bins of equal length; bins without a single reading are left out.
-
-    Attributes
-    ----------
-    middle : (n,) float64
-        (n,) float64: sample index of the middle of each bin.
-    """
+    """Averages over consecutive bins of equal length; bins without a single reading are left out."""
 
     center: Floats
+    """(n,) sample index of the middle of each bin."""
     table_m: Floats
-    """(n,) float64: mean displacements (m); `relative_m` is NaN where gauge 2 has no reading."""
+    """(n,) mean displacements (m)."""
     relative_m: Floats
+    """(n,) mean displacements (m), NaN where gauge 2 has no reading."""
 
     def __len__(self) -> int:
         return len(self.center)
@@ -66,70 +75,224 @@ class BinAverager:
 
 def _bins(sums: Floats, first: int, samples_per_bin: int) -> BinAverages:
     """Means from rows table sum, table count, relative sum, relative count."""
-    there = sums[1] > 0
-    middle: Floats = (np.flatnonzero(there).astype(np.float64) + first + 0.5) * samples_per_bin - 0.5
+    present = sums[1] > 0
+    center: Floats = (np.flatnonzero(present).astype(np.float64) + first + 0.5) * samples_per_bin - 0.5
     with np.errstate(invalid="ignore"):  # 0 / 0 where gauge 2 has no reading: NaN, as promised
-        means: Floats = sums[::2, there] / sums[1::2, there]
-    return BinAverages(middle, means[0], means[1])
+        means: Floats = sums[::2, present] / sums[1::2, present]
+    return BinAverages(center, means[0], means[1])
 
 
-_DRIFT_ERRORS = 4.0
-_KEPT_S = 1.6
-"""A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
+@dataclass(frozen=True, slots=True)
+class StationaryLevel:
+    """A stretch that stood still: its mean and noise (m), and the index of its first reading."""
+
+    mean_m: float
+    noise_m: float
+    since: float
 
 
-class RecentAverages:
-    """Short averages of the table's and the plate's displacement, of the last 1.6 s.
+class SlidingWindow:
+    """The latest readings of one gauge.
 
     Parameters
     ----------
+    span_s : float
+        How far back they are kept.
+    spacing : float
+        Sample indices from one reading to the next, at least.
     rate_hz : float
         Sample indices a second.
-    spacing : float
-        Samples in an average.
     """
 
-    def __init__(self, rate_hz: float, spacing: float) -> None:
+    def __init__(self, span_s: float, spacing: float, rate_hz: float = 1.0) -> None:
         self._rate_hz = rate_hz
-        self._table = SlidingWindow(_KEPT_S * rate_hz, spacing)
-        self._relative = SlidingWindow(_KEPT_S * rate_hz, spacing)
+        self._kept = math.ceil(span_s * rate_hz / spacing) + 2
+        self._rows = np.empty((4 * self._kept, 2))
+        self._count = 0
+
+    def add(self, index: Floats, value_m: Floats) -> None:
+        """Add readings (n,), later than all before."""
+        index, value_m = index[-self._kept :], value_m[-self._kept :]
+        end = self._count + len(index)
+        if end > len(self._rows):
+            self._rows[: self._kept] = self._rows[self._count - self._kept : self._count]
+            self._count, end = self._kept, self._kept + len(index)
+        self._rows[self._count : end, 0] = index
+        self._rows[self._count : end, 1] = value_m
+        self._count = end
+
+    def latest(self, duration_s: float) -> Floats:
+        """Indices and values (n, 2) of the readings not older than `duration_s` before the latest one."""
+        rows = self._all()
+        return (
+            rows[np.searchsorted(rows[:, 0], rows[-1, 0] - duration_s * self._rate_hz) :]
+            if len(rows)
+            else rows
+        )
+
+    def between(self, first: float, last: float) -> Floats:
+        """Indices and values (n, 2) of the readings with first <= index <= last."""
+        rows = self._all()
+        start, end = np.searchsorted(rows[:, 0], first), np.searchsorted(rows[:, 0], last, side="right")
+        return rows[start:end]
+
+    def mean(self, duration_s: float, now: float) -> float:
+        """Mean of the latest readings (m); NaN if there were none for so long before index `now`."""
+        rows = self.latest(duration_s)
+        is_current = len(rows) > 0 and rows[0, 0] >= now - 2.0 * duration_s * self._rate_hz
+        return float(rows[:, 1].mean()) if is_current else math.nan
+
+    def stationary(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
+        """Level of the gauge if it stood still, or within a tolerance, for so long."""
+        return stationary_level(self.latest(duration_s), duration_s * self._rate_hz, tolerance_m)
+
+    def drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
+        """Rate of drift; 0 as long as that is within a bound, or hidden in the noise."""
+        rate, error = (self._rate_hz * value for value in drift(self.latest(duration_s)))
+        return rate if abs(rate) > bound_m_per_s + _DRIFT_ERRORS * error else 0.0
+
+    def _all(self) -> Floats:
+        return self._rows[max(0, self._count - self._kept) : self._count]
+
+
+class RecentAverages:
+    """Short averages of the last 1.6 s: of the table, and of the plate against the table."""
+
+    def __init__(self, rate_hz: float, samples_per_bin: int) -> None:
+        self.table = SlidingWindow(_KEPT_S, samples_per_bin, rate_hz)
+        self.relative = SlidingWindow(_KEPT_S, samples_per_bin, rate_hz)
 
     def add(self, bins: BinAverages) -> None:
-        """Take the next averages, at least one; where gauge 2 has no reading, its is NaN."""
-        self._table.add(bins.center, bins.table_m)
-        there = ~np.isnan(bins.relative_m)
-        if there.all():
-            self._relative.add(bins.center, bins.relative_m)
-        else:
-            self._relative.add(bins.center[there], bins.relative_m[there])
+        """Add the next averages, at least one; where gauge 2 has no reading, its is NaN."""
+        self.table.add(bins.center, bins.table_m)
+        present = ~np.isnan(bins.relative_m)
+        self.relative.add(bins.center[present], bins.relative_m[present])
 
-    def table(self, duration_s: float) -> Floats:
-        """Indices and displacements (n, 2) of the table, not older than `duration_s`."""
-        return self._table.latest(duration_s * self._rate_hz)
 
-    def table_between(self, first: float, last: float) -> Floats:
-        """Indices and displacements (n, 2) of the table with first <= index <= last."""
-        return self._table.between(first, last)
+def noise_m(values_m: Floats) -> float:
+    """Standard deviation (m) of the noise of readings (n,), whatever slow motion they show.
 
-    def relative(self, duration_s: float) -> Floats:
-        """Indices and displacements (n, 2) of the plate against the table."""
-        return self._relative.latest(duration_s * self._rate_hz)
+    From the median step between neighbours, which few jumps do not change.
+    """
+    if len(values_m) < _PARTS:
+        return _RESOLUTION_M
+    step = _median(np.abs(values_m[1:] - values_m[:-1]))
+    return max(step / (_NORMAL_MEDIAN * math.sqrt(2.0)), _RESOLUTION_M)
 
-    def relative_mean(self, duration_s: float, now: float) -> float:
-        """Mean of the plate against the table (m); NaN if gauge 2 gave nothing for so long before `now`."""
-        rows = self.relative(duration_s)
-        is_there = len(rows) > 0 and rows[0, 0] >= now - 2.0 * duration_s * self._rate_hz
-        return float(rows[:, 1].mean()) if is_there else math.nan
 
-    def stationary_table(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
-        """Level of the table if it stood still, or within a tolerance, for so long."""
-        return stationary_level(self.table(duration_s), duration_s * self._rate_hz, tolerance_m)
+def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> StationaryLevel | None:
+    """Level of a stretch (n, 2) that stood still for `span` indices; None if it moved or is too short.
 
-    def stationary_relative(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
-        """Level of the plate against the table if it stood still for so long."""
-        return stationary_level(self.relative(duration_s), duration_s * self._rate_hz, tolerance_m)
+    It stood still when the means of its quarters agree within six standard errors, or `tolerance_m`.
+    """
+    if len(stretch) < 2 * _PARTS or stretch[-1, 0] - stretch[0, 0] < 0.9 * span:
+        return None
+    values = stretch[:, 1]
+    edges = [len(values) * part // _PARTS for part in range(_PARTS + 1)]
+    quarters = [values[start:end].sum() / (end - start) for start, end in itertools.pairwise(edges)]
+    noise = noise_m(values)
+    error_m = noise / math.sqrt(len(values) / _PARTS)
+    if max(quarters) - min(quarters) > max(_LEVEL_ERRORS * error_m, tolerance_m):
+        return None
+    return StationaryLevel(float(values.mean()), noise, float(stretch[0, 0]))
 
-    def table_drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
-        """How fast the table drifts; 0 as long as that is within a bound, or hidden in the noise."""
-        rate, error = (self._rate_hz * value for value in drift(self.table(duration_s)))
-        return rate if abs(rate) > bound_m_per_s + _DRIFT_ERRORS * error else 0.0
+
+def drift(stretch: Floats) -> tuple[float, float]:
+    """Rate of a stretch (n, 2), in its values for one index, and its standard error from the noise.
+
+    Least squares; of fewer than eight readings nothing is known, so the error is infinite.
+    """
+    if len(stretch) < 2 * _PARTS:
+        return 0.0, math.inf
+    index = stretch[:, 0] - stretch[:, 0].mean()
+    spread = float(index @ index)
+    return float(index @ stretch[:, 1]) / spread, noise_m(stretch[:, 1]) / math.sqrt(spread)
+
+
+def fit_parabola_start(falling: Floats) -> float:
+    """Index at which a rise from zero, growing with the square of time, began (least squares).
+
+    Parameters
+    ----------
+    falling : (n, 2) float64
+        Ascending indices, and the distance (m) from where it began. One alone is its own beginning.
+    """
+    index, distance_m = falling[:, 0], falling[:, 1]
+    if len(index) == 1:
+        return float(index[0])
+    starts = np.linspace(index[0], index[-1], _START_GRID, endpoint=False)
+    shape = np.maximum(index - starts[:, None], 0.0) ** 2
+    growth = np.maximum(shape @ distance_m, 0.0) / (shape**2).sum(axis=1)
+    misfit = ((distance_m - growth[:, None] * shape) ** 2).sum(axis=1)
+    return float(starts[np.argmin(misfit)])
+
+
+def _median(values: Floats) -> float:
+    """Median of values (n,), n >= 1: numpy's own takes three times as long for so few."""
+    middle = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, middle)[middle])
+    low, high = np.partition(values, (middle - 1, middle))[middle - 1 : middle + 1]
+    return float(low + high) / 2.0
+
+
+_ZEROS_KEPT_S = 10.0
+_KNOWN_S = 0.15
+"""The zero is known when the levels of so long a time agree; each is itself a mean over 0.3 s."""
+_BEFORE_S = 1.3
+"""The zero is taken so long before the pull is noticed: a smooth pull begins unnoticed."""
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroLevel:
+    """A moment of rest: sample at which it began, and what both gauges read (m)."""
+
+    since: float
+    table_m: float
+    relative_m: float
+
+
+class ZeroEstimator:
+    """Moments of rest, of the last ten seconds at most."""
+
+    def __init__(self, rate_hz: float, tick_s: float) -> None:
+        self._rate_hz = rate_hz
+        self._levels: deque[ZeroLevel] = deque(maxlen=round(_ZEROS_KEPT_S / tick_s))
+
+    def add(self, level: ZeroLevel) -> None:
+        """Add the latest moment of rest."""
+        self._levels.append(level)
+
+    def reset(self) -> None:
+        """Begin anew: table or plate were moved."""
+        self._levels.clear()
+
+    @property
+    def has_levels(self) -> bool:
+        """Tell whether there was any moment of rest."""
+        return bool(self._levels)
+
+    @property
+    def is_known(self) -> bool:
+        """Tell whether there was rest enough for a zero."""
+        levels = self._levels
+        return self.has_levels and levels[-1].since - levels[0].since >= _KNOWN_S * self._rate_hz
+
+    @property
+    def latest(self) -> ZeroLevel:
+        """The last moment of rest. Raises IndexError before any."""
+        return self._levels[-1]
+
+    def pulled_m(self, table_m: float) -> float:
+        """Distance (m) of the table from where it rested; 0 before any rest.
+
+        From the oldest rest that is kept, so that a slow pull is noticed as well.
+        """
+        return abs(table_m - self._levels[0].table_m) if self._levels else 0.0
+
+    def level_before(self, index: float, noticed_m: float) -> ZeroLevel:
+        """The rest before a pull that was noticed at `index`, at `noticed_m` from it. Raises IndexError."""
+        oldest, latest = self._levels[0], index - _BEFORE_S * self._rate_hz
+        chosen = next((level for level in reversed(self._levels) if level.since <= latest), oldest)
+        is_slow = math.fabs(chosen.table_m - oldest.table_m) > 0.5 * noticed_m
+        return oldest if is_slow else chosen

@@ -1,14 +1,21 @@
-"""Table and plate after the release: is it one, does the plate slip, when do they swing together and rest."""
+"""The hold of the table and its release: whether the plate slips, and when both swing together and rest."""
 
 import math
+from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback.averages import BinAverages, Floats, RecentAverages
-from app.acquisition.pullback.hold import Hold
+from app.acquisition.pullback.averages import (
+    BinAverages,
+    Floats,
+    RecentAverages,
+    StationaryLevel,
+    fit_parabola_start,
+    noise_m,
+)
 from app.acquisition.pullback.plan import Excursion, PullbackMeasurement, PullbackPlan, Transition
-from app.acquisition.pullback.stationarity import fit_parabola_start, noise_m
 from messages.message import EMPTY, Message, message
 
 LET_DOWN_NOTE = message(
@@ -21,15 +28,18 @@ SILENT_PLATE_NOTE = message(
     "Gauge 2 gives no reading, so it is unknown whether the plate slips. Check its cable"
 )
 
+_RELEASE_NOISES = 6.0
+_CREEP = 0.01
+"""Fraction of the pullback that a release must exceed, and that a hold may move: less is creep."""
 _RELEASE_FIT_S = 0.04
 _PARABOLA_S = 0.01
-"""So long after a release was noticed, the table still falls by the square of time."""
+"""Time after a release was noticed during which the table moves by the square of time."""
 _CONFIRM_S = 1.5
 _STUCK_S = 0.6
 """Longer than a period: within one, the plates stick and slip again."""
 _REST_S = 1.0
 _OVERSHOOT = 0.05
-"""Part of the pullback by which a released table swings to the other side, at least."""
+"""Fraction of the pullback by which a released table swings to the other side, at least."""
 _REST_NOISES = 0.5
 _REST_M = 1e-6
 _STUCK_M = 5e-6
@@ -39,35 +49,102 @@ _BINS_TO_SLIP = 2
 _UNDECIDED = (PullbackState.RELEASED, PullbackState.NO_SLIP)
 
 
+@dataclass(frozen=True, slots=True)
+class HoldReference:
+    """What both gauges read in the last few hundredths of a second (m); NaN without gauge 2."""
+
+    table_m: float
+    relative_m: float
+    relative_noise_m: float
+    """Of one short average."""
+    relative_error_m: float
+    """Of `relative_m`."""
+
+
+class Hold:
+    """A hold of the table, from when it stood still; `detect_release` sees its end.
+
+    Parameters
+    ----------
+    level : StationaryLevel
+        Of the table when it was found still.
+    side : float
+        1 or -1: to which side it is pulled.
+    pulled_m : float
+        How far, without sign (m).
+    bins_to_release : int
+        So many short averages in a row must be beyond the limit.
+    """
+
+    def __init__(self, level: StationaryLevel, side: float, pulled_m: float, bins_to_release: int) -> None:
+        self.start = level.since
+        """Sample at which it began."""
+        self.since = level.since
+        """Sample from which on it has not crept noticeably."""
+        self._level_m = level.mean_m
+        self._side = side
+        self._pulled_m = pulled_m
+        self._bins_to_release = bins_to_release
+        self._noise_m = level.noise_m
+        self._references: deque[HoldReference] = deque(maxlen=2)
+        self._beyond = 0
+
+    @property
+    def reference(self) -> HoldReference:
+        """Where table and plate stood a moment ago: before the release, if it has begun."""
+        return self._references[0]
+
+    @property
+    def is_leaving(self) -> bool:
+        """Tell whether the latest average was beyond the limit."""
+        return self._beyond > 0
+
+    def update(self, level: StationaryLevel, reference: HoldReference) -> None:
+        """Take a new level; a table that has crept too far begins a new hold."""
+        if abs(level.mean_m - self._level_m) > _CREEP * self._pulled_m:
+            self.since, self._level_m = level.since, level.mean_m
+        self._noise_m = level.noise_m
+        self._references.append(reference)
+
+    def detect_release(self, table_m: float) -> bool:
+        """Take the next average; return whether the table leaves its hold towards its zero."""
+        if self._references:
+            gone_m = self._side * (self.reference.table_m - table_m)
+            limit_m = max(_RELEASE_NOISES * self._noise_m, _CREEP * self._pulled_m)
+            self._beyond = self._beyond + 1 if gone_m > limit_m else 0
+        return self._beyond >= self._bins_to_release
+
+
 class FreeMotion:
     """Follows one release.
 
     Parameters
     ----------
-    readings : Readings
-        Holds each short average before `see` is told of it.
-    facts : PullbackFacts
-        Filled in with what is found.
+    plan : PullbackPlan
+    readings : RecentAverages
+        Holds each short average before `update` receives it.
+    measurement : PullbackMeasurement
+        Receives what is found.
     hold : Hold
         From which it was released.
     noticed_at : float
         Sample at which the release was noticed.
     remark : Message
-        What there is to say of this release, once it is sure.
+        On this release, once it is confirmed.
     """
 
     def __init__(
         self,
         plan: PullbackPlan,
         readings: RecentAverages,
-        facts: PullbackMeasurement,
+        measurement: PullbackMeasurement,
         hold: Hold,
         noticed_at: float,
         remark: Message,
     ) -> None:
         self._plan = plan
         self._readings = readings
-        self._facts = facts
+        self._measurement = measurement
         self._from = hold.reference
         self._noticed_at = noticed_at
         self._remark = remark
@@ -76,32 +153,32 @@ class FreeMotion:
         self._slipping_bins = 0
         self._slip_index: float | None = None
         self._is_silence_said = False
-        facts.release_index = self._release_before(noticed_at)
+        measurement.release_index = self._release_before(noticed_at)
 
     @property
     def is_settled(self) -> bool:
-        """Tell whether slow questions alone are left: `see` may be told of all bins until a tick at once."""
+        """Tell whether only checks at ticks are left: `update` may then receive all bins until a tick."""
         is_open = self._slip_index is None or self._state in _UNDECIDED
-        return self._facts.release_confirmed and not is_open
+        return self._measurement.release_confirmed and not is_open
 
     def update(self, bins: BinAverages, samples_per_bin: int, is_tick: bool) -> list[Transition]:
-        """Take the next averages; return the new states. Slow questions are asked at ticks only."""
+        """Take the next averages; return the new states. Slow changes are checked at ticks only."""
         index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
         self._follow_plate(bins)
-        since_s = (index - (self._facts.release_index or 0)) / self._plan.rate_hz
-        if not self._facts.release_confirmed:
+        since_s = (index - (self._measurement.release_index or 0)) / self._plan.rate_hz
+        if not self._measurement.release_confirmed:
             return self._confirm(table_m, since_s, index)
         if self._slip_index is not None and self._state in _UNDECIDED:
-            return [self._turn(PullbackState.SLIPPING, self._slip_index)]
+            return [self._enter(PullbackState.SLIPPING, self._slip_index)]
         if not is_tick or since_s <= _STUCK_S:
             return []
-        turns = self._after_a_period(index)
-        return turns + self._look_for_rest(index, samples_per_bin) if since_s > _REST_S else turns
+        transitions = self._after_a_period(index)
+        return transitions + self._look_for_rest(index, samples_per_bin) if since_s > _REST_S else transitions
 
     def _follow_plate(self, bins: BinAverages) -> None:
-        if self._facts.plate_m is not None:
+        if self._measurement.plate_m is not None:
             seen_m = bins.relative_m + bins.table_m if self._plan.gauge_2_on_base else bins.relative_m
-            self._widen(seen_m - self._facts.plate_m)
+            self._widen(seen_m - self._measurement.plate_m)
         if self._slip_index is None:
             self._look_for_slip(bins.center[-1].item(), bins.relative_m[-1].item())
 
@@ -114,20 +191,22 @@ class FreeMotion:
             self._slip_index = index
 
     def _widen(self, gone_m: Floats) -> None:
-        before = self._facts.excursion or Excursion(0.0, 0.0)
+        before = self._measurement.excursion or Excursion(0.0, 0.0)
         low_m, high_m = float(np.fmin.reduce(gone_m)), float(np.fmax.reduce(gone_m))
         if low_m < before.low_m or high_m > before.high_m:
-            self._facts.excursion = Excursion(min(before.low_m, low_m), max(before.high_m, high_m))
+            self._measurement.excursion = Excursion(min(before.low_m, low_m), max(before.high_m, high_m))
 
     def _confirm(self, table_m: float, since_s: float, index: float) -> list[Transition]:
-        facts = self._facts
-        across_m = facts.side * ((facts.zero_m or 0.0) - table_m)
-        if across_m > _OVERSHOOT * abs(facts.pulled_m):
-            facts.release_confirmed = True
-            facts.release_index = self._release_before(self._noticed_at + _PARABOLA_S * self._plan.rate_hz)
-            return [self._turn(PullbackState.RELEASED, facts.release_index, self._remark)]
+        measurement = self._measurement
+        across_m = measurement.side * ((measurement.zero_m or 0.0) - table_m)
+        if across_m > _OVERSHOOT * abs(measurement.pulled_m):
+            measurement.release_confirmed = True
+            measurement.release_index = self._release_before(
+                self._noticed_at + _PARABOLA_S * self._plan.rate_hz
+            )
+            return [self._enter(PullbackState.RELEASED, measurement.release_index, self._remark)]
         if since_s > _CONFIRM_S:
-            facts.release_index = facts.excursion = None
+            measurement.release_index = measurement.excursion = None
             return [Transition(PullbackState.PULLING, round(index), LET_DOWN_NOTE)]
         return []
 
@@ -137,36 +216,36 @@ class FreeMotion:
         return self._look_for_tail() if self._state is PullbackState.SLIPPING else []
 
     def _judge_stuck_plate(self, index: float) -> list[Transition]:
-        """No single average showed a slip: see whether their mean does."""
-        if math.isnan(self._readings.relative_mean(_STUCK_S, index)):
+        """No single average showed a slip: check whether their mean does."""
+        if math.isnan(self._readings.relative.mean(_STUCK_S, index)):
             is_new, self._is_silence_said = not self._is_silence_said, True
-            return [self._turn(self._state, index, SILENT_PLATE_NOTE)] if is_new else []
-        level = self._readings.stationary_relative(_STUCK_S, _STUCK_M)
+            return [self._enter(self._state, index, SILENT_PLATE_NOTE)] if is_new else []
+        level = self._readings.relative.stationary(_STUCK_S, _STUCK_M)
         limit_m = _SLIP_NOISES * self._from.relative_error_m + _STUCK_M
         if level is not None and not abs(level.mean_m - self._from.relative_m) > limit_m:
-            return [self._turn(PullbackState.NO_SLIP, index, NO_SLIP_NOTE)]
-        return [self._turn(PullbackState.SLIPPING, self._facts.release_index or index)]
+            return [self._enter(PullbackState.NO_SLIP, index, NO_SLIP_NOTE)]
+        return [self._enter(PullbackState.SLIPPING, self._measurement.release_index or index)]
 
     def _look_for_tail(self) -> list[Transition]:
-        level = self._readings.stationary_relative(_STUCK_S, _STUCK_M)
+        level = self._readings.relative.stationary(_STUCK_S, _STUCK_M)
         if level is None:
             return []
         # A slip in the first quarter may have gone unseen: rather late than early.
         stuck_since = level.since + _STUCK_S * self._plan.rate_hz / 4
-        self._facts.slip_end_index = round(stuck_since)
-        return [self._turn(PullbackState.TAIL, stuck_since)]
+        self._measurement.slip_end_index = round(stuck_since)
+        return [self._enter(PullbackState.TAIL, stuck_since)]
 
     def _look_for_rest(self, index: float, samples_per_bin: int) -> list[Transition]:
-        if self._facts.rest_index is not None:
+        if self._measurement.rest_index is not None:
             return []
-        values_m = self._readings.table(_REST_S)[:, 1]
+        values_m = self._readings.table.latest(_REST_S)[:, 1]
         bin_noise_m = noise_m(values_m)
         off_m = values_m - values_m.sum() / len(values_m)
         moving_m = math.sqrt(max(0.0, float(off_m @ off_m) / len(off_m) - bin_noise_m**2))
         sample_noise_m = bin_noise_m * math.sqrt(samples_per_bin)
         if moving_m >= _REST_NOISES * sample_noise_m + _REST_M:
             return []
-        self._facts.rest_index = round(index - _REST_S * self._plan.rate_hz)
+        self._measurement.rest_index = round(index - _REST_S * self._plan.rate_hz)
         if self._plan.duration_s is not None:
             return []
         return [Transition(PullbackState.CLOSING, round(index) + 1, end_reason=EndReason.REST)]
@@ -174,10 +253,10 @@ class FreeMotion:
     def _release_before(self, last: float) -> int:
         """Sample at which the table left its hold, from readings until `last`."""
         first = last - _RELEASE_FIT_S * self._plan.rate_hz
-        falling = self._readings.table_between(first, last).copy()
-        falling[:, 1] = self._facts.side * (self._from.table_m - falling[:, 1])
+        falling = self._readings.table.between(first, last).copy()
+        falling[:, 1] = self._measurement.side * (self._from.table_m - falling[:, 1])
         return round(fit_parabola_start(falling))
 
-    def _turn(self, state: PullbackState, index: float, note: Message = EMPTY) -> Transition:
+    def _enter(self, state: PullbackState, index: float, note: Message = EMPTY) -> Transition:
         self._state = state
         return Transition(state, round(index), note, is_stored=bool(note))

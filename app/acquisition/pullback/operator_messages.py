@@ -1,4 +1,4 @@
-"""Messages while a release is awaited: hints, remarks on how the release came, and the end of the wait."""
+"""Messages to the operator: hints during the wait, remarks on a release, and the end of the wait."""
 
 from app.acquisition.messages import PullbackState
 from app.acquisition.pullback.plan import PullbackPlan
@@ -16,11 +16,6 @@ NOT_RECENTRED_NOTE = message(
 RESTLESS_NOTE = message("The table has not come to rest yet, so its zero cannot be taken. Still it")
 NO_READING_NOTE = message("Gauge 1 gives no reading. Check its cable, and whether it is overloaded")
 
-HINT_AFTER_S = 2.0
-"""An operator who knows what to do is faster; a hint before that would flicker by."""
-_WARNING_S = 60.0
-_SILENT_S = 0.5
-"""Longer than any gap between two samples, at the slowest rate of any driver."""
 
 _TIMEOUT_CAUSES = {
     PullbackState.RECENTRE: message(
@@ -40,7 +35,7 @@ _TIMEOUT_CAUSES = {
 
 
 def timeout_note(state: PullbackState, timeout_s: float) -> Message:
-    """Why a run ended without a release, by the state in which it waited. The last seconds are kept."""
+    """Reason why a run ended without a release, by the state in which it waited."""
     return message(
         "no release within {timeout_s:g} s: {cause}", timeout_s=timeout_s, cause=_TIMEOUT_CAUSES[state]
     )
@@ -89,32 +84,6 @@ def filling_hint(pretrigger_s: float) -> Message:
     )
 
 
-class ReleaseTimeout:
-    """Time that a release is awaited.
-
-    Parameters
-    ----------
-    armed_index : int
-        Sample from which the time counts.
-    """
-
-    def __init__(self, plan: PullbackPlan, armed_index: int) -> None:
-        self._rate_hz = plan.rate_hz
-        self._timeout_s = plan.trigger_timeout_s
-        self._armed_index = armed_index
-        self._warning_s = min(_WARNING_S, 0.5 * plan.trigger_timeout_s)
-
-    @property
-    def end_index(self) -> float:
-        """Sample at which the wait is over."""
-        return self._armed_index + self._timeout_s * self._rate_hz
-
-    def warning(self, now: float) -> Message:
-        """Warn that the wait will be over soon; empty before the last minute."""
-        if now < self.end_index - self._warning_s * self._rate_hz:
-            return EMPTY
-        return message("No release yet: the run ends without one in {left_s:g} s", left_s=self._warning_s)
-
-    def is_silent(self, last_reading: float, now: float) -> bool:
-        """Tell whether gauge 1 has given no reading for too long."""
-        return now - last_reading > _SILENT_S * self._rate_hz
+def timeout_warning(left_s: float) -> Message:
+    """Warn that the wait for a release will be over soon."""
+    return message("No release yet: the run ends without one in {left_s:g} s", left_s=left_s)

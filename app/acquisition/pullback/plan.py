@@ -1,4 +1,4 @@
-"""What a pullback test is told beforehand, and what it finds."""
+"""Plan of a pullback test, and what is measured in it."""
 
 import math
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ from app.acquisition.messages import EndReason, PullbackState
 from messages.message import EMPTY, Message
 
 _USUAL = 1.5
-"""Reach of a slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand."""
+"""Largest slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand."""
 _MARGIN = 0.2
-"""What the next slip may reach beyond the last one, as a part of that."""
+"""Fraction by which the next slip may exceed the last one."""
 _USED = 0.98
-"""Part of a gauge's range that is counted upon."""
+"""Fraction of a gauge's range that is used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,37 +80,32 @@ _TOLERANCE_MIN_M = 0.1e-3
 
 @dataclass(frozen=True, slots=True)
 class PullbackPlan:
-    """What is expected of one test.
-
-    Attributes
-    ----------
-    expected : Excursion or None
-        How far the plate is expected to go; None takes what any plate may.
-    """
+    """What is expected of one test."""
 
     rate_hz: float
     """Samples a second."""
     pullback_m: float | None = None
     """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
     duration_s: float | None = None
-    """How long to go on after release; None until rest, or `enough_s`."""
+    """Time after release; None goes on until rest, or `enough_s`."""
     trigger_timeout_s: float = math.inf
     """How long to wait for a release (s)."""
     enough_s: float = 20.0
-    """Time after release at which waiting longer no longer pays (s)."""
+    """Time after release at which waiting longer no longer helps (s)."""
     tolerance_m: float | None = None
     """How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least."""
     pretrigger_s: float = 0.0
-    """What is to be kept from before the release (s)."""
+    """Time to be kept from before the release (s)."""
     first_index: int = 0
-    """Oldest sample that is kept: before it is so long ago as the pretrigger, nothing is armed."""
+    """Oldest sample that is kept: nothing is armed until it is as old as the pretrigger."""
     relative_range_m: float | None = None
-    """Gauge 2 reads from minus to plus this (m); None where nobody says."""
+    """Gauge 2 reads from minus to plus this (m); None where it is not known."""
     gauge_2_on_base: bool = False
     """Gauge 2 measures the plate against the base, and not against the table."""
     expected_excursion: Excursion | None = None
+    """How far the plate is expected to go; None takes the largest of any plate."""
     side: int = 0
-    """To which side the table was pulled the last time: 1, -1, or 0 if nobody knows."""
+    """Side to which the table was pulled last: 1, -1, or 0 if unknown."""
 
     @property
     def target_m(self) -> float | None:

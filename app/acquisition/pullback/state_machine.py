@@ -1,22 +1,29 @@
-"""The pullback test as a state machine: samples in, turns of events out; no clock, thread or file.
+"""The pullback test as a state machine: samples in, transitions out; no clock, thread or file.
 
 Re-centring, rest (zero), pulling, held, armed, released, slipping or not, tail (both plates together),
-rest again. All times are sample indices, so that the machine does the same live, in a replay and in a test.
+rest again. All times are sample indices, so that the machine works alike live, in a replay and in a test.
 """
 
 import math
 
 from app.acquisition.messages import EndReason, PullbackState, StandPosition
 from app.acquisition.pullback import operator_messages
-from app.acquisition.pullback.averages import BinAverager, BinAverages, Floats, RecentAverages
-from app.acquisition.pullback.free_motion import FreeMotion
-from app.acquisition.pullback.hold import Hold, HoldReference
+from app.acquisition.pullback.averages import (
+    BinAverager,
+    BinAverages,
+    Floats,
+    RecentAverages,
+    StationaryLevel,
+    ZeroEstimator,
+    ZeroLevel,
+    noise_m,
+)
+from app.acquisition.pullback.free_motion import FreeMotion, Hold, HoldReference
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
-from app.acquisition.pullback.stationarity import StationaryLevel, ZeroEstimator, ZeroLevel, noise_m
 from messages.message import EMPTY, Message
 
 _TICK_S = 0.02
-"""How often slow questions are asked; the release is looked for at each bin."""
+"""Interval of slow checks; the release is looked for at each bin."""
 _ZERO_S = 0.3
 _HOLD_S = 0.2
 _REFERENCE_S = 0.06
@@ -27,19 +34,24 @@ _DRIFT_M_PER_S = 50e-6
 _DRIFT_LEEWAY = 2.0
 """An armed hold may drift so much faster than one that is to be armed."""
 
-# Parts of the pullback:
+# Fractions of the pullback:
 _CREEP = 0.01
 """Moving less than this still counts as standing still."""
 _PULL_NOTICED = 0.02
 _PULLED = 0.5
 _BACK = 0.5
-"""Part of what is noticed as a pull: within it, the table is where it was before."""
+"""Fraction of what is noticed as a pull: within it, the table is where it was before."""
 
 _PULL_NOISES = 8.0
 _INSET = 0.02
-"""Part of the room for the plate by which it must be inside, once it had to be put back."""
+"""Fraction of its allowed range by which the plate must be inside, once it had to be put back."""
 _LEEWAY = 1.25
-"""A hold may go so much further off than where it was taken, before it is one no more."""
+"""A hold may deviate so much more from the target than when it was accepted, before it is lost."""
+_HINT_AFTER_S = 2.0
+"""An operator who knows what to do is faster; a hint before that would flicker."""
+_WARNING_S = 60.0
+_SILENT_S = 0.5
+"""Longer than any gap between two samples, at the slowest rate of any driver."""
 
 _WAITING = (
     PullbackState.RECENTRE,
@@ -52,12 +64,9 @@ _FREE = (PullbackState.RELEASED, PullbackState.SLIPPING, PullbackState.NO_SLIP, 
 
 
 class PullbackStateMachine:
-    """Follows one test to its end; feed it every sample.
+    """Follows one test to its end; it needs every sample.
 
-    Parameters
-    ----------
-    armed_index : int
-        Sample from which on a release is waited for; what is fed from before is context.
+    A release is awaited from sample `armed_index` on; earlier samples are context.
     """
 
     def __init__(self, plan: PullbackPlan, armed_index: int = 0) -> None:
@@ -78,16 +87,12 @@ class PullbackStateMachine:
         self._hold: Hold | None = None
         self._free: FreeMotion | None = None
         self._farthest_m = 0.0
-        self._patience = operator_messages.ReleaseTimeout(plan, armed_index)
-        self._turned_at = self._seen_at = float(armed_index)
+        self._timeout_index = armed_index + self._span(plan.trigger_timeout_s)
+        self._warning_s = min(_WARNING_S, 0.5 * plan.trigger_timeout_s)
+        self._entered_at = self._last_reading = float(armed_index)
         self._hinted: set[int] = set()
         self._filled_index = plan.first_index + self._span(plan.pretrigger_s)
-        self._turns: list[Transition] = []
-
-    @property
-    def has_ended(self) -> bool:
-        """Tell whether nothing more is awaited."""
-        return self.state is PullbackState.CLOSING
+        self._transitions: list[Transition] = []
 
     @property
     def is_at_rest(self) -> bool:
@@ -101,7 +106,7 @@ class PullbackStateMachine:
 
     @property
     def position(self) -> StandPosition:
-        """Where table and plate stand, for the sentence of the state."""
+        """Where table and plate stand, for the instruction to the operator."""
         facts, must_move = self.measurement, self.state is PullbackState.RECENTRE
         return StandPosition(
             pullback_m=self._plan.target_m,
@@ -117,74 +122,71 @@ class PullbackStateMachine:
     def add_samples(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Transition]:
         """Take consecutive samples (n,) from `first_index` on, NaN where there is no reading.
 
-        Returns
-        -------
-        list of Turn
-            What happened, in order. The index of the last one, CLOSING, is where the run ends.
+        Returns the transitions, in order. The index of the last one, CLOSING, is where the run ends.
         """
         bins, seen = self._binning.add(first_index, table_m, relative_m), 0
         while seen < len(bins):
             until_tick = self._bins_per_tick - self._bins % self._bins_per_tick
             some = bins[seen : seen + (until_tick if self._is_settled else 1)]
-            self._see(some)
+            self._on_bins(some)
             seen += len(some)
         self._keep_time(first_index + len(table_m))
-        turns, self._turns = self._turns, []
-        return turns
+        transitions, self._transitions = self._transitions, []
+        return transitions
 
     @property
     def _is_settled(self) -> bool:
-        """Nothing can happen but at ticks: what lies between them is seen in one piece, which costs less."""
+        """Only checks at ticks are left: the bins between them are taken in one piece, which costs less."""
         if self._free is not None and self.state in _FREE:
             return self._free.is_settled
         return self.state not in _WAITING
 
-    def _see(self, bins: BinAverages) -> None:
+    def _on_bins(self, bins: BinAverages) -> None:
         """Take one bin, or those until the next tick."""
         self._readings.add(bins)
         self._bins += len(bins)
         is_tick = self._bins % self._bins_per_tick == 0
         index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
-        self._seen_at = index
+        self._last_reading = index
         if self._free is not None and self.state in _FREE:
-            self._see_free(self._free, bins, is_tick)
+            self._on_free(self._free, bins, is_tick)
         elif self.is_at_rest:
-            self._see_rest(index, table_m, is_tick)
+            self._on_rest(index, table_m, is_tick)
         elif self.state in _WAITING:
-            self._see_pulled(index, table_m, is_tick)
+            self._on_pulled(index, table_m, is_tick)
 
     # --- at rest ---
 
-    def _see_rest(self, index: float, table_m: float, is_tick: bool) -> None:
+    def _on_rest(self, index: float, table_m: float, is_tick: bool) -> None:
         is_recentring = self.state is PullbackState.RECENTRE  # the hand that moves the plate moves the table
         limit_m = _PULLED * self._plan.nominal_m if is_recentring else self._noticed_m()
         if self._rest.pulled_m(table_m) > limit_m:
             self._begin_pull(index)
         elif is_tick and (level := self._still(_ZERO_S)) is not None:
-            self._take_rest(index, level)
+            self._add_rest(index, level)
 
-    def _take_rest(self, index: float, level: StationaryLevel) -> None:
-        if self._readings.table_drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
+    def _add_rest(self, index: float, level: StationaryLevel) -> None:
+        if self._readings.table.drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
             return
         is_first = not self._rest.has_levels and self.measurement.zero_m is None
         if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
-            self._turn(PullbackState.PULLING, index, operator_messages.ALREADY_PULLED_NOTE, is_kept=True)
+            self._enter(PullbackState.PULLING, index, operator_messages.ALREADY_PULLED_NOTE, is_stored=True)
             return
         if self._is_plate_moving(index):
             self._rest.reset()
             return
-        self._rest.add(ZeroLevel(level.since, level.mean_m, self._readings.relative_mean(_ZERO_S, index)))
+        self._rest.add(ZeroLevel(level.since, level.mean_m, self._readings.relative.mean(_ZERO_S, index)))
         if self._rest.is_known:
             self._set_zero(self._rest.latest)
-            self._centre(index)
+            self._check_plate(index)
 
     def _is_plate_moving(self, index: float) -> bool:
         """Tell whether there is a hand on the plate."""
-        is_seen = not math.isnan(self._readings.relative_mean(_ZERO_S, index))
-        return is_seen and self._readings.stationary_relative(_ZERO_S, _CREEP * self._plan.nominal_m) is None
+        is_seen = not math.isnan(self._readings.relative.mean(_ZERO_S, index))
+        return is_seen and self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
 
-    def _centre(self, index: float) -> None:
+    def _check_plate(self, index: float) -> None:
         """Ask for the plate to be put back, or for the pull."""
         room, plate_m = self._room, math.nan if self.measurement.plate_m is None else self.measurement.plate_m
         is_recentring = self.state is PullbackState.RECENTRE
@@ -192,13 +194,13 @@ class PullbackStateMachine:
             inset_m = _INSET * (room.high_m - room.low_m) if is_recentring else 0.0
             if not room.fits(plate_m, inset_m):
                 if not is_recentring:
-                    self._turn(PullbackState.RECENTRE, index)
+                    self._enter(PullbackState.RECENTRE, index)
                 return
         if is_recentring:
             self._rest.reset()
-            self._turn(PullbackState.ZERO, index)
+            self._enter(PullbackState.ZERO, index)
         elif self.state is PullbackState.ZERO:
-            self._turn(PullbackState.PULLING, index)
+            self._enter(PullbackState.PULLING, index)
 
     def _set_zero(self, zero: ZeroLevel) -> None:
         self.measurement.zero_m = zero.table_m
@@ -212,20 +214,20 @@ class PullbackStateMachine:
         self._is_pulled = True
         self._moved_at = index
         if self.state is PullbackState.RECENTRE:
-            self._turn(PullbackState.PULLING, index, operator_messages.NOT_RECENTRED_NOTE, is_kept=True)
+            self._enter(PullbackState.PULLING, index, operator_messages.NOT_RECENTRED_NOTE, is_stored=True)
         elif self.state is PullbackState.ZERO:
-            self._turn(PullbackState.PULLING, index)
+            self._enter(PullbackState.PULLING, index)
 
     # --- pulled back ---
 
-    def _see_pulled(self, index: float, table_m: float, is_tick: bool) -> None:
+    def _on_pulled(self, index: float, table_m: float, is_tick: bool) -> None:
         self._farthest_m = max(self._farthest_m, abs(table_m - self._zero_m()))
         if self._hold is not None and self._hold.detect_release(table_m):
             self._release(self._hold, index)
         elif is_tick and not (self._hold is not None and self._hold.is_leaving):
-            self._watch_pull(index)
+            self._check_hold(index)
 
-    def _watch_pull(self, index: float) -> None:
+    def _check_hold(self, index: float) -> None:
         level = self._still(_HOLD_S)
         if level is None:
             self._lose_hold(index)
@@ -234,13 +236,13 @@ class PullbackStateMachine:
             if pulled_m > _PULLED * self._plan.nominal_m:
                 self._keep_hold(index, level)
             elif pulled_m < _BACK * self._noticed_m():
-                self._come_back(index)
+                self._on_returned(index)
 
     def _lose_hold(self, index: float) -> None:
         self._hold = None
         if self.state is not PullbackState.PULLING:
             self._moved_at = index
-            self._turn(PullbackState.PULLING, index)
+            self._enter(PullbackState.PULLING, index)
 
     def _keep_hold(self, index: float, level: StationaryLevel) -> None:
         facts = self.measurement
@@ -252,10 +254,10 @@ class PullbackStateMachine:
         state = self._state_of(self._hold, index)
         if state is not self.state:
             is_held_first = state is PullbackState.HELD and self.state is PullbackState.PULLING
-            self._turn(state, self._hold.since if is_held_first else index)
+            self._enter(state, self._hold.since if is_held_first else index)
 
     def _state_of(self, hold: Hold, index: float) -> PullbackState:
-        """How good a hold is: far enough, and then steady and long enough."""
+        """State of a hold: PULLING until it is far enough, ARMED when it is steady and long enough."""
         if abs(self._off_m()) > self._plan.hold_tolerance_m * self._leeway():
             return PullbackState.PULLING
         is_settled = index - hold.start >= self._span(_STEADY_S) and index >= self._filled_index
@@ -263,20 +265,20 @@ class PullbackStateMachine:
         return PullbackState.ARMED if is_ready else PullbackState.HELD
 
     def _hold_drift_m_per_s(self, hold: Hold, index: float) -> float:
-        """How fast a hold drifts, 0 if hardly; the longer it lasts, the less is hidden in the noise."""
+        """Drift of a hold, 0 if small; the longer it lasts, the less is hidden in the noise."""
         is_long = index - hold.start > self._span(_DRIFT_S + _STEADY_S)
         bound_m_per_s = _DRIFT_M_PER_S * (_DRIFT_LEEWAY if self.state is PullbackState.ARMED else 1.0)
-        return self._readings.table_drift_m_per_s(_DRIFT_S if is_long else _STEADY_S, bound_m_per_s)
+        return self._readings.table.drift_m_per_s(_DRIFT_S if is_long else _STEADY_S, bound_m_per_s)
 
     def _leeway(self) -> float:
         return 1.0 if self.state is PullbackState.PULLING else _LEEWAY
 
     def _off_m(self) -> float:
-        """How much further (m) the table is pulled than wanted; 0 where nothing is."""
+        """Distance (m) by which the table is pulled beyond the target; 0 without one."""
         wanted_m = self._plan.target_m
         return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
-    def _come_back(self, index: float) -> None:
+    def _on_returned(self, index: float) -> None:
         """The table is where it was before the pull."""
         was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m
         self._is_pulled = False
@@ -284,15 +286,15 @@ class PullbackStateMachine:
         self._farthest_m = 0.0
         self._rest.reset()
         if was_pulled or self.state is not PullbackState.PULLING:
-            self._turn(PullbackState.ZERO, index, operator_messages.NOT_HELD_NOTE)
+            self._enter(PullbackState.ZERO, index, operator_messages.NOT_HELD_NOTE)
 
     def _release(self, hold: Hold, index: float) -> None:
         remark = self._remark(hold, index)
         self._free = FreeMotion(self._plan, self._readings, self.measurement, hold, index, remark)
-        self._turn(PullbackState.RELEASED, self.measurement.release_index or index)
+        self._enter(PullbackState.RELEASED, self.measurement.release_index or index)
 
     def _remark(self, hold: Hold, index: float) -> Message:
-        """What there is to say of a release that came before it was armed."""
+        """Remark on a release that came before the hold was armed."""
         if self.state is PullbackState.ARMED:
             return EMPTY
         if self.state is PullbackState.PULLING and self._plan.target_m is not None:
@@ -301,81 +303,79 @@ class PullbackStateMachine:
 
     # --- released ---
 
-    def _see_free(self, free: FreeMotion, bins: BinAverages, is_tick: bool) -> None:
-        for turn in free.update(bins, self._binning.samples_per_bin, is_tick):
-            if turn.state is PullbackState.PULLING:
+    def _on_free(self, free: FreeMotion, bins: BinAverages, is_tick: bool) -> None:
+        for transition in free.update(bins, self._binning.samples_per_bin, is_tick):
+            if transition.state is PullbackState.PULLING:
                 self._hold = self._free = None
                 self._moved_at = bins.center[-1].item()
-                self._farthest_m = 0.0  # it was said that the table was let down: say nothing more of that
-            self._take_turn(turn)
+                self._farthest_m = 0.0  # the note says that the table was let down; no second one
+            self._add(transition)
 
     # --- in any state ---
 
     def _keep_time(self, end_index: int) -> None:
-        """End the test where a time is over, at the very sample; before that, say what it waits for."""
+        """End the test at the sample at which a time is over; before that, say what it waits for."""
         if self.measurement.release_confirmed and self.measurement.release_index is not None:
             wanted_s, reason = self._plan.duration_s, EndReason.DURATION
             if wanted_s is None:
                 wanted_s, reason = self._plan.enough_s, EndReason.ENOUGH
             last_index = self.measurement.release_index + round(self._span(wanted_s))
-            if end_index >= last_index and not self.has_ended:
-                self._take_turn(Transition(PullbackState.CLOSING, last_index, end_reason=reason))
+            if end_index >= last_index and self.state is not PullbackState.CLOSING:
+                self._add(Transition(PullbackState.CLOSING, last_index, end_reason=reason))
         elif self.state in _WAITING:
             self._keep_waiting(end_index)
 
     def _keep_waiting(self, end_index: int) -> None:
-        if end_index >= self._patience.end_index:
+        if end_index >= self._timeout_index:
             note = operator_messages.timeout_note(self.state, self._plan.trigger_timeout_s)
-            last_index = round(self._patience.end_index)
-            ending = EndReason.TRIGGER_TIMEOUT
-            self._take_turn(
-                Transition(PullbackState.CLOSING, last_index, note, is_stored=True, end_reason=ending)
-            )
+            reason = EndReason.TRIGGER_TIMEOUT
+            self._add(Transition(PullbackState.CLOSING, round(self._timeout_index), note, True, reason))
             return
-        hints = (self._hint(end_index), self._patience.warning(end_index))
-        for kind, hint in enumerate(hints):
+        is_late = end_index >= self._timeout_index - self._span(self._warning_s)
+        warning = operator_messages.timeout_warning(self._warning_s) if is_late else EMPTY
+        for kind, hint in enumerate((self._hint(end_index), warning)):
             if hint and kind not in self._hinted:
                 self._hinted.add(kind)
-                self._turns.append(Transition(self.state, end_index, hint))
+                self._transitions.append(Transition(self.state, end_index, hint))
 
     def _hint(self, now: float) -> Message:
-        """Why it does not go on by itself, where that may not be seen."""
-        if now - self._turned_at < self._span(operator_messages.HINT_AFTER_S):
+        """Reason why the test does not proceed, where the operator may not see it."""
+        if now - self._entered_at < self._span(_HINT_AFTER_S):
             return EMPTY
         if self.state is PullbackState.ZERO:
-            is_silent = self._patience.is_silent(self._seen_at, now)
+            is_silent = now - self._last_reading > self._span(_SILENT_S)
             return operator_messages.NO_READING_NOTE if is_silent else operator_messages.RESTLESS_NOTE
         if self.state is PullbackState.HELD:
-            drift_m_per_s = self._readings.table_drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
+            drift_m_per_s = self._readings.table.drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
             if drift_m_per_s or now >= self._filled_index:
                 return operator_messages.drift_hint(drift_m_per_s)
             return operator_messages.filling_hint(self._plan.pretrigger_s)
         return EMPTY
 
-    def _turn(
-        self, state: PullbackState, index: float, note: Message = EMPTY, *, is_kept: bool = False
+    def _enter(
+        self, state: PullbackState, index: float, note: Message = EMPTY, *, is_stored: bool = False
     ) -> None:
-        self._take_turn(Transition(state, round(index), note, is_kept))
+        self._add(Transition(state, round(index), note, is_stored))
 
-    def _take_turn(self, turn: Transition) -> None:
-        if turn.state is not self.state:
-            self.state = turn.state
-            self._turned_at = turn.index
+    def _add(self, transition: Transition) -> None:
+        if transition.state is not self.state:
+            self.state = transition.state
+            self._entered_at = transition.index
             self._hinted.clear()
-        self._turns.append(turn)
+        self._transitions.append(transition)
 
     def _still(self, duration_s: float) -> StationaryLevel | None:
-        level = self._readings.stationary_table(duration_s, _CREEP * self._plan.nominal_m)
+        level = self._readings.table.stationary(duration_s, _CREEP * self._plan.nominal_m)
         if level is not None:
             self._noise_m = level.noise_m
         return level
 
     def _reference(self, index: float) -> HoldReference:
-        relative = self._readings.relative(_HOLD_S)[:, 1]
+        relative = self._readings.relative.latest(_HOLD_S)[:, 1]
         noise = noise_m(relative)
-        mean_m = self._readings.relative_mean(_REFERENCE_S, index)
-        count = max(1, len(self._readings.relative(_REFERENCE_S)))
-        table_m = float(self._readings.table(_REFERENCE_S)[:, 1].mean())
+        mean_m = self._readings.relative.mean(_REFERENCE_S, index)
+        count = max(1, len(self._readings.relative.latest(_REFERENCE_S)))
+        table_m = float(self._readings.table.latest(_REFERENCE_S)[:, 1].mean())
         return HoldReference(table_m, mean_m, noise, noise / math.sqrt(count))
 
     def _span(self, duration_s: float) -> float:

@@ -1,7 +1,6 @@
 """When a run begins and ends: by the pullback, or at once and by the clock."""
 
 from dataclasses import replace
-from typing import Protocol
 
 from app.acquisition.messages import EndReason, PullbackState, RunSettings, StandPosition
 from app.acquisition.pullback.operator_messages import no_room_note
@@ -9,7 +8,7 @@ from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Tra
 from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.acquisition.stream.live_stream import ReadHistory
 from app.runs.blocks import CalibratedBlock
-from messages.message import EMPTY, Message
+from messages.message import EMPTY
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (
@@ -20,67 +19,24 @@ _SEEN_WITHOUT_TRIGGER = (
 )
 
 
-class Trigger(Protocol):
-    """Says from which sample to which a run goes."""
+class Trigger:
+    """Decides from which sample to which a run goes. This one records without waiting for a release.
 
-    @property
-    def measurement(self) -> PullbackMeasurement:
-        """What was found of the pullback."""
-
-    @property
-    def state(self) -> PullbackState:
-        """Where the run stands."""
-
-    @property
-    def position(self) -> StandPosition:
-        """Where table and plate stand."""
-
-    @property
-    def note(self) -> Message:
-        """What there is to say beforehand."""
-
-    @property
-    def start_index(self) -> int | None:
-        """First sample to store; None before that is known."""
-
-    @property
-    def end(self) -> tuple[int, EndReason] | None:
-        """Sample before which the run ends, and why; None before that is known."""
-
-    @property
-    def is_unattended(self) -> bool:
-        """Tell whether the run comes to its end without anybody at the stand."""
-
-    @property
-    def awaits_release(self) -> bool:
-        """Tell whether a release that somebody waits for may come at any moment, or be confirmed."""
-
-    @property
-    def is_at_rest(self) -> bool:
-        """Tell whether nothing has happened yet that would be worth keeping."""
-
-    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
-        """Take the samples that come next, from arming on; return the new states."""
-
-
-class PullbackTrigger:
-    """From `pretrigger_s` before the release, to the sample, until rest, enough or `duration_s` after it."""
+    It starts with the first sample after arming and ends after `duration_s`, or when stopped. A release is
+    reported like any other; nothing is asked of the operator.
+    """
 
     def __init__(
         self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
     ) -> None:
-        self._before = round(settings.pretrigger_s * plan.rate_hz)
-        waits = replace(
-            plan,
-            duration_s=settings.duration_s,
-            trigger_timeout_s=settings.trigger_timeout_s,
-            tolerance_m=settings.pullback_tolerance_m,
-            pretrigger_s=settings.pretrigger_s,
-            first_index=history.first_index,
-        )
-        self._test = armed_test(waits, armed_index, history)
-        self.note = no_room_note(waits)
+        self._test = armed_test(plan, armed_index, history)
+        self._armed_index = armed_index
+        self.note = EMPTY
+        """Remark before the run begins."""
         self.end: tuple[int, EndReason] | None = None
+        """Sample before which the run ends, and why; None before that is known."""
+        if settings.duration_s is not None:
+            self.end = armed_index + round(settings.duration_s * plan.rate_hz), EndReason.DURATION
 
     @property
     def measurement(self) -> PullbackMeasurement:
@@ -89,7 +45,62 @@ class PullbackTrigger:
 
     @property
     def state(self) -> PullbackState:
-        """Where the test stands."""
+        """State of the run."""
+        return PullbackState.RECORDING
+
+    @property
+    def position(self) -> StandPosition:
+        """Where table and plate stand."""
+        return StandPosition()
+
+    @property
+    def start_index(self) -> int | None:
+        """First sample to store; None before that is known."""
+        return self._armed_index
+
+    @property
+    def is_unattended(self) -> bool:
+        """Tell whether the run comes to its end without anybody at the stand."""
+        return self.end is not None
+
+    @property
+    def awaits_release(self) -> bool:
+        """Tell whether a release that somebody waits for may come at any moment, or be confirmed."""
+        return False
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether nothing has happened yet that would be worth keeping."""
+        return False
+
+    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
+        """Take the samples that come next, from arming on; return the new states."""
+        transitions = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
+        return [replace(one, note=EMPTY) for one in transitions if one.state in _SEEN_WITHOUT_TRIGGER]
+
+
+class PullbackTrigger(Trigger):
+    """From `pretrigger_s` before the release, to the sample, until rest, enough or `duration_s` after it."""
+
+    def __init__(
+        self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
+    ) -> None:
+        plan = replace(
+            plan,
+            duration_s=settings.duration_s,
+            trigger_timeout_s=settings.trigger_timeout_s,
+            tolerance_m=settings.pullback_tolerance_m,
+            pretrigger_s=settings.pretrigger_s,
+            first_index=history.first_index,
+        )
+        super().__init__(settings, plan, armed_index, history)
+        self._pretrigger = round(settings.pretrigger_s * plan.rate_hz)
+        self.note = no_room_note(plan)
+        self.end = None
+
+    @property
+    def state(self) -> PullbackState:
+        """State of the test."""
         return self._test.state
 
     @property
@@ -99,80 +110,45 @@ class PullbackTrigger:
 
     @property
     def start_index(self) -> int | None:
-        """Known once the release is sure."""
+        """First sample to store; known once the release is confirmed."""
         if not self.measurement.release_confirmed or self.measurement.release_index is None:
             return None
-        return self.measurement.release_index - self._before
+        return self.measurement.release_index - self._pretrigger
 
     @property
     def is_unattended(self) -> bool:
-        """After the release."""
+        """Tell whether the release is confirmed."""
         return self.measurement.release_confirmed
 
     @property
     def awaits_release(self) -> bool:
-        """From the hold on until the release is sure."""
+        """Tell whether the table is held, or the release is not confirmed yet."""
         return self._test.awaits_release
 
     @property
     def is_at_rest(self) -> bool:
-        """Before the pull."""
+        """Tell whether the table has not been pulled back yet."""
         return self._test.is_at_rest
 
     def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
-        """Take the samples that come next; return the new states. The end itself is told by `end`."""
-        turns = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
-        for turn in turns:
-            if turn.end_reason is not None:
-                self.end = turn.index, turn.end_reason
-        return turns
-
-
-class NoTrigger:
-    """From the first sample after arming for `duration_s`, or until told to stop.
-
-    A release in it is told like any other; nothing is asked of the operator.
-    """
-
-    def __init__(
-        self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
-    ) -> None:
-        self.state = PullbackState.RECORDING
-        self.position = StandPosition()
-        self.note = EMPTY
-        self.is_at_rest = self.awaits_release = False
-        self.start_index: int | None = armed_index
-        self.end: tuple[int, EndReason] | None = None
-        if settings.duration_s is not None:
-            self.end = armed_index + round(settings.duration_s * plan.rate_hz), EndReason.DURATION
-        self._test = armed_test(plan, armed_index, history)
-
-    @property
-    def measurement(self) -> PullbackMeasurement:
-        """What was found of the pullback."""
-        return self._test.measurement
-
-    @property
-    def is_unattended(self) -> bool:
-        """When it ends by the clock."""
-        return self.end is not None
-
-    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
-        """Take the samples that come next; return the new states."""
-        turns = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
-        return [replace(turn, note=EMPTY) for turn in turns if turn.state in _SEEN_WITHOUT_TRIGGER]
+        """Take the samples that come next; return the new states. The last one sets `end`."""
+        transitions = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
+        for one in transitions:
+            if one.end_reason is not None:
+                self.end = one.index, one.end_reason
+        return transitions
 
 
 def create_trigger(
     settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
 ) -> Trigger:
-    """The trigger that the settings ask for."""
-    kind = NoTrigger if settings.trigger == "none" else PullbackTrigger
+    """Create the trigger that the settings ask for."""
+    kind = Trigger if settings.trigger == "none" else PullbackTrigger
     return kind(settings, plan, armed_index, history)
 
 
 def armed_test(plan: PullbackPlan, armed_index: int, history: ReadHistory) -> PullbackStateMachine:
-    """A test that knows the second before it was armed, unless the table was not at rest then."""
+    """Create a test that knows the second before it was armed, unless the table was not at rest then."""
     test = PullbackStateMachine(plan, armed_index)
     earliest = armed_index - round(_CONTEXT_S * plan.rate_hz)
     for chunk in history.reads():

@@ -43,7 +43,7 @@ def follow(plan: PullbackPlan, table, relative, block=None, first_index=0):
         new = test.add_samples(first_index + start, table[start:end], relative[start:end])
         turns += new
         known += [first_index + end] * len(new)
-        if test.has_ended:
+        if test.state is PullbackState.CLOSING:
             break
     return test, turns, known
 

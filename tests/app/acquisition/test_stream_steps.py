@@ -7,8 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.acquisition.pullback.averages import BinAverager
-from app.acquisition.pullback.stationarity import SlidingWindow, fit_parabola_start, noise_m, stationary_level
+from app.acquisition.pullback.averages import (
+    BinAverager,
+    SlidingWindow,
+    fit_parabola_start,
+    noise_m,
+    stationary_level,
+)
 from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, losses_between
 from app.runs.blocks import calibrate
 from config.files import load_gauges
@@ -54,7 +59,7 @@ def test_noise_is_measured_through_slow_motion_and_jumps():
 
 
 def test_a_stretch_forgets_and_finds():
-    stretch, index = SlidingWindow(span=10.0, spacing=1.0), np.arange(1000.0)
+    stretch, index = SlidingWindow(10.0, spacing=1.0), np.arange(1000.0)
     for start, end in itertools.pairwise([0, *range(1, 500), 502, 509, 520, 533, 633, 640, 1000]):
         stretch.add(index[start:end], index[start:end] * 2.0)
         assert stretch.latest(10.0)[-1].tolist() == [end - 1, (end - 1) * 2.0]
