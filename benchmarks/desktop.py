@@ -28,7 +28,7 @@ from app.acquisition.ring import RingRows
 from app.presenters.composition import make_window_presenter
 from app.presenters.record.live_traces import LiveTraces
 from app.presenters.record.state import Action
-from app.presenters.window import Screen
+from app.presenters.screens import Screen
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
 from app.qt.window import MainWindow

@@ -31,6 +31,18 @@ class Presenter(Generic[State]):
         self._view = view
         view.show_state(self.state)
 
+    def enter(self) -> None:
+        """React to the screen being shown."""
+
+    def leave(self) -> None:
+        """React to another screen being shown."""
+
+    def tick(self) -> None:
+        """Process what has come from workers and the engine; called some 60 times a second."""
+
+    def close(self) -> None:
+        """End the workers."""
+
     def _set_state(self, state: State) -> None:
         if state != self.state:
             self.state = state

@@ -3,9 +3,9 @@
 import getpass
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
@@ -24,13 +24,13 @@ from app.presenters.record.state import (
     Connecting,
     Disconnected,
     RunsChanged,
-    ScreenEntered,
     StandContext,
 )
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
+from app.presenters.screens import Screen, ScreenContext
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
@@ -43,19 +43,6 @@ from messages.message import Message
 RECONNECT = N_("Connect again")
 ANALYSE = LazyFunction("app.presenters.analysis_task", "analyse_run")
 WARM_UP = LazyFunction("app.presenters.analysis_task", "warm_up")
-
-
-class Screen(StrEnum):
-    """All screens, in the order of the side bar."""
-
-    START = "start"
-    RECORD = "record"
-    IDENTIFY = "identify"
-    RUNS = "runs"
-    CAMPAIGN = "campaign"
-    GAUGES = "gauges"
-    STAND = "stand"
-    SETTINGS = "settings"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +80,19 @@ class Workers:
     gauges: Worker
     ports: Worker
     pool: WorkerPool = field(default_factory=WorkerPool)
+    report_error: Callable[[ErrorReport], None] = lambda _error: None
 
     @classmethod
     def sharing(cls, report_error: Callable[[ErrorReport], None]) -> "Workers":
         """Make workers that share processes, all but the analysis."""
         pool = WorkerPool()
         record, runs, batch, campaign, gauges, ports = (Worker(report_error, pool) for _ in range(6))
-        return cls(Worker(report_error), record, runs, batch, campaign, gauges, ports, pool)
+        analysis = Worker(report_error)
+        return cls(analysis, record, runs, batch, campaign, gauges, ports, pool, report_error)
+
+    def make(self) -> Worker:
+        """Make one more worker that shares the processes."""
+        return Worker(self.report_error, self.pool)
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -135,6 +128,11 @@ class WindowPresenter(Presenter[WindowState]):
         )
         self.campaign = CampaignPresenter(workers.campaign, self._folder, stand.all_series, author, self)
         self.settings = SettingsPresenter(context.personal, self._apply_settings)
+        screen_context = ScreenContext(stand, self, workers.make)
+        self.presenters: dict[Screen, Presenter[Any]] = {
+            screen: screen.make_presenter(screen_context) if screen.make_presenter else getattr(self, screen)
+            for screen in Screen
+        }
         self._apply_settings(context.personal.settings)
         if context.personal.fault:
             text = gettext("{fault}. The usual settings are used until then", fault=context.personal.fault)
@@ -143,11 +141,11 @@ class WindowPresenter(Presenter[WindowState]):
     # --- screens and notices ---
 
     def show_screen(self, screen: Screen) -> None:
-        if screen is Screen.RUNS:
-            self.runs.refresh()
-        elif screen is Screen.CAMPAIGN:
-            self.campaign.refresh()
-        self._show(screen)
+        before, entered = self.presenters[self.state.screen], self.presenters[screen]
+        if entered is not before:
+            before.leave()
+        entered.enter()
+        self._update(screen=screen)
 
     def dismiss_notice(self) -> None:
         self._update(notice=None)
@@ -181,7 +179,7 @@ class WindowPresenter(Presenter[WindowState]):
     def open_run(self, path: str) -> None:
         path = str(Path(path).absolute())
         self.identify.on_opening(path)
-        self._show(Screen.IDENTIFY)
+        self.show_screen(Screen.IDENTIFY)
         self._update(notice=None)
         self._workers.analysis.submit(ANALYSE, path)
 
@@ -228,20 +226,15 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=Notice(sentence(report.message), Tone.BAD, details=report.details))
         for event in self._connection.poll():
             self._on_engine_event(event)
-        self.record.tick()
-        self.gauges.tick()
-        self.stand.tick()
-        self.runs.tick()
-        self.campaign.tick()
+        for presenter in self.presenters.values():
+            presenter.tick()
         self._poll_analysis()
 
     def close(self) -> None:
         self._connection.close()
         self._workers.analysis.close()
-        self.record.close()
-        self.runs.close()
-        self.campaign.close()
-        self.gauges.close()
+        for presenter in self.presenters.values():
+            presenter.close()
         self._workers.pool.close()
 
     # --- inside ---
@@ -260,19 +253,9 @@ class WindowPresenter(Presenter[WindowState]):
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
-        self._show(Screen.RECORD)
+        self.show_screen(Screen.RECORD)
         self._update(notice=None)
         open_it()
-
-    def _show(self, screen: Screen) -> None:
-        """Show a screen; Gauges works only while it is shown."""
-        if screen is Screen.GAUGES:
-            self.gauges.enter()
-        else:
-            self.gauges.leave()
-        if screen is Screen.RECORD:
-            self.record.dispatch(ScreenEntered())
-        self._update(screen=screen)
 
     def _refuse_while_recording(self) -> bool:
         if self.record.is_recording:

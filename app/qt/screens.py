@@ -1,12 +1,13 @@
-"""Factory of screens. A screen is imported when it is first shown: screens with plots load pyqtgraph."""
+"""Factory of screens. A screen in a folder is imported when it is first shown: its plots load pyqtgraph."""
 
 import importlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from PySide6.QtWidgets import QWidget
 
-from app.presenters.window import Screen, WindowPresenter
+from app.presenters.screens import Screen
+from app.presenters.window import WindowPresenter
 from app.qt.settings_screen import SettingsScreen
 from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
@@ -16,32 +17,32 @@ if TYPE_CHECKING:
     from app.qt.window import MainWindow
 
 
-def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: "MainWindow") -> QWidget:
+def build_screen(screen: Screen, window: WindowPresenter, theme: Theme, dialogs: "MainWindow") -> QWidget:
     """Build the view of a screen, attached to its presenter."""
-    view: QWidget
+    presenter = window.presenters[screen]
+    view: Any
     match screen:
         case Screen.START:
-            view = StartScreen(presenter.start, dialogs.ask_for_run)
-        case Screen.RECORD:
-            view = _view_class("Record")(theme, presenter.record, presenter.show_start)
-        case Screen.IDENTIFY:
-            view = _view_class("Identify")(theme, presenter.identify, dialogs.ask_for_run)
-        case Screen.RUNS:
-            view = _view_class("Runs")(theme, presenter.runs, dialogs)
-        case Screen.CAMPAIGN:
-            view = _view_class("Campaign")(theme, presenter.campaign)
-        case Screen.GAUGES:
-            view = _view_class("Gauges")(theme, presenter.gauges)
+            view = StartScreen(window.start, dialogs.ask_for_run)
         case Screen.STAND:
-            view = StandScreen(presenter.stand)
+            view = StandScreen(window.stand)
         case Screen.SETTINGS:
-            view = SettingsScreen(presenter.settings)
-    getattr(presenter, screen.value).attach(view)
-    return view
+            view = SettingsScreen(window.settings)
+        case Screen.RECORD:
+            view = _view_class(screen)(theme, presenter, window.show_start)
+        case Screen.IDENTIFY:
+            view = _view_class(screen)(theme, presenter, dialogs.ask_for_run)
+        case Screen.RUNS:
+            view = _view_class(screen)(theme, presenter, dialogs)
+        case _:
+            view = _view_class(screen)(theme, presenter)
+    presenter.attach(view)
+    return cast(QWidget, view)
 
 
-def _view_class(name: str) -> Callable[..., QWidget]:
+def _view_class(screen: Screen) -> Callable[..., QWidget]:
+    """Class `<Name>Screen` of `app.qt.<name>.screen`."""
     view: Callable[..., QWidget] = getattr(
-        importlib.import_module(f"app.qt.{name.lower()}.screen"), f"{name}Screen"
+        importlib.import_module(f"app.qt.{screen}.screen"), f"{screen.capitalize()}Screen"
     )
     return view

@@ -23,7 +23,8 @@ from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.record.state import Action, PlanEdited, RunForm, StepStatus
-from app.presenters.window import Screen, WindowPresenter
+from app.presenters.screens import Screen
+from app.presenters.window import WindowPresenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions

@@ -16,7 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Notice
-from app.presenters.window import Screen, WindowPresenter, WindowState
+from app.presenters.screens import Screen
+from app.presenters.window import WindowPresenter, WindowState
 from app.qt.screens import build_screen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
@@ -28,16 +29,6 @@ from messages.i18n import N_, gettext
 
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
-_SIDE_BAR = {
-    Screen.START: (N_("Start"), "house"),
-    Screen.RECORD: (N_("Record"), "record"),
-    Screen.IDENTIFY: (N_("Identify"), "chart-line"),
-    Screen.RUNS: (N_("Runs"), "stack"),
-    Screen.CAMPAIGN: (N_("Campaign"), "table"),
-    Screen.GAUGES: (N_("Gauges"), "gauge"),
-    Screen.STAND: (N_("Stand"), "flask"),
-    Screen.SETTINGS: (N_("Settings"), "gear"),
-}
 _AT_FOOT = (Screen.SETTINGS,)
 
 
@@ -124,7 +115,7 @@ class MainWindow(QMainWindow):
         if self._help is not None:
             self._help.close()
         screen = self._shown.screen
-        title = gettext("On {screen}", screen=gettext(_SIDE_BAR[screen][0]))
+        title = gettext("On {screen}", screen=gettext(screen.label))
         groups = [
             (title, list_shortcuts(self._screens[screen])),
             (gettext("Everywhere"), list_shortcuts(self, own=True)),
@@ -152,7 +143,7 @@ class MainWindow(QMainWindow):
     def _rail_button(self, screen: Screen) -> QToolButton:
         button = QToolButton()
         button.setProperty("role", "rail")
-        button.setText(gettext(_SIDE_BAR[screen][0]))
+        button.setText(gettext(screen.label))
         button.setFont(font(TextRole.LABEL))
         button.setCheckable(True)
         button.setAutoExclusive(True)
@@ -167,14 +158,14 @@ class MainWindow(QMainWindow):
         numbers = iter(range(1, len(Screen) + 1))
         for screen, button in self._rail.items():
             key = "Ctrl+," if screen in _AT_FOOT else f"Ctrl+{next(numbers)}"
-            bind_button(button, key, gettext(_SIDE_BAR[screen][0]), self)
+            bind_button(button, key, gettext(screen.label), self)
         add_shortcut(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
         add_shortcut(self, "F1", gettext("Show these keys"), self.show_help)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         for screen, button in self._rail.items():
-            button.setIcon(icon(_SIDE_BAR[screen][1], tokens.muted, active=tokens.accent))
+            button.setIcon(icon(screen.icon, tokens.muted, active=tokens.accent))
 
     def _lay_out(self) -> None:
         rail, middle = QFrame(), QWidget()

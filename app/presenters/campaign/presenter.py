@@ -60,6 +60,9 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._undos: list[_Undo] = []
         self._collecting: CollectRuns | None = None
 
+    def enter(self) -> None:
+        self.refresh()
+
     def refresh(self) -> None:
         self._collect(save=False)
 

@@ -19,6 +19,7 @@ from app.presenters.record.state import (
     PullbackTarget,
     RecordEvent,
     RecordState,
+    ScreenEntered,
     StandContext,
     Step,
     StepStatus,
@@ -81,6 +82,9 @@ class RecordPresenter(Presenter[RecordState]):
             self._update(status_bar=self._model.status_bar, traces=self._model.live.traces)
         else:
             self._set_state(record_state(self._model))
+
+    def enter(self) -> None:
+        self.dispatch(ScreenEntered())
 
     def tick(self) -> None:
         """Take answers of the worker and new samples; to be called some 60 times a second."""

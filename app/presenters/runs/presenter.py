@@ -80,6 +80,9 @@ class RunsPresenter(Presenter[RunsState]):
         self._progress: Progress | None = None
         self._is_listing = False
 
+    def enter(self) -> None:
+        self.refresh()
+
     def refresh(self) -> None:
         if not self._is_listing:
             self._is_listing = True

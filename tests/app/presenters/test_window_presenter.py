@@ -13,9 +13,10 @@ from app.presenters.error_reports import ErrorReporter
 from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action
+from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
-from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, Screen, WindowContext, WindowPresenter
+from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, WindowContext, WindowPresenter
 
 
 class Desk:

@@ -15,7 +15,7 @@ from test_main_window import Desk
 from app.presenters.events import TaskDone
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
-from app.presenters.window import Screen
+from app.presenters.screens import Screen
 from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme

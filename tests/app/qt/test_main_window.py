@@ -29,8 +29,9 @@ from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.events import TaskDone
 from app.presenters.navigator import ConnectForm
 from app.presenters.recovery import RecoverFolder
+from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
-from app.presenters.window import Screen, WindowContext, WindowPresenter
+from app.presenters.window import WindowContext, WindowPresenter
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow

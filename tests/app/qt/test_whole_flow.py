@@ -15,7 +15,8 @@ from analysis.quantities import Quantity
 from app.presenters.composition import make_window_presenter
 from app.presenters.number_text import format_uncertain
 from app.presenters.record.state import Action
-from app.presenters.window import Screen, WindowPresenter
+from app.presenters.screens import Screen
+from app.presenters.window import WindowPresenter
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.theme import Theme
 from app.qt.window import MainWindow

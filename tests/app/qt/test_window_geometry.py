@@ -10,7 +10,7 @@ from test_main_window import Desk
 
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.runs.state import Column
-from app.presenters.window import Screen
+from app.presenters.screens import Screen
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.window_geometry import WindowGeometry, persist_layout
