@@ -261,10 +261,7 @@ class SkewStatistics:
         self._windows: deque[_Window] = deque(maxlen=_MAX_SKEW_WINDOWS)
 
     def add(self, first_index: int, lag_s: Floats, scatter_s: float) -> None:
-        """Add the lags of consecutive rows (n,), NaN where a reading is missing.
-
-        `scatter_s` is the scatter of the arrivals of both devices (s).
-        """
+        """Add lags of consecutive rows (n,), NaN for a missing reading, and the scatter of arrivals (s)."""
         numbers = (first_index + np.arange(len(lag_s))) // self._rows
         is_known = np.isfinite(lag_s)
         for number in np.unique(numbers[is_known]).tolist():

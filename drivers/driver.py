@@ -95,11 +95,7 @@ class DeviceDriver:
         return explain(received) if explain else None
 
     def single_gauge_settings(self, gauge: str, settings: Mapping[str, str]) -> tuple[dict[str, str], int]:
-        """Settings of a device that has only this gauge, and the column of its readings.
-
-        Raises SettingsError for a device that has both gauges on one port, or settings that contradict a
-        single gauge.
-        """
+        """Settings of a device with only this gauge, and the column of its readings. Raises SettingsError."""
         if self.single_gauge is not None:
             own = self.single_gauge is SingleGauge.OWN_COLUMN
             return (

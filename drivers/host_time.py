@@ -34,10 +34,7 @@ def suspended_ns() -> int:
 
 
 class ActiveTimer:
-    """Time during which this process was running; time in which it stood still is left out.
-
-    More than `longest_step_s` between two calls means that the process stood still.
-    """
+    """Time during which this process ran; more than `longest_step_s` between two calls does not count."""
 
     def __init__(self, longest_step_s: float) -> None:
         self._longest_step_ns = longest_step_s * 1e9

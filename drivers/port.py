@@ -230,10 +230,7 @@ class Port:
         return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")
 
     def configure(self, line_settings: LineSettings) -> None:
-        """Change baud rate and parity and discard unread bytes.
-
-        Raises SettingsError if the port cannot be set so. Raises DeviceLostError if the port is gone.
-        """
+        """Change the settings and discard unread bytes. Raises SettingsError, DeviceLostError."""
         try:
             self._wire.baudrate, self._wire.parity = line_settings.baud, line_settings.parity
         except PLATFORM_ERRORS as error:
@@ -324,10 +321,7 @@ class PortUser:
 
 
 def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
-    """Programs that have `device` open, as far as the system tells: Linux does, for the same user.
-
-    `processes` is the process folder of Linux; it need not exist.
-    """
+    """Programs that have `device` open, as far as Linux tells it to the same user; none elsewhere."""
     if "://" in device:
         return []
     target = os.path.realpath(device)

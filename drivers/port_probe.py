@@ -165,10 +165,7 @@ def query_identity(
     queries: Iterable[tuple[str, IdentityQuery]] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> ListenResult | None:
-    """Ask the question of one device after the other, by default of all, until one is answered.
-
-    Raises DeviceLostError if the port is gone.
-    """
+    """Ask one question after the other, by default of all devices. Raises DeviceLostError."""
     for protocol, query in queries or identity_queries():
         for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
             if link.has_baud:

@@ -86,10 +86,7 @@ def rate_from_count(samples: int, duration_s: float | None) -> float | None:
 
 
 def describe_unreadable(received: bytes, protocol: str, baud: int | None = None) -> Message:
-    """Say what came instead of good data of `protocol` (usual baud rate `baud`), and what to do.
-
-    Envelopes of the host are removed first.
-    """
+    """Say what came instead of good data of `protocol` (usual rate `baud`), and what to do."""
     received = b"".join(read.data for read in Unwrapper().feed(received)) or received
     if not received:
         return message("nothing came, check cable and power, and that the device is sending")
@@ -103,10 +100,7 @@ def describe_unreadable(received: bytes, protocol: str, baud: int | None = None)
 
 
 def describe_unrecognised(received: bytes, *, has_baud: bool) -> Message:
-    """Say what bytes look like that no device folder knows, and what to do.
-
-    `has_baud`: all likely baud rates of the port were tried; else the port has none.
-    """
+    """Say what unknown bytes look like (at all baud rates, if the port has any), and what to do."""
     return message(
         "{count} bytes came, first {first}, which no built protocol knows{remedy}",
         count=len(received),

@@ -49,10 +49,7 @@ class Decoder(Protocol):
 
 
 class StreamSource(SampleSource):
-    """A `SampleSource` around a decoder that needs to know the rate.
-
-    `identity` holds until the device reports its own; `rate_hz` is None where it is not known beforehand.
-    """
+    """A `SampleSource` around a decoder that needs to know the rate, which is None until it is known."""
 
     timeout_s = 3.0
     """How long `start` waits for the first good data."""
@@ -95,10 +92,7 @@ class StreamSource(SampleSource):
         """Decoder, once `data` (all that came so far) tell what it needs to know."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Samples completed by `data`, see `SampleSource`.
-
-        Raises NoDataError if a megabyte did not tell what a decoder needs to know.
-        """
+        """See `SampleSource`. Raises NoDataError if a megabyte does not show what a decoder needs to know."""
         if not data and self._decoder is not None:
             self._decoder.expect_restart()
         data, self._pending = self._pending + data, b""
@@ -114,10 +108,7 @@ class StreamSource(SampleSource):
     def await_data(
         self, link: Link, timeout_s: float, is_good: Callable[[bytes], bool]
     ) -> tuple[bytes, bool]:
-        """Read until all that came is good, or for `timeout_s`; returns what came and whether it is good.
-
-        Time in which this computer stands still does not count.
-        """
+        """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good."""
         received, now_s = b"", time.monotonic()
         deadline_s = now_s + max(timeout_s, _MIN_WAIT_S)
         while now_s < deadline_s:
@@ -171,10 +162,7 @@ class StreamSource(SampleSource):
 
 
 def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) -> _Settings:
-    """Device settings, given as text, as the driver's typed struct.
-
-    Raises SettingsError if a key is unknown or a value cannot be read.
-    """
+    """Device settings, given as text, as the driver's typed struct. Raises SettingsError."""
     allowed = [field.name for field in msgspec.structs.fields(kind)]
     unknown = next((key for key in given if key not in allowed), None)
     if unknown is not None and allowed:
@@ -248,12 +236,8 @@ class BatchedReader:
     def read(self, link: Link, batch_delay_s: float) -> bytes:
         """What came, or comes within the next 50 ms; b"" if nothing.
 
-        Raises DeviceLostError if the port is gone. What came before it is returned by the call before.
-
-        Parameters
-        ----------
-        batch_delay_s : float
-            How long bytes may collect (s); less where they would be too many for the port.
+        Bytes collect for `batch_delay_s`, or less where they would be too many for the port. Raises
+        DeviceLostError if the port is gone. What came before it is returned by the call before.
         """
         parts: list[bytes] = []
         try:
@@ -343,16 +327,9 @@ class ReaderEnd:
 class PortReader:
     """Thread that reads a device, stamps what came, and hands it on; nothing else.
 
-    Parameters
-    ----------
-    read : callable
-        Waits shortly and returns what came, b"" if nothing; `SampleSource.read` of an open port. Raises
-        DeviceLostError.
-    sink : callable (arrival_ns, data)
-        Takes each read with the host's time after it (ns, `host_time.host_ns`); must not wait. Raises
-        `QueueFullError` when it cannot take more.
-    on_end : callable (ReaderEnd)
-        Called once from the thread, as its last act.
+    `read` is `SampleSource.read` of an open port. `sink` takes the host's time after each read (ns,
+    `host_time.host_ns`) and the bytes; it must not wait, and raises `QueueFullError` when it cannot take
+    more. `on_end` is called once from the thread, as its last act.
     """
 
     def __init__(

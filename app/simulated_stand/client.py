@@ -48,10 +48,7 @@ decode_stand_event: Callable[[bytes], StandEvent] = json_decoder(StandEvent)
 
 
 class SimulatedStand:
-    """A simulated stand in a process of its own, which lives no longer than the process that started it.
-
-    Make it with `SimulatedStand.start`; use it in a `with` statement, or call `stop`.
-    """
+    """A simulated stand in its own process, which ends with this one; a context manager, made by `start`."""
 
     _READY_S = 120.0
     """A first start compiles the solver."""
@@ -72,10 +69,7 @@ class SimulatedStand:
 
     @classmethod
     def start(cls, options: SimulatedStandOptions) -> Self:
-        """Start the process and wait until its port can be opened.
-
-        Raises SimulatedStandError if it cannot be set up as asked, or does not get ready.
-        """
+        """Start the process and wait until its port can be opened. Raises SimulatedStandError."""
         return cls(spawn("app.simulated_stand", msgspec.json.encode(options).decode()))
 
     @property
@@ -94,21 +88,13 @@ class SimulatedStand:
         return self._child.is_running
 
     def truth(self) -> Truth:
-        """The truth as last told: at each turn of events, and when stopped.
-
-        Turns are the start and end of a stream, a release, a disturbance and a port that goes or comes.
-        """
+        """The truth at the last change (stream, release, disturbance, port), and after `stop` all of it."""
         if self._truth is None:
             raise SimulatedStandError("the simulated stand has not started")
         return self._truth
 
     def disturb(self, text: str) -> None:
-        """Let something happen to the device now, or at a time: `unplug 1.5`, `stall`, `jump -5 at 3`.
-
-        It happens within some milliseconds; `truth` tells when it did. Raises SettingsError if `text` is not
-        as `drivers.simulated.faults.parse_disturbance` wants it. Raises SimulatedStandError if the stand has
-        ended.
-        """
+        """Disturb the device now or later: `unplug 1.5`, `jump -5 at 3`. Raises DriverError."""
         parse_disturbance(text)
         if not self._child.is_running:
             raise SimulatedStandError(

@@ -97,10 +97,7 @@ def _smooth(x: Floats) -> Floats:
 
 
 def stand_truth(options: SimulatedStandOptions, stand: Stand) -> StandTruth:
-    """Parameters of the chosen series, with what the options change.
-
-    Raises ConfigError if the series is not one of the stand or has no row in Table 1.
-    """
+    """Parameters of the chosen series, with what the options change. Raises ConfigError."""
     series = stand.series(options.series)
     row = published_row(series.code)
     friction = _or(options.friction, row.friction_dynamic)

@@ -116,10 +116,7 @@ class SimulatedGauge:
         self._limit_m = min(self._range_m, faults.clip_m or math.inf)
 
     def read(self, displacement_m: Floats, drifting_s: Floats) -> tuple[Int32s, Flags]:
-        """Counts (n,) for true displacements (n,), and where the gauge is overloaded.
-
-        `drifting_s` is for how long the zero has crept (s).
-        """
+        """Counts (n,) for displacements (n,) with a zero that creeps for `drifting_s`, and overloads (n,)."""
         faults = self._faults
         shown = displacement_m + faults.drift_m_per_s * drifting_s
         if faults.nonlinearity_m:

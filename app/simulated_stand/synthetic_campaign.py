@@ -118,10 +118,7 @@ def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> SystematicErrors:
 def plan_tests(
     options: CampaignOptions, stand: Stand, gauges: Gauges, folder: Path, first: datetime.datetime
 ) -> list[SyntheticTest]:
-    """The tests of a campaign in the order of the paper's table, one series after the other.
-
-    Raises ConfigError where a series is not one of the stand, or not in Table 1.
-    """
+    """The tests of a campaign, series after series in the order of Table 1. Raises ConfigError."""
     errors = draw_errors(stand, gauges, options.seed)
     drawn = {
         "gain_error_table": errors.gains[0],

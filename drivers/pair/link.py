@@ -68,11 +68,7 @@ class PairLink:
         return " + ".join(reader.info.device for reader in self._readers)
 
     def read(self) -> bytes:
-        """Wait at most 50 ms for the first envelope and return all that wait.
-
-        Raises DeviceLostError if one of the devices was not back within 10 s. Raises QueueFullError if
-        thousands of reads wait. Raises DriverError if one of them could not be started.
-        """
+        """Wait at most 50 ms for the first envelope and return all that wait. Raises DriverError."""
         failure = next(filter(None, (reader.failure for reader in self._readers)), None)
         if failure is not None and self._is_ending:
             raise failure
@@ -103,11 +99,7 @@ def open_pair(
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
-    """Open both ports and start both devices.
-
-    `lost` is what the ports were before the link was lost. Raises DriverError if one of them cannot be
-    opened.
-    """
+    """Open both ports, as they were before the link was `lost`, and start both. Raises DriverError."""
     ports: list[OpenPort] = []
     try:
         for gauge, config in enumerate(configs):

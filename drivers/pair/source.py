@@ -100,10 +100,7 @@ class PairSource(SampleSource):
             channel.source.prepare()
 
     def start(self, link: Link) -> bytes:
-        """Wait until both devices have sent something; the link starts them.
-
-        Raises NoDataError if one of them sends nothing. Raises DriverError as its own source raises it.
-        """
+        """Wait until both devices have sent something; the link starts them. Raises NoDataError."""
         received, unwrapper = b"", Unwrapper()
         silent = set(range(len(self.channel_sources)))
         waited = ActiveTimer(_STALL_S)
@@ -122,10 +119,7 @@ class PairSource(SampleSource):
         return received
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in envelopes
-        """Rows completed by `data`, b"" where both connections broke. Exhaust it.
-
-        Raises ProtocolError if the rates are not known: the source was not started, and they were not given.
-        """
+        """Rows completed by `data`, b"" where both connections broke. Raises ProtocolError without rates."""
         if self._decoder is None:
             rates_hz = self._rates_hz
             if rates_hz is None:

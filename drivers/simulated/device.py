@@ -282,10 +282,7 @@ class PolledDevice(SimulatedDevice):
 
 
 class RegisterUpdater:
-    """Takes samples at their rate into the registers of a polled device; its `Stream`.
-
-    The log counts its samples; its answers are counted as frames by the device.
-    """
+    """Takes samples at their rate into the registers of a polled device, and counts them; its `Stream`."""
 
     _INTERVAL_S = 0.02
 

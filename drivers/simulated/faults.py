@@ -166,10 +166,7 @@ _PATTERN = re.compile(rf"({_KINDS})(?:\s+({_NUMBER}))?(?:\s+at\s+({_NUMBER}))?",
 
 
 def parse_disturbance(text: str) -> Disturbance:
-    """Parse `KIND [SECONDS] [at SECONDS]`, for example `unplug 1.5`, `stall`, `jump -5 at 3`.
-
-    Raises SettingsError for anything else.
-    """
+    """Parse `KIND [SECONDS] [at SECONDS]`: `unplug 1.5`, `stall`, `jump -5 at 3`. Raises SettingsError."""
     match = _PATTERN.fullmatch(text.strip())
     if match is None:
         raise SettingsError(
@@ -188,10 +185,7 @@ def parse_disturbance(text: str) -> Disturbance:
 
 
 class DisturbanceSchedule:
-    """All disturbances of a device, on the stand's own time.
-
-    What is planned happens in each session, at its start where it has no time.
-    """
+    """Disturbances of a device on the stand's own time; those planned happen in each session."""
 
     def __init__(self, planned: Sequence[Disturbance] = ()) -> None:
         self._planned = tuple(replace(one, at_s=one.at_s or 0.0) for one in planned)

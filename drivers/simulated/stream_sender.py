@@ -125,10 +125,7 @@ class DeviceClock:
 
 
 class StreamSender:
-    """Sends the samples of one stream at their time.
-
-    The log is updated with every frame. `started_ns` is the host's monotonic time of sample 0.
-    """
+    """Sends the samples of one stream at their time, sample 0 at the host's monotonic `started_ns`."""
 
     _STEP_S = 0.001
     _CATCH_UP = 1.25

@@ -40,10 +40,7 @@ _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
 @dataclass(frozen=True, slots=True)
 class LineFormat:
-    """Columns of a line and how they are written.
-
-    Raises SettingsError if the attributes contradict each other.
-    """
+    """Columns of a line and how they are written. Raises SettingsError if they contradict each other."""
 
     columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
     """From left to right: `table` and `relative` once each, or `value` once of a device with one gauge; at

@@ -44,10 +44,7 @@ _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
 
 @dataclass(frozen=True, slots=True)
 class FrameLayout:
-    """What all measurement frames of a stream have in common.
-
-    Raises ProtocolError if a gauge's channel is not in the frame.
-    """
+    """What all measurement frames of a stream share. Raises ProtocolError without a gauge's channel."""
 
     channels: int
     """Values in a frame, 1 to 16."""

@@ -91,10 +91,7 @@ def encode_request(code: Code, parameters: bytes = b"") -> bytes:
 
 
 def write_rate(rate_hz: float) -> bytes:
-    """Request that sets the samples a second; at most 48 kHz, the highest rate of any GSV.
-
-    Raises SettingsError for a rate out of range.
-    """
+    """Request that sets the rate. Raises SettingsError above 48 kHz, the highest rate of any GSV."""
     if not 0 < rate_hz <= 48_000:
         raise SettingsError(
             "rate {rate_hz:g} Hz cannot be set: give 1 to 48000, as the amplifier allows", rate_hz=rate_hz

@@ -59,10 +59,7 @@ def _command(code: int, parameters: bytes) -> Command:
 
 
 class SimulatedGsv(SimulatedProtocol):
-    """Sends a frame a sample. With `format=device` it sends whole numbers of 24 bits.
-
-    `SET_ZERO` makes the last reading the zero of what it sends from then on.
-    """
+    """Sends a frame a sample, with `format=device` as 24-bit integers; obeys `SET_ZERO`."""
 
     streams_on_open = True
     max_rate_hz = MAX_RATE_HZ

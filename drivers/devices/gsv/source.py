@@ -60,10 +60,7 @@ class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GsvSource(StreamSource):
-    """Conversation: stop, identify, set format, input and rate, start.
-
-    `rate_hz` None accepts the rate of the device.
-    """
+    """Conversation: stop, identify, set format, input and rate (None: that of the device), start."""
 
     stop_command = encode_request(Code.STOP)
 

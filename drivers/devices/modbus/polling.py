@@ -134,10 +134,7 @@ class PollSchedule:
 
 
 class ResponseTiming:
-    """How quickly a device answers the requests of a poll, measured in trials and during the stream.
-
-    `trials` are polls in immediate succession.
-    """
+    """How quickly a device answers, measured in trials (polls in immediate succession) and in the stream."""
 
     def __init__(self, trials: Sequence[Sequence[Transaction]]) -> None:
         durations_s = sorted(sum(transaction.duration_s for transaction in poll) for poll in trials)

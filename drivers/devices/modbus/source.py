@@ -133,10 +133,7 @@ class ModbusSource(StreamSource):
             list(decoder.feed(wrap_response(number, 0, data), 0))
 
     def start(self, link: Link) -> bytes:
-        """Wait for a response, zero the device if asked to, and choose or check the rate.
-
-        Raises ProtocolError also where the device is too slow for the rate.
-        """
+        """Wait for a response, zero the device if asked to, and choose or check the rate."""
         self.prepare()
         self._await_responses(link)
         if self._settings.zero:
@@ -152,17 +149,11 @@ class ModbusSource(StreamSource):
         return b""
 
     def set_poll_rate(self, rate_hz: float) -> None:
-        """Change the rate of polls after the start and before anything is decoded.
-
-        `rate_hz` must not be above the one of the start.
-        """
+        """Lower the rate of polls, after the start and before anything is decoded."""
         self._rate_hz, self._schedule = rate_hz, PollSchedule(rate_hz)
 
     def read(self, link: Link) -> bytes:
-        """Wait for the next poll and make it; b"" where it is not due within 50 ms, or nothing came.
-
-        Each response is wrapped with the time of measurement (`Transaction.measured_ns`).
-        """
+        """Wait for the next poll and make it; b"" where it is not due within 50 ms, or nothing came."""
         schedule, timing = self._schedule, self._timing
         if schedule is None or timing is None:
             raise ProtocolError("the device was not started: start it before it is read")
@@ -321,10 +312,7 @@ def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str
 
 
 def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, RegisterMap]:
-    """Settings of the driver, and the register map that they choose and change.
-
-    Raises SettingsError for one that is unknown or cannot be.
-    """
+    """Settings of the driver, and the register map that they choose and change. Raises SettingsError."""
     own = {key: value for key, value in settings.items() if not is_map_key(key)}
     known = {field.name for field in msgspec.structs.fields(ModbusSettings)}
     for key in own:

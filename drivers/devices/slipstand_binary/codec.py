@@ -80,10 +80,7 @@ def encode_identity(identity: FirmwareIdentity) -> bytes:
 
 
 def find_identity(received: bytes) -> FirmwareIdentity | None:
-    """The identity line in `received`, wherever it is; None while it is not complete.
-
-    Raises ProtocolError if the device has not two channels.
-    """
+    """Identity line in `received`; None while it is incomplete. Raises ProtocolError without 2 channels."""
     match = _IDENTITY.search(received)
     if match is None:
         return None
@@ -197,10 +194,7 @@ def find_frames(data: bytes) -> Records:
 
 
 def rate_from_frames(data: bytes) -> float | None:
-    """Samples a second by the device's own times; None while there are too few frames.
-
-    Only frames after the last restart of the device count.
-    """
+    """Samples a second by device times since the last restart; None while there are too few frames."""
     frames = find_frames(data)
     steps = np.diff(frames["seq"]) & _U32
     steps_us = np.diff(frames["t_us"]) & _U32
