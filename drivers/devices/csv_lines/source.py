@@ -5,16 +5,8 @@ from typing import Literal
 
 import msgspec
 
-from drivers.devices.csv_lines import DRIVER
-from drivers.devices.csv_lines.codec import (
-    LineDecoder,
-    clock_step_from_lines,
-    encode_line,
-    first_line_start,
-    has_good_line,
-    rate_from_lines,
-    whole_lines_end,
-)
+from drivers.devices.csv_lines import DRIVER, codec
+from drivers.devices.csv_lines.codec import LineDecoder
 from drivers.devices.csv_lines.columns import CHECKSUMS, DECIMALS, SEPARATORS, Column, LineFormat
 from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT, find_openscale_format, infer_columns
 from drivers.devices.csv_lines.line_parser import LineParser
@@ -98,7 +90,7 @@ class CsvLinesSource(StreamSource):
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
         layout = self._layout or LineFormat()
-        list(LineDecoder(layout, 1.0).feed(b"\n" + encode_line(layout, 0.0, 0, 0), 0))
+        list(LineDecoder(layout, 1.0).feed(b"\n" + codec.encode_line(layout, 0.0, 0, 0), 0))
 
     def start(self, link: Link) -> bytes:
         """Wait for the first good line, and with a time column for as many as show the rate.
@@ -122,7 +114,7 @@ class CsvLinesSource(StreamSource):
             )
         self._decoder = self._decoder or self.make_decoder(first + more)
         if self._decoder is None:
-            raise self._rate_error(rate_from_lines(self._layout, first + more) or 0.0)
+            raise self._rate_error(codec.rate_from_lines(self._layout, first + more) or 0.0)
         return first + more
 
     def make_decoder(self, data: bytes) -> LineDecoder | None:
@@ -135,7 +127,7 @@ class CsvLinesSource(StreamSource):
         if layout is None:
             return None
         self._check_rate(layout)
-        measured_hz = self._rate_hz if layout.time_column is None else rate_from_lines(layout, data)
+        measured_hz = self._rate_hz if layout.time_column is None else codec.rate_from_lines(layout, data)
         if measured_hz is None:
             return None
         self._rate_hz = self._rate_hz or measured_hz
@@ -143,7 +135,9 @@ class CsvLinesSource(StreamSource):
             if len(data) < _DOUBTED_BYTES:
                 return None
             raise self._rate_error(measured_hz)
-        return LineDecoder(layout, measured_hz, clock_step_from_lines(layout, data), self._overload_count)
+        return LineDecoder(
+            layout, measured_hz, codec.clock_step_from_lines(layout, data), self._overload_count
+        )
 
     def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
         """Layout of the lines in `data`, where none was given."""
@@ -159,10 +153,10 @@ class CsvLinesSource(StreamSource):
 
     def _has_good_line(self, data: bytes) -> bool:
         self._layout = self._layout or self.find_layout(data)
-        return self._layout is not None and has_good_line(self._layout, data)
+        return self._layout is not None and codec.has_good_line(self._layout, data)
 
     def _shows_rate(self, data: bytes) -> bool:
-        return self._layout is not None and rate_from_lines(self._layout, data) is not None
+        return self._layout is not None and codec.rate_from_lines(self._layout, data) is not None
 
     def _check_rate(self, layout: LineFormat) -> None:
         if self._rate_hz is None and layout.time_column is None:
@@ -230,7 +224,7 @@ def _recognise_lines(
     settings: dict[str, str],
     remark: Message = EMPTY,
 ) -> Recognition | None:
-    whole = data[first_line_start(data) : whole_lines_end(data)]
+    whole = data[codec.first_line_start(data) : codec.whole_lines_end(data)]
     lines = LineParser(layout).read(whole)
     good = lines[lines["good"] != 0]
     share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)
@@ -243,7 +237,7 @@ def _recognise_lines(
         len(good),
         layout.channels,
         settings,
-        rate_from_lines(layout, data) or rate_from_count(samples, duration_s),
+        codec.rate_from_lines(layout, data) or rate_from_count(samples, duration_s),
         layout.time_column is None,
         remark,
     )

@@ -5,21 +5,9 @@ import struct
 import numpy as np
 
 from drivers.arrays import Floats, Int32s, UInt8s
-from drivers.devices.gsv import DRIVER
-from drivers.devices.gsv.codec import FrameLayout, ValueKind, encode_frames
-from drivers.devices.gsv.commands import (
-    END,
-    LENGTH,
-    OK,
-    REQUEST,
-    SYNC,
-    UNKNOWN_COMMAND,
-    WRONG_VALUE,
-    Code,
-    InputType,
-    encode_response,
-    set_float,
-)
+from drivers.devices.gsv import DRIVER, codec, commands
+from drivers.devices.gsv.codec import FrameLayout, ValueKind
+from drivers.devices.gsv.commands import Code, InputType
 from drivers.devices.gsv.source import GsvSettings
 from drivers.samples import SampleStatus
 from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
@@ -29,26 +17,26 @@ SERIAL_NUMBER = b"15060001"
 FIRMWARE = bytes([0, 1, 0, 45])
 MAX_RATE_HZ = 48_000.0
 _MIN_REQUEST_BYTES = 4
-_FLOAT = set_float()[3:-1]
+_FLOAT = commands.set_float()[3:-1]
 _KINDS = {Code.START: CommandKind.START, Code.STOP: CommandKind.STOP, Code.WRITE_RATE: CommandKind.RATE}
 
 
 def find_commands(data: bytes) -> tuple[list[Command], int]:
     """Requests in `data`; see `SimulatedProtocol`."""
-    commands = []
-    at = data.find(SYNC)
+    found = []
+    at = data.find(commands.SYNC)
     while 0 <= at <= len(data) - _MIN_REQUEST_BYTES:
-        end = at + _MIN_REQUEST_BYTES + (data[at + 1] & LENGTH)
-        if data[at + 1] & ~LENGTH != REQUEST:
-            at = data.find(SYNC, at + 1)
+        end = at + _MIN_REQUEST_BYTES + (data[at + 1] & commands.LENGTH)
+        if data[at + 1] & ~commands.LENGTH != commands.REQUEST:
+            at = data.find(commands.SYNC, at + 1)
         elif end > len(data):
             break
-        elif data[end - 1] != END:
-            at = data.find(SYNC, at + 1)
+        elif data[end - 1] != commands.END:
+            at = data.find(commands.SYNC, at + 1)
         else:
-            commands.append(_command(data[at + 2], data[at + 3 : end - 1]))
-            at = data.find(SYNC, end)
-    return commands, at if at >= 0 else len(data)
+            found.append(_command(data[at + 2], data[at + 3 : end - 1]))
+            at = data.find(commands.SYNC, end)
+    return found, at if at >= 0 else len(data)
 
 
 def _command(code: int, parameters: bytes) -> Command:
@@ -77,24 +65,24 @@ class SimulatedGsv(SimulatedProtocol):
         self._last = counts[-1].astype(np.float64)
         overloads = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
         flags = np.where(status & overloads, np.uint8(1), np.uint8(0))
-        return [row.tobytes() for row in encode_frames(self._layout, counts - self._zero, flags)]
+        return [row.tobytes() for row in codec.encode_frames(self._layout, counts - self._zero, flags)]
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
         """Response to a request; for `GET_VALUE` a frame of the last reading."""
         match command.code:
             case Code.START | Code.STOP | Code.WRITE_RATE:
-                return encode_response(OK if is_done else WRONG_VALUE)
+                return commands.encode_response(commands.OK if is_done else commands.WRONG_VALUE)
             case Code.READ_RATE:
-                return encode_response(OK, struct.pack(">f", rate_hz))
+                return commands.encode_response(commands.OK, struct.pack(">f", rate_hz))
             case Code.SERIAL_NUMBER:
-                return encode_response(OK, SERIAL_NUMBER)
+                return commands.encode_response(commands.OK, SERIAL_NUMBER)
             case Code.FIRMWARE:
-                return encode_response(OK, FIRMWARE)
+                return commands.encode_response(commands.OK, FIRMWARE)
             case Code.GET_VALUE:
-                return encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
+                return codec.encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
             case Code.SET_FORMAT | Code.SET_ZERO | Code.SET_INPUT:
-                return encode_response(OK if self._set(command) else WRONG_VALUE)
-        return encode_response(UNKNOWN_COMMAND)
+                return commands.encode_response(commands.OK if self._set(command) else commands.WRONG_VALUE)
+        return commands.encode_response(commands.UNKNOWN_COMMAND)
 
     @property
     def _layout(self) -> FrameLayout:

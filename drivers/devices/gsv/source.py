@@ -5,29 +5,9 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from drivers.devices.gsv import DRIVER
-from drivers.devices.gsv.codec import (
-    MAX_CHANNELS,
-    FrameDecoder,
-    FrameLayout,
-    ValueKind,
-    encode_frames,
-    find_layout,
-)
-from drivers.devices.gsv.commands import (
-    OK,
-    Code,
-    InputType,
-    Response,
-    encode_request,
-    encode_response,
-    find_response,
-    rate_from_response,
-    set_float,
-    set_input,
-    text_from_response,
-    write_rate,
-)
+from drivers.devices.gsv import DRIVER, codec, commands
+from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
+from drivers.devices.gsv.commands import Code, InputType, Response
 from drivers.errors import NoDataError, ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
@@ -56,13 +36,13 @@ class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Input range of both channels; `device` leaves it."""
 
     def __post_init__(self) -> None:
-        check_gauge_channels(self.table, self.relative, range(1, MAX_CHANNELS + 1))
+        check_gauge_channels(self.table, self.relative, range(1, codec.MAX_CHANNELS + 1))
 
 
 class GsvSource(StreamSource):
     """Conversation: stop, identify, set format, input and rate (None: that of the device), start."""
 
-    stop_command = encode_request(Code.STOP)
+    stop_command = commands.encode_request(Code.STOP)
 
     def __init__(self, settings: GsvSettings, rate_hz: float | None = None) -> None:
         super().__init__(DeviceIdentity(DRIVER.name, "ME-Systeme GSV"), DRIVER.default_baud, rate_hz)
@@ -72,16 +52,16 @@ class GsvSource(StreamSource):
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
         layout = FrameLayout(2)
-        list(FrameDecoder(layout, 1.0).feed(encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
+        list(FrameDecoder(layout, 1.0).feed(codec.encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
         """Stop the device, which sends from power-on, set it up, and wait for the first frames."""
         self.prepare()
         self._stop(link)
         self._set_up(link)
-        link.write(encode_request(Code.START))
-        received = self.await_stream(link, lambda data: find_layout(data) is not None, self.timeout_s)
-        received = received.removeprefix(encode_response(OK))
+        link.write(commands.encode_request(Code.START))
+        received = self.await_stream(link, lambda data: codec.find_layout(data) is not None, self.timeout_s)
+        received = received.removeprefix(commands.encode_response(commands.OK))
         self._set_layout(received)
         return received
 
@@ -96,16 +76,16 @@ class GsvSource(StreamSource):
     def _stop(self, link: Link) -> None:
         """Stop the device and see that it answers."""
         received = self.silence(link)
-        if self.request(link, self.stop_command, find_response, _TRIES) is not None:
+        if self.request(link, self.stop_command, commands.find_response, _TRIES) is not None:
             return
-        if find_layout(received) is None:
+        if codec.find_layout(received) is None:
             raise self.no_data_error(received)
         raise NoDataError(
             "the device sends and does not answer: check the line from this computer to the device"
         )
 
     def _ask(self, link: Link, command: bytes) -> Response | None:
-        return self.request(link, command, find_response)
+        return self.request(link, command, commands.find_response)
 
     def _require(self, link: Link, command: bytes, what: Message) -> None:
         response = self._ask(link, command)
@@ -117,29 +97,31 @@ class GsvSource(StreamSource):
             )
 
     def _set_up(self, link: Link) -> None:
-        serial_number = self._ask(link, encode_request(Code.SERIAL_NUMBER))
-        firmware = self._ask(link, encode_request(Code.FIRMWARE))
+        serial_number = self._ask(link, commands.encode_request(Code.SERIAL_NUMBER))
+        firmware = self._ask(link, commands.encode_request(Code.FIRMWARE))
         self._identity = DeviceIdentity(
             DRIVER.name,
             self._identity.name,
-            firmware=text_from_response(firmware) if firmware else "",
-            serial_number=text_from_response(serial_number) if serial_number else "",
+            firmware=commands.text_from_response(firmware) if firmware else "",
+            serial_number=commands.text_from_response(serial_number) if serial_number else "",
         )
         if self._settings.format == "float32":
-            self._require(link, set_float(), message("the format float32"))
+            self._require(link, commands.set_float(), message("the format float32"))
         if self._settings.input in _INPUTS:
             for channel in (self._settings.table, self._settings.relative):
                 what = message(
                     "input {input} on channel {channel}", input=self._settings.input, channel=channel
                 )
-                self._require(link, set_input(channel, _INPUTS[self._settings.input]), what)
+                self._require(link, commands.set_input(channel, _INPUTS[self._settings.input]), what)
         self._set_rate(link)
 
     def _set_rate(self, link: Link) -> None:
         if self._rate_hz is not None:
-            self._require(link, write_rate(self._rate_hz), message("{rate_hz:g} Hz", rate_hz=self._rate_hz))
-        response = self._ask(link, encode_request(Code.READ_RATE))
-        actual_hz = rate_from_response(response) if response else None
+            self._require(
+                link, commands.write_rate(self._rate_hz), message("{rate_hz:g} Hz", rate_hz=self._rate_hz)
+            )
+        response = self._ask(link, commands.encode_request(Code.READ_RATE))
+        actual_hz = commands.rate_from_response(response) if response else None
         if actual_hz is None:
             raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
         if not self.is_same_rate(actual_hz):
@@ -152,7 +134,7 @@ class GsvSource(StreamSource):
         self._rate_hz = actual_hz
 
     def _set_layout(self, data: bytes) -> None:
-        found = find_layout(data)
+        found = codec.find_layout(data)
         if found is None:
             return
         channels, kind = found
@@ -168,13 +150,13 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> GsvSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     parsed = parse_settings(GsvSettings, settings, DRIVER.name)
     if rate_hz is not None:
-        write_rate(rate_hz)
+        commands.write_rate(rate_hz)
     return GsvSource(parsed, rate_hz)
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    found = find_layout(data)
+    found = codec.find_layout(data)
     if found is None or found[0] < DRIVER.channels:
         return None
     channels, kind = found
@@ -198,13 +180,13 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
 
 
 def _parse_firmware(received: bytes) -> Message | None:
-    response = find_response(received)
+    response = commands.find_response(received)
     if response is None:
         return None
-    version = text_from_response(response)
+    version = commands.text_from_response(response)
     return message("firmware {version}", version=version) if version else message("firmware unknown")
 
 
 IDENTITY_QUERY = IdentityQuery(
-    3, encode_request(Code.FIRMWARE), (LineSettings(115200), LineSettings(230400)), _parse_firmware
+    3, commands.encode_request(Code.FIRMWARE), (LineSettings(115200), LineSettings(230400)), _parse_firmware
 )

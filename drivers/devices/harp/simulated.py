@@ -1,22 +1,8 @@
 """A simulated Harp LoadCells: registers that can be read and written, and an event a sample."""
 
 from drivers.arrays import Floats, Int32s, UInt8s
-from drivers.devices.harp import DRIVER
-from drivers.devices.harp.codec import (
-    ERROR,
-    PAYLOAD_TYPES,
-    READ,
-    TICKS_PER_S,
-    U8,
-    WHO_AM_I,
-    WRITE,
-    HarpMessage,
-    Register,
-    encode,
-    encode_events,
-    find_messages,
-    with_active_mode,
-)
+from drivers.devices.harp import DRIVER, codec
+from drivers.devices.harp.codec import HarpMessage, Register
 from drivers.devices.harp.source import HarpSettings
 from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
 from drivers.stream import parse_settings
@@ -31,13 +17,13 @@ _ALL_EVENTS = 0x0F
 
 def find_commands(data: bytes) -> tuple[list[Command], int]:
     """Requests in `data`, their type and payload as `parameters`; see `SimulatedProtocol`."""
-    messages, used = find_messages(data)
-    return [_command(message) for message in messages if message.kind in (READ, WRITE)], used
+    messages, used = codec.find_messages(data)
+    return [_command(message) for message in messages if message.kind in (codec.READ, codec.WRITE)], used
 
 
 def _command(message: HarpMessage) -> Command:
     kind = CommandKind.OTHER
-    if message.kind == WRITE and message.address == Register.ACQUISITION:
+    if message.kind == codec.WRITE and message.address == Register.ACQUISITION:
         kind = CommandKind.START if message.number else CommandKind.STOP
     return Command(kind, code=message.address, parameters=bytes([message.kind]) + message.payload)
 
@@ -52,7 +38,7 @@ class SimulatedHarp(SimulatedProtocol):
         self._channels = (settings.table, settings.relative)
         self._ticks = 0
         self._registers = {
-            Register.WHO_AM_I: WHO_AM_I,
+            Register.WHO_AM_I: codec.WHO_AM_I,
             Register.FIRMWARE_HIGH: FIRMWARE[0],
             Register.FIRMWARE_LOW: FIRMWARE[1],
             Register.OPERATION: _STANDBY,
@@ -63,23 +49,23 @@ class SimulatedHarp(SimulatedProtocol):
 
     def encode(self, _first_sequence: int, counts: Int32s, _status: UInt8s, times_s: Floats) -> list[bytes]:
         """An event for each sample; none in standby."""
-        self._ticks = round(float(times_s[-1]) * TICKS_PER_S)
-        if with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:
+        self._ticks = round(float(times_s[-1]) * codec.TICKS_PER_S)
+        if codec.with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:
             return [b""] * len(counts)
-        return [row.tobytes() for row in encode_events(times_s, counts, *self._channels)]
+        return [row.tobytes() for row in codec.encode_events(times_s, counts, *self._channels)]
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Reply to a request, with the new value of the register."""
         kind, given = command.parameters[0], command.parameters[1:]
         if command.code not in self._registers:
-            return encode(HarpMessage(kind | ERROR, command.code), U8, self._ticks)
+            return codec.encode(HarpMessage(kind | codec.ERROR, command.code), codec.U8, self._ticks)
         register = Register(command.code)
-        if kind == WRITE and (register not in _WRITABLE or len(given) != PAYLOAD_TYPES[register]):
-            kind |= ERROR
-        elif kind == WRITE:
+        if kind == codec.WRITE and (register not in _WRITABLE or len(given) != codec.PAYLOAD_TYPES[register]):
+            kind |= codec.ERROR
+        elif kind == codec.WRITE:
             self._registers[register] = int.from_bytes(given, "little")
-        payload = self._registers[register].to_bytes(PAYLOAD_TYPES[register], "little")
-        return encode(HarpMessage(kind, register, payload), PAYLOAD_TYPES[register], self._ticks)
+        payload = self._registers[register].to_bytes(codec.PAYLOAD_TYPES[register], "little")
+        return codec.encode(HarpMessage(kind, register, payload), codec.PAYLOAD_TYPES[register], self._ticks)
 
 
 def make_protocol(settings: dict[str, str]) -> SimulatedHarp:

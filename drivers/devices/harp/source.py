@@ -5,29 +5,8 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 
-from drivers.devices.harp import DRIVER
-from drivers.devices.harp.codec import (
-    CHANNELS,
-    ERROR,
-    EVENT_BYTES,
-    FULL_SCALE,
-    TICKS_PER_S,
-    WHO_AM_I,
-    EventDecoder,
-    HarpMessage,
-    Register,
-    encode_events,
-    encode_read,
-    encode_start,
-    encode_stop,
-    encode_write,
-    event_times,
-    find_messages,
-    find_reply,
-    rate_from_events,
-    with_active_mode,
-    with_load_cells,
-)
+from drivers.devices.harp import DRIVER, codec
+from drivers.devices.harp.codec import EventDecoder, HarpMessage, Register
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
@@ -45,11 +24,11 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     table: int = 0
     relative: int = 1
     """Channels that the two gauges are wired to, 0 to 7."""
-    overload_count: float = FULL_SCALE
+    overload_count: float = codec.FULL_SCALE
     """Readings of this size and more are marked as overloaded."""
 
     def __post_init__(self) -> None:
-        check_gauge_channels(self.table, self.relative, range(CHANNELS))
+        check_gauge_channels(self.table, self.relative, range(codec.CHANNELS))
         if not self.overload_count > 0:
             raise SettingsError("overload_count {count:g} must be positive", count=self.overload_count)
 
@@ -57,7 +36,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class HarpSource(StreamSource):
     """Conversation: stop, identify, enable events, start. The device's times show its fixed rate."""
 
-    stop_command = encode_stop()
+    stop_command = codec.encode_stop()
 
     def __init__(self, settings: HarpSettings, rate_hz: float = RATE_HZ) -> None:
         super().__init__(DeviceIdentity(DRIVER.name, "Harp LoadCells"), DRIVER.default_baud, rate_hz)
@@ -65,24 +44,24 @@ class HarpSource(StreamSource):
 
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
-        list(EventDecoder(1.0).feed(encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
+        list(EventDecoder(1.0).feed(codec.encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
         """Stop the device, identify it, start it, and wait for as many events as show the rate."""
         self.prepare()
         self._identify(link)
-        self._write(link, Register.OPERATION, with_active_mode)
-        self._write(link, Register.EVENTS, with_load_cells)
-        link.write(encode_start())
+        self._write(link, Register.OPERATION, codec.with_active_mode)
+        self._write(link, Register.EVENTS, codec.with_load_cells)
+        link.write(codec.encode_start())
         received, good = self.await_data(
-            link, self.timeout_s, lambda data: rate_from_events(data) is not None
+            link, self.timeout_s, lambda data: codec.rate_from_events(data) is not None
         )
-        reply = find_reply(received, Register.ACQUISITION)
-        if reply is not None and reply.kind & ERROR:
+        reply = codec.find_reply(received, Register.ACQUISITION)
+        if reply is not None and reply.kind & codec.ERROR:
             raise ProtocolError("the device refuses to start: switch it off and on, and try again")
         if not good:
             raise self.no_data_error(received)
-        measured_hz = rate_from_events(received)
+        measured_hz = codec.rate_from_events(received)
         if not self.is_same_rate(measured_hz):
             raise ProtocolError(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
@@ -100,17 +79,17 @@ class HarpSource(StreamSource):
     def _identify(self, link: Link) -> None:
         received = self.silence(link)
         who = self._read(link, Register.WHO_AM_I)
-        if who is None and not find_messages(received)[0]:
+        if who is None and not codec.find_messages(received)[0]:
             raise self.no_data_error(received)
         if who is None:
             raise NoDataError(
                 "the device sends and does not answer: check the line from this computer to the device"
             )
-        if who != WHO_AM_I:
+        if who != codec.WHO_AM_I:
             raise ProtocolError(
                 "the device is Harp {number}, and LoadCells is {expected}: choose its port",
                 number=who,
-                expected=WHO_AM_I,
+                expected=codec.WHO_AM_I,
             )
         high, low = (self._read(link, r) for r in (Register.FIRMWARE_HIGH, Register.FIRMWARE_LOW))
         serial_number = self._read(link, Register.SERIAL_NUMBER)
@@ -125,17 +104,17 @@ class HarpSource(StreamSource):
         """Value of a register; None where the device refuses or does not answer."""
 
         def find(received: bytes) -> HarpMessage | None:
-            return find_reply(received, register)
+            return codec.find_reply(received, register)
 
-        reply = self.request(link, encode_read(register), find, _TRIES)
-        return None if reply is None or reply.kind & ERROR else reply.number
+        reply = self.request(link, codec.encode_read(register), find, _TRIES)
+        return None if reply is None or reply.kind & codec.ERROR else reply.number
 
     def _write(self, link: Link, register: Register, wanted: Callable[[int], int]) -> None:
         """Write the wanted value, made of the present one; a register that cannot be read is left alone."""
         present = self._read(link, register)
         if present is None or wanted(present) == present:
             return
-        link.write(encode_write(register, wanted(present)))
+        link.write(codec.encode_write(register, wanted(present)))
         if self._read(link, register) != wanted(present):
             raise ProtocolError(
                 "the device does not take {value} in register {register}: switch it off and on",
@@ -147,7 +126,7 @@ class HarpSource(StreamSource):
 def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     parsed = parse_settings(HarpSettings, settings, DRIVER.name)
-    if rate_hz is not None and not 0 < rate_hz <= TICKS_PER_S:
+    if rate_hz is not None and not 0 < rate_hz <= codec.TICKS_PER_S:
         raise SettingsError(
             "rate {rate_hz:g} Hz cannot be: LoadCells sends {usual_hz:g} Hz, leave --rate out",
             rate_hz=rate_hz,
@@ -158,24 +137,26 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    events = len(event_times(data))
-    share = events * EVENT_BYTES / max(len(data), 1)
+    events = len(codec.event_times(data))
+    share = events * codec.EVENT_BYTES / max(len(data), 1)
     if not is_recognised(events, share, has_checksum=True):
         return None
-    rate_hz = rate_from_events(data) or rate_from_count(events, duration_s)
+    rate_hz = codec.rate_from_events(data) or rate_from_count(events, duration_s)
     remark = message("say which channels the gauges are: --set table=N --set relative=N")
     return Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
 
 
 def _parse_who_am_i(received: bytes) -> Message | None:
-    reply = find_reply(received, Register.WHO_AM_I)
+    reply = codec.find_reply(received, Register.WHO_AM_I)
     if reply is None:
         return None
-    if reply.number == WHO_AM_I:
+    if reply.number == codec.WHO_AM_I:
         return EMPTY
-    return message("it is Harp {number}, and LoadCells is {expected}", number=reply.number, expected=WHO_AM_I)
+    return message(
+        "it is Harp {number}, and LoadCells is {expected}", number=reply.number, expected=codec.WHO_AM_I
+    )
 
 
 IDENTITY_QUERY = IdentityQuery(
-    2, encode_read(Register.WHO_AM_I), (LineSettings(DRIVER.default_baud),), _parse_who_am_i
+    2, codec.encode_read(Register.WHO_AM_I), (LineSettings(DRIVER.default_baud),), _parse_who_am_i
 )

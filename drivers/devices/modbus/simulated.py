@@ -5,16 +5,8 @@ import struct
 import numpy as np
 
 from drivers.arrays import Int32s
-from drivers.devices.modbus import DRIVER
-from drivers.devices.modbus.frames import (
-    MAX_REGISTERS,
-    READ_FUNCTIONS,
-    WRITE_FUNCTIONS,
-    Function,
-    encode_exception,
-    encode_read_response,
-    with_crc,
-)
+from drivers.devices.modbus import DRIVER, frames
+from drivers.devices.modbus.frames import Function
 from drivers.devices.modbus.maps import RegisterMap
 from drivers.devices.modbus.registers import Channel, ChannelValue, encode_channel
 from drivers.devices.modbus.source import read_modbus_settings
@@ -37,7 +29,7 @@ def find_commands(data: bytes) -> tuple[list[Command], int]:
     commands, at = [], 0
     while (size := _request_bytes(data, at)) and at + size <= len(data):
         frame = data[at : at + size]
-        if with_crc(frame[:-2]) == frame:
+        if frames.with_crc(frame[:-2]) == frame:
             commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
             at += size
         else:
@@ -86,11 +78,11 @@ class SimulatedModbus(PolledProtocol):
         unit, function = command.code, command.parameters[0]
         if unit not in {channel.unit for channel in self._channels.values()}:
             return b""
-        if function in READ_FUNCTIONS:
+        if function in frames.READ_FUNCTIONS:
             return self._read(unit, function, command.parameters)
-        if function in WRITE_FUNCTIONS:
+        if function in frames.WRITE_FUNCTIONS:
             return self._write(unit, function, command.parameters)
-        return encode_exception(unit, function, _ILLEGAL_FUNCTION)
+        return frames.encode_exception(unit, function, _ILLEGAL_FUNCTION)
 
     def _put(self, channel: Channel, reading: ChannelValue, states: dict[tuple[int, int, int], int]) -> None:
         held = self._registers.setdefault((channel.unit, channel.function), {})
@@ -104,13 +96,13 @@ class SimulatedModbus(PolledProtocol):
         first, count = struct.unpack_from(">HH", asked, 1)
         held = self._registers.get((unit, function))
         if held is None:
-            return encode_exception(unit, function, _ILLEGAL_FUNCTION)
-        if not 1 <= count <= MAX_REGISTERS:
-            return encode_exception(unit, function, _ILLEGAL_VALUE)
+            return frames.encode_exception(unit, function, _ILLEGAL_FUNCTION)
+        if not 1 <= count <= frames.MAX_REGISTERS:
+            return frames.encode_exception(unit, function, _ILLEGAL_VALUE)
         values = [held.get(register) for register in range(first, first + count)]
         if None in values:
-            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
-        return encode_read_response(unit, function, struct.pack(f">{count}H", *values))
+            return frames.encode_exception(unit, function, _ILLEGAL_ADDRESS)
+        return frames.encode_read_response(unit, function, struct.pack(f">{count}H", *values))
 
     def _write(self, unit: int, function: int, asked: bytes) -> bytes:
         (register,) = struct.unpack_from(">H", asked, 1)
@@ -121,13 +113,13 @@ class SimulatedModbus(PolledProtocol):
             if channel.unit == unit and channel.zero_register == register
         }
         if not known:
-            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
+            return frames.encode_exception(unit, function, _ILLEGAL_ADDRESS)
         zeroed = [gauge for gauge, zero_value in known.items() if zero_value == value]
         if not zeroed:
-            return encode_exception(unit, function, _ILLEGAL_VALUE)
+            return frames.encode_exception(unit, function, _ILLEGAL_VALUE)
         for gauge in zeroed:
             self._zero[gauge] = self._latest[gauge]
-        return with_crc(struct.pack(">B", unit) + asked[:5])
+        return frames.with_crc(struct.pack(">B", unit) + asked[:5])
 
 
 def make_protocol(settings: dict[str, str]) -> SimulatedModbus:

@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 
 from drivers.clock import Skew
-from drivers.devices.modbus import DRIVER
+from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import (
     ExceptionResponse,
@@ -16,9 +16,6 @@ from drivers.devices.modbus.frames import (
     InvalidResponse,
     RegisterResponse,
     Request,
-    encode_read_response,
-    find_exception,
-    parse_response,
 )
 from drivers.devices.modbus.maps import RegisterMap, is_map_key, map_keys, read_map
 from drivers.devices.modbus.polling import PollSchedule, ResponseTiming, Transaction, drain, transact
@@ -129,7 +126,7 @@ class ModbusSource(StreamSource):
         """Compile what makes rows, which takes a second on the very first use."""
         decoder = self._decoder_at(1.0)
         for number, request in enumerate(self._poll.requests):
-            data = encode_read_response(request.unit, request.function, bytes(2 * request.count))
+            data = frames.encode_read_response(request.unit, request.function, bytes(2 * request.count))
             list(decoder.feed(wrap_response(number, 0, data), 0))
 
     def start(self, link: Link) -> bytes:
@@ -207,7 +204,7 @@ class ModbusSource(StreamSource):
 
         One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
         """
-        response = parse_response(request, transaction.data)
+        response = frames.parse_response(request, transaction.data)
         was_invalid, self._was_invalid = self._was_invalid, isinstance(response, InvalidResponse)
         if transaction.data and (is_stale or (was_invalid and self._was_invalid)):
             drain(link)
@@ -222,7 +219,7 @@ class ModbusSource(StreamSource):
             last: ExceptionResponse | InvalidResponse | None = None
             while True:
                 transaction = transact(link, request, self._settings.timeout_s)
-                response = parse_response(request, transaction.data)
+                response = frames.parse_response(request, transaction.data)
                 if isinstance(response, RegisterResponse):
                     break
                 received += transaction.data + drain(link)
@@ -262,7 +259,7 @@ class ModbusSource(StreamSource):
                 continue
             function, values = channel.zero_function, (channel.zero_value,)
             request = Request(channel.unit, function, channel.zero_register, 1, values)
-            response = parse_response(request, transact(link, request, self._settings.timeout_s).data)
+            response = frames.parse_response(request, transact(link, request, self._settings.timeout_s).data)
             if not isinstance(response, RegisterResponse):
                 raise ProtocolError(
                     "the {gauge} gauge was not set to zero: {reason}. Try again, or without zero",
@@ -289,7 +286,7 @@ class ModbusSource(StreamSource):
         transactions = []
         for request in self._poll.requests:
             transactions.append(transact(link, request, self._settings.timeout_s))
-            if not isinstance(parse_response(request, transactions[-1].data), RegisterResponse):
+            if not isinstance(frames.parse_response(request, transactions[-1].data), RegisterResponse):
                 drain(link)
         return transactions
 
@@ -340,14 +337,14 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
 
 def explain(received: bytes) -> Message | None:
     """What a Modbus exception in `received` says; None without one."""
-    refused = find_exception(received)
+    refused = frames.find_exception(received)
     if refused is None:
         return None
     return message("the device refuses, {fault}: hold its registers against its manual", fault=refused.fault)
 
 
 def _parse_response(received: bytes) -> Message | None:
-    if isinstance(parse_response(_QUERY, received), InvalidResponse):
+    if isinstance(frames.parse_response(_QUERY, received), InvalidResponse):
         return None
     return message("unit {unit} answers: choose its register map with --set map=NAME", unit=_QUERY.unit)
 

@@ -5,14 +5,8 @@ import re
 import numpy as np
 
 from drivers.arrays import Floats, Int32s, UInt8s
-from drivers.devices.slipstand_binary import DRIVER
-from drivers.devices.slipstand_binary.codec import (
-    FirmwareIdentity,
-    FrameFlags,
-    encode_frames,
-    encode_identity,
-    samples_per_frame,
-)
+from drivers.devices.slipstand_binary import DRIVER, codec
+from drivers.devices.slipstand_binary.codec import FirmwareIdentity, FrameFlags
 from drivers.devices.slipstand_binary.source import BinarySettings
 from drivers.samples import SampleStatus
 from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
@@ -44,12 +38,12 @@ class SimulatedBinary(SimulatedProtocol):
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Answer `IDENTIFY`; other commands have no answer."""
         if command.kind is CommandKind.IDENTIFY:
-            return encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
+            return codec.encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
         return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:
         """As the reference firmware: at most 5 ms and at most 32 samples."""
-        return samples_per_frame(rate_hz)
+        return codec.samples_per_frame(rate_hz)
 
     def encode(self, first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:
         """Frames; one is flagged as overloaded when one of its samples is."""
@@ -58,7 +52,7 @@ class SimulatedBinary(SimulatedProtocol):
         relative = seen & SampleStatus.OVERLOAD_RELATIVE
         flags = np.where(relative, table | np.uint8(FrameFlags.OVERLOAD_RELATIVE), table)
         times_us = np.rint(times_s * 1e6).astype(np.int64)
-        return [row.tobytes() for row in encode_frames(first_sequence, times_us, counts, flags)]
+        return [row.tobytes() for row in codec.encode_frames(first_sequence, times_us, counts, flags)]
 
 
 def make_protocol(settings: dict[str, str]) -> SimulatedBinary:

@@ -5,20 +5,8 @@ import time
 import msgspec
 import numpy as np
 
-from drivers.devices.slipstand_binary import DRIVER
-from drivers.devices.slipstand_binary.codec import (
-    IDENTIFY,
-    START,
-    STOP,
-    FirmwareIdentity,
-    FrameDecoder,
-    encode_frame,
-    encode_rate,
-    find_frames,
-    find_identity,
-    frame_length,
-    rate_from_frames,
-)
+from drivers.devices.slipstand_binary import DRIVER, codec
+from drivers.devices.slipstand_binary.codec import FirmwareIdentity, FrameDecoder
 from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
@@ -42,14 +30,14 @@ class SlipstandBinarySource(StreamSource):
     """Conversation: stop, identify, set the rate where another is asked for, start."""
 
     answer_timeout_s = 0.5
-    stop_command = STOP
+    stop_command = codec.STOP
 
     def __init__(self, rate_hz: float | None = None) -> None:
         super().__init__(DeviceIdentity(DRIVER.name, "Slipstand binary"), DRIVER.default_baud, rate_hz)
 
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
-        frame = encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))
+        frame = codec.encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))
         list(FrameDecoder(1.0).feed(frame, 0))
 
     def start(self, link: Link) -> bytes:
@@ -65,7 +53,7 @@ class SlipstandBinarySource(StreamSource):
             device = self._with_rate(link, device)
             self._rate_hz = device.rate_hz
             self._identity = DeviceIdentity(DRIVER.name, "slipstand-fw", firmware=device.version)
-        link.write(START)
+        link.write(codec.START)
         return self._await_frames(link, deadline_s - time.monotonic(), measure=device is None)
 
     def resume(self, link: Link) -> bytes:
@@ -74,7 +62,7 @@ class SlipstandBinarySource(StreamSource):
         if sends:
             more, _ = self.await_data(link, _RATE_S, lambda data: _has_rate(received + data))
             received += more
-        rate_hz = rate_from_frames(received)
+        rate_hz = codec.rate_from_frames(received)
         if self._rate_hz and rate_hz and self.is_same_rate(rate_hz):
             return received
         return self.start(link)
@@ -82,17 +70,17 @@ class SlipstandBinarySource(StreamSource):
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
         """Decoder at the known rate, else at the one that the frames in `data` show."""
         if self._rate_hz is None:
-            self._rate_hz = rate_from_frames(data)
+            self._rate_hz = codec.rate_from_frames(data)
         return FrameDecoder(self._rate_hz) if self._rate_hz else None
 
     def _identify(self, link: Link) -> FirmwareIdentity | None:
-        return self.request(link, IDENTIFY, find_identity, _TRIES)
+        return self.request(link, codec.IDENTIFY, codec.find_identity, _TRIES)
 
     def _with_rate(self, link: Link, device: FirmwareIdentity) -> FirmwareIdentity:
         """Set the rate where another is asked for, and let the device confirm it."""
         if self._rate_hz is None or device.rate_hz == self._rate_hz:
             return device
-        link.write(encode_rate(self._rate_hz))
+        link.write(codec.encode_rate(self._rate_hz))
         confirmed = self._identify(link)
         if confirmed is None or confirmed.rate_hz != self._rate_hz:
             raise ProtocolError(
@@ -105,7 +93,7 @@ class SlipstandBinarySource(StreamSource):
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
         received = self.await_stream(link, _has_rate if measure else _has_frame, timeout_s)
-        rate_hz = rate_from_frames(received) if measure else None
+        rate_hz = codec.rate_from_frames(received) if measure else None
         if not self.is_same_rate(rate_hz):
             raise ProtocolError(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is asked for, and cannot be "
@@ -118,34 +106,34 @@ class SlipstandBinarySource(StreamSource):
 
 
 def _has_frame(received: bytes) -> bool:
-    return len(find_frames(received)) > 0
+    return len(codec.find_frames(received)) > 0
 
 
 def _has_rate(received: bytes) -> bool:
-    return rate_from_frames(received) is not None
+    return codec.rate_from_frames(received) is not None
 
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBinarySource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     parse_settings(BinarySettings, settings, DRIVER.name)
     if rate_hz is not None:
-        encode_rate(rate_hz)
+        codec.encode_rate(rate_hz)
     return SlipstandBinarySource(rate_hz)
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    frames = find_frames(data)
-    share = sum(frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
+    frames = codec.find_frames(data)
+    share = sum(codec.frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
     if not is_recognised(len(frames), share, has_checksum=True):
         return None
-    rate_hz = rate_from_frames(data) or rate_from_count(int(frames["n"].sum()), duration_s)
+    rate_hz = codec.rate_from_frames(data) or rate_from_count(int(frames["n"].sum()), duration_s)
     return Recognition(DRIVER.name, share, len(frames), rate_hz=rate_hz)
 
 
 def _parse_identity(received: bytes) -> Message | None:
     try:
-        device = find_identity(received)
+        device = codec.find_identity(received)
     except ProtocolError as error:
         return error.message
     if device is None:
@@ -154,5 +142,5 @@ def _parse_identity(received: bytes) -> Message | None:
 
 
 IDENTITY_QUERY = IdentityQuery(
-    1, IDENTIFY, tuple(LineSettings(baud) for baud in (460800, 500000, 115200)), _parse_identity
+    1, codec.IDENTIFY, tuple(LineSettings(baud) for baud in (460800, 500000, 115200)), _parse_identity
 )
