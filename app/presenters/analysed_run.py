@@ -1,4 +1,4 @@
-"""One run with its identification, as plain values that travel from the analysis process to the screens."""
+"""An identified run as plain values, which the analysis process sends to the screens."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,12 +13,23 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 Floats = NDArray[np.float64]
 NO_EVENTS = Events()
 AnalysisKind = Literal["two-mass", "one-mass"]
-"""How many masses an analysis takes to have moved."""
+"""Number of masses in the model."""
+
+AUTO_MODEL = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisTask:
+    """Request to identify a run: by the best friction law or a given one, as two masses or one."""
+
+    path: str
+    model: str = AUTO_MODEL
+    kind: AnalysisKind = "two-mass"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Channel:
-    """What one gauge read and what it should have read (m), NaN where absent; no `fit` without a model."""
+    """Record of one gauge and its fit (m), NaN where absent; no fit without a model."""
 
     record_m: Floats
     fit_m: Floats | None = None
@@ -43,23 +54,23 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Objective:
-    """What a fit would leave over with other values of f_d, all else as fitted."""
+    """Residual for other values of f_d, with all other parameters as fitted."""
 
     friction: Floats
     """Rising."""
     residual_m: Floats
-    """Root mean square of what is left over, relative to the noise of each gauge."""
+    """Root mean square of the residual, relative to the noise of each gauge."""
     fitted: float
     interval_95: tuple[float, float]
 
     def residual_at(self, friction: float) -> float:
-        """Between the values that were worked out, a straight line."""
+        """Residual at any f_d, by linear interpolation."""
         return float(np.interp(friction, self.friction, self.residual_m))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AnalysedRun:
-    """A stored run and what was found in it."""
+    """A stored run and its identification."""
 
     path: Path
     time_s: Floats
@@ -72,11 +83,9 @@ class AnalysedRun:
     model: ModelSelection | None = None
     events: Events = NO_EVENTS
     cautions: tuple[ResultWarning, ...] = ()
-    """results/labels/model/events/cautions: As in `analysis.identification.Identification`."""
     ended: str = ""
     """Why the recording ended, as stored."""
     budget: tuple[BudgetLine, ...] = ()
-    """What the standard uncertainties consist of."""
     kinematics: Kinematics | None = None
     """None where no law without a running-in velocity was fitted."""
     objective: Objective | None = None

@@ -1,22 +1,24 @@
-"""What the worker does to a run: read it, identify it, and hand back plain arrays. Runs in its process."""
+"""Tasks of the window's analysis process: identify a run, and recover unfinished runs."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from app.presenters.analysed_run import AnalysedRun, AnalysisKind, Channel, Kinematics, Objective
+from analysis.identification import Identification
+from analysis.identify import warm_up as identify_once
+from analysis.laws.catalogue import law_with_own_parameters
+from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.record import Record
+from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
+from app.presenters.analysed_run import AnalysedRun, AnalysisTask, Channel, Kinematics, Objective
 from app.presenters.base import Progress, ReportProgress
+from app.presenters.recovery import RecoverFolder, RecoveryReport
 from app.presenters.results import FRICTION, sentence
+from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
+from app.runs.paths import journal_folders
+from messages.i18n import gettext, translate
 
-if TYPE_CHECKING:
-    from analysis.identification import Identification
-    from analysis.motion.two_mass import Motion
-    from analysis.record import Record
-    from app.runs.analyze import Analysis, AnalysisRequest
-
-AUTO_MODEL = "auto"
 _SCANNED = 161
 _SCAN_DEVIATIONS, _SCAN_SHARE = 12.0, 0.04
 """The scan of f_d reaches so many standard uncertainties, and at least this share of f_d, both ways."""
@@ -24,44 +26,27 @@ _PER_PERIOD = 60
 _BEFORE_RELEASE_S = 0.2
 
 
-@dataclass(frozen=True, slots=True)
-class AnalysisTask:
-    """Ask for the identification of a run: with one friction law instead of the likeliest, or as one mass."""
-
-    path: str
-    model: str = AUTO_MODEL
-    kind: AnalysisKind = "two-mass"
-
-
 class _AnalysisCache:
-    """The analyses of the last run: a handle that is dragged asks for one many times a second."""
+    """Analyses of the last run: a handle that is dragged asks for one many times a second."""
 
     path: ClassVar = ""
-    analyses: ClassVar[dict[AnalysisTask, Any]] = {}
+    analyses: ClassVar[dict[AnalysisTask, Analysis]] = {}
 
 
 def analyse_run(path: str, report: ReportProgress) -> AnalysedRun:
-    """Read and identify a run.
-
-    Raises
-    ------
-    RunError
-        It cannot be read.
-    AnalysisError
-        Nothing can be identified in it.
-    """
+    """Read and identify a run. Raises RunError, AnalysisError."""
     _AnalysisCache.path = ""  # the file may have changed
     return run_analysis(AnalysisTask(path), report)
 
 
-def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
-    """Identify a run as asked. Raises RunError, AnalysisError."""
-    analysis = cached_analysis(asked, report)
+def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
+    """Identify a run. Raises RunError, AnalysisError."""
+    analysis = cached_analysis(task, report)
     found, record, run = analysis.identification, analysis.record, analysis.run
     table, relative = _channels(found, record)
     motion = _motion(found, record)
     return AnalysedRun(
-        path=Path(asked.path),
+        path=Path(task.path),
         time_s=record.time_s,
         table=table,
         relative=relative,
@@ -74,43 +59,47 @@ def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         budget=tuple(found.budget),
         kinematics=None if motion is None else _kinematics(motion, found),
         objective=_objective(found),
-        kind=asked.kind,
+        kind=task.kind,
         slips=() if motion is None else _slips(motion, found.parameters["release_s"]),
         note=run.metadata.note,
     )
 
 
-def cached_analysis(asked: AnalysisTask, report: ReportProgress) -> "Analysis":
-    """The analysis that was asked for, done now unless it was done before. Raises RunError, AnalysisError."""
-    from app.runs.analyze import analyze_run
-
-    if _AnalysisCache.path != asked.path:
-        _AnalysisCache.path, _AnalysisCache.analyses = asked.path, {}
-    if asked not in _AnalysisCache.analyses:
-        _AnalysisCache.analyses[asked] = analyze_run(
-            Path(asked.path),
-            _request(asked),
-            progress=lambda share, what: report(Progress(sentence(what), share)),
+def cached_analysis(task: AnalysisTask, report: ReportProgress) -> Analysis:
+    """Analysis of a run, from the cache if it is there. Raises RunError, AnalysisError."""
+    if _AnalysisCache.path != task.path:
+        _AnalysisCache.path, _AnalysisCache.analyses = task.path, {}
+    if task not in _AnalysisCache.analyses:
+        request = AnalysisRequest(model=task.model, kind=task.kind, classical=False)
+        _AnalysisCache.analyses[task] = analyze_run(
+            Path(task.path), request, progress=lambda share, what: report(Progress(sentence(what), share))
         )
-    analysis: Analysis = _AnalysisCache.analyses[asked]
-    return analysis
-
-
-def _request(asked: AnalysisTask) -> "AnalysisRequest":
-    from app.runs.analyze import AnalysisRequest
-
-    return AnalysisRequest(model=asked.model, kind=asked.kind, classical=False)
+    return _AnalysisCache.analyses[task]
 
 
 def warm_up(_nothing: None, _report: ReportProgress) -> None:
-    """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand."""
-    from analysis.identify import warm_up as identify_once
-
+    """Identify a simulated record, so that all code is loaded, and compiled on a first start."""
     identify_once()
 
 
-def _channels(found: "Identification", record: "Record") -> tuple[Channel, Channel | None]:
-    """Both gauges with what they should have read; of one mass the first alone, from its first turning on."""
+def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
+    """Finish the runs of a folder that a crash has left unfinished."""
+    found: list[Recovery] = []
+    for folder in journal_folders(Path(task.folder)):
+        found += recover_folder(
+            folder,
+            lambda journal, share: report(Progress(gettext("Recovering {name}", name=journal.stem), share)),
+            original_folder=Path(task.folder),
+        )
+    return RecoveryReport(
+        runs=tuple(one.run for one in found if one.run),
+        replaced_files=tuple(one.kept for one in found if one.kept),
+        errors=tuple(translate(one.message) for one in found if one.state is RecoveryState.FAILED),
+    )
+
+
+def _channels(found: Identification, record: Record) -> tuple[Channel, Channel | None]:
+    """Record and fit of both gauges; of the table alone for one mass, from its first turning point on."""
     fit = None if found.curves is None else found.curves(record.time_s)
     table_m = None if fit is None else fit.table_displacement_m
     if found.kind == "one-mass":
@@ -120,12 +109,11 @@ def _channels(found: "Identification", record: "Record") -> tuple[Channel, Chann
     table = Channel(record.table_displacement_m, table_m)
     if record.relative_displacement_m is None:
         return table, None
-    return table, Channel(
-        record.relative_displacement_m, None if fit is None else fit.relative_displacement_m
-    )
+    relative_m = None if fit is None else fit.relative_displacement_m
+    return table, Channel(record.relative_displacement_m, relative_m)
 
 
-def _objective(found: "Identification") -> Objective | None:
+def _objective(found: Identification) -> Objective | None:
     friction = found.results.get(FRICTION.name)
     if found.objective is None or found.model is None or friction is None:
         return None
@@ -138,11 +126,8 @@ def _objective(found: "Identification") -> Objective | None:
     return Objective(scanned, residual_m, friction.value, friction.interval_95)
 
 
-def _motion(found: "Identification", record: "Record") -> "Motion | None":
-    """The fitted motion of both masses; None for one mass, without slip, or for an integrated law."""
-    from analysis.laws.catalogue import law_with_own_parameters
-    from analysis.motion.two_mass import TwoMassParameters
-
+def _motion(found: Identification, record: Record) -> Motion | None:
+    """Fitted motion of both masses; None for one mass, without slip, or for an integrated law."""
     if FRICTION.name not in found.parameters:
         return None
     if not law_with_own_parameters(found.results).solver.is_closed_form:
@@ -151,7 +136,7 @@ def _motion(found: "Identification", record: "Record") -> "Motion | None":
     return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])
 
 
-def _kinematics(motion: "Motion", found: "Identification") -> Kinematics:
+def _kinematics(motion: Motion, found: Identification) -> Kinematics:
     period_s = found.results["period_s"].value if "period_s" in found.results else 0.3
     count = round((motion.duration_s + _BEFORE_RELEASE_S) / period_s * _PER_PERIOD) + 2
     shown = motion.sample(np.linspace(-_BEFORE_RELEASE_S, motion.duration_s, count))
@@ -166,8 +151,8 @@ def _kinematics(motion: "Motion", found: "Identification") -> Kinematics:
     )
 
 
-def _slips(motion: "Motion", release_s: float) -> tuple[tuple[float, float], ...]:
-    """Spans of sliding, one for slips that follow one another without a stick."""
+def _slips(motion: Motion, release_s: float) -> tuple[tuple[float, float], ...]:
+    """Spans of sliding; slips without a stick between them are one span."""
     ends_s = np.append(motion.phase_starts_s[1:], motion.duration_s)
     spans: list[tuple[float, float]] = []
     for sign, start_s, end_s in zip(motion.phase_signs, motion.phase_starts_s, ends_s, strict=True):

@@ -1,7 +1,6 @@
-"""Reports of errors of the program itself: shown in the window and appended to a file."""
+"""Reports of errors of the program itself: shown in the window and logged."""
 
-import contextlib
-import datetime
+import logging
 import platform
 import sys
 import threading
@@ -10,10 +9,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from types import TracebackType
-
-import platformdirs
 
 from app.acquisition.errors import AcquisitionError
 from app.version import __version__
@@ -22,8 +18,7 @@ from messages.message import EMPTY, Message, MessageError, message, message_of
 
 _REPEATED_S = 10.0
 """An error that repeats, as one of a timer does, is reported this often."""
-_FILE_BYTES_MAX = 1_000_000
-"""About a thousand reports; one older file of this size is kept."""
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +30,9 @@ class ErrorReport:
 
 
 class ErrorReporter:
-    """Takes reports from any thread, appends them to a file, and hands them to the window.
+    """Takes reports from any thread, logs them, and hands them to the window; `clock` is monotonic (s)."""
 
-    A full file `log` is renamed to `.old`. `clock` is monotonic (s).
-    """
-
-    def __init__(self, log: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self._log = log
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._waiting: deque[ErrorReport] = deque()
         self._last = (EMPTY, float("-inf"))
@@ -52,7 +43,7 @@ class ErrorReporter:
         if report.message == self._last[0] and now_s - self._last[1] < _REPEATED_S:
             return
         self._last = report.message, now_s
-        self._write(report)
+        _log.error("%s\n%s", report.message, report.details)
         self._waiting.append(report)
 
     def next_report(self) -> ErrorReport | None:
@@ -72,21 +63,6 @@ class ErrorReporter:
         sys.__excepthook__(kind, error, trace)
         if isinstance(error, Exception):
             self.report(error_report(error))
-
-    def _write(self, report: ErrorReport) -> None:
-        if self._log is None:
-            return
-        with contextlib.suppress(OSError):  # what cannot be logged is still shown
-            self._log.parent.mkdir(parents=True, exist_ok=True)
-            if self._log.exists() and self._log.stat().st_size > _FILE_BYTES_MAX:
-                self._log.replace(self._log.with_name(f"{self._log.name}.old"))
-            with self._log.open("a", encoding="utf-8") as file:
-                file.write(f"{datetime.datetime.now().astimezone().isoformat()}\n{report.details}\n\n")
-
-
-def log_file() -> Path:
-    """Path of the file of error reports."""
-    return platformdirs.user_log_path("slipstand", appauthor=False) / "faults.log"
 
 
 def error_report(error: Exception) -> ErrorReport:

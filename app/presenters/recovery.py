@@ -1,11 +1,11 @@
-"""Runs that a crash has left unfinished: what the window says of them, and the work that finishes them."""
+"""Notices about runs that a crash has left unfinished."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.presenters.base import Notice, Progress, ReportProgress, Tone
+from app.presenters.base import Notice, Progress, Tone
 from app.presenters.results import sentence
-from messages.i18n import N_, gettext, ngettext, translate
+from messages.i18n import N_, gettext, ngettext
 
 RECOVER = N_("Recover")
 LATER = N_("Later")
@@ -13,69 +13,43 @@ LATER = N_("Later")
 
 @dataclass(frozen=True, slots=True)
 class RecoverFolder:
-    """A task for the worker: finish all runs of a folder, with journals that had to move elsewhere."""
+    """Task to finish all runs of a folder, with their journals in fallback folders."""
 
     folder: str
 
 
 @dataclass(frozen=True, slots=True)
 class RecoveryReport:
-    """What came of it."""
+    """Answer to `RecoverFolder`: paths of recovered runs and of replaced files, and errors."""
 
     runs: tuple[str, ...] = ()
-    """Paths of the runs that are whole now."""
     replaced_files: tuple[str, ...] = ()
     errors: tuple[str, ...] = ()
 
 
-def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
-    """Do it, in the worker's process."""
-    from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
-    from app.runs.paths import journal_folders
-
-    found: list[Recovery] = []
-    for folder in journal_folders(Path(task.folder)):
-        found += recover_folder(
-            folder,
-            lambda journal, share: report(Progress(gettext("Recovering {name}", name=journal.stem), share)),
-            original_folder=Path(task.folder),
-        )
-    return RecoveryReport(
-        runs=tuple(one.run for one in found if one.run),
-        replaced_files=tuple(one.kept for one in found if one.kept),
-        errors=tuple(translate(one.message) for one in found if one.state is RecoveryState.FAILED),
-    )
-
-
 def recovery_question(count: int) -> Notice:
-    """Ask at the start what is to become of `count` unfinished runs."""
+    """Offer to recover unfinished runs."""
     text = ngettext("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
     text += " " + gettext("All that came is in a journal, and the run can be rebuilt from it.")
     return Notice(text, Tone.WARN, RECOVER, LATER)
 
 
 def recovery_progress(progress: Progress | None = None) -> Notice:
-    """Say that it is being done, and how far."""
+    """Show the progress of the recovery."""
     if progress is None or progress.fraction is None:
         return Notice(gettext("Recovering runs"), Tone.PLAIN)
     return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
 
 
 def recovery_outcome(recovered: RecoveryReport) -> Notice:
-    """Say what came of it."""
-    said = [_count(recovered.runs)] if recovered.runs else []
-    said += [
-        gettext("What was there before is kept as {name}", name=Path(path).name)
-        for path in recovered.replaced_files
-    ]
-    said += recovered.errors
+    """Show the result of the recovery."""
+    names, parts = [Path(path).name for path in recovered.runs], []
+    if len(names) == 1:
+        parts.append(gettext("Recovered {name}", name=names[0]))
+    elif names:
+        parts.append(ngettext("Recovered {count} run", "Recovered {count} runs", len(names)))
+    kept = gettext("What was there before is kept as {name}")
+    parts += [kept.format(name=Path(path).name) for path in recovered.replaced_files]
+    parts += recovered.errors
     tone = Tone.BAD if recovered.errors else Tone.OK
-    return Notice(sentence(". ".join(said or [gettext("Nothing was left to recover")])), tone)
-
-
-def _count(runs: tuple[str, ...]) -> str:
-    return (
-        gettext("Recovered {name}", name=Path(runs[0]).name)
-        if len(runs) == 1
-        else ngettext("Recovered {count} run", "Recovered {count} runs", len(runs))
-    )
+    return Notice(sentence(". ".join(parts or [gettext("Nothing was left to recover")])), tone)

@@ -26,7 +26,7 @@ from app.presenters.record.state import (
     RunsChanged,
     StandContext,
 )
-from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
+from app.presenters.recovery import LATER, RECOVER, RecoverFolder
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
@@ -43,6 +43,7 @@ from messages.message import Message
 RECONNECT = N_("Connect again")
 ANALYSE = LazyFunction("app.presenters.analysis_task", "analyse_run")
 WARM_UP = LazyFunction("app.presenters.analysis_task", "warm_up")
+RECOVER_RUNS = LazyFunction("app.presenters.analysis_task", "recover_runs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +156,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(notice=None)
         if offered == RECOVER:
             self._update(notice=recovery.recovery_progress())
-            self._workers.analysis.submit(recover_runs, RecoverFolder(self._folder))
+            self._workers.analysis.submit(RECOVER_RUNS, RecoverFolder(self._folder))
         else:
             self.reconnect()
 

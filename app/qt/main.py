@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 
 from app.log import start_log
 from app.presenters.composition import make_window_presenter, read_personal
-from app.presenters.error_reports import ErrorReporter, error_report, log_file
+from app.presenters.error_reports import ErrorReporter, error_report
 from app.presenters.window import WindowPresenter
 from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
@@ -31,7 +31,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
-    errors, personal = ErrorReporter(log_file()), read_personal()
+    errors, personal = ErrorReporter(), read_personal()
     start_log("window", personal.settings.log_level)
     errors.install_hooks()
     _use(personal.settings)

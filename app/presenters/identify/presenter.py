@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from app.presenters import results
-from app.presenters.analysed_run import AnalysedRun
-from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask, run_analysis
+from app.presenters.analysed_run import AUTO_MODEL, AnalysedRun, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.identify import plot_data, result_tables
@@ -34,6 +33,7 @@ from app.presenters.worker import LazyFunction, Worker
 from messages.i18n import gettext, translate
 from messages.message import Message
 
+RUN_ANALYSIS: Final = LazyFunction("app.presenters.analysis_task", "run_analysis")
 SIMULATE_FRICTION: Final = LazyFunction("app.presenters.identify.tasks", "simulate_friction")
 ESTIMATE_CLASSICAL: Final = LazyFunction("app.presenters.identify.tasks", "estimate_classical")
 _PIXELS = 1000
@@ -134,13 +134,13 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             )
         else:
             self._update(progress=Progress(gettext("Fitting {law}", law=name)))
-            self._worker.submit(run_analysis, AnalysisTask(self._path, name))
+            self._worker.submit(RUN_ANALYSIS, AnalysisTask(self._path, name))
 
     def analyse_as_alternative(self) -> None:
         if self.state.alternative_kind is not None and self.state.progress is None:
             task = AnalysisTask(self._path, kind=self.state.alternative_kind)
             self._update(progress=Progress(gettext("Reading the run")), failure="")
-            self._worker.submit(run_analysis, task)
+            self._worker.submit(RUN_ANALYSIS, task)
 
     def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
         self._span = start_s, end_s, pixels

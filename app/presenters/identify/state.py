@@ -6,8 +6,7 @@ from enum import Enum, StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.analysed_run import AnalysisKind
-from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask
+from app.presenters.analysed_run import AUTO_MODEL, AnalysisKind, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from app.presenters.results import Result, ResultRow
 from messages.i18n import N_

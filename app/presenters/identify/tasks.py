@@ -3,7 +3,8 @@
 import numpy as np
 
 from analysis.classical_estimates import estimate_classically
-from app.presenters.analysis_task import AnalysisTask, cached_analysis
+from app.presenters.analysed_run import AnalysisTask
+from app.presenters.analysis_task import cached_analysis
 from app.presenters.base import Progress, ReportProgress
 from app.presenters.identify.state import (
     ClassicalFigures,

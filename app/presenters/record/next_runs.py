@@ -12,8 +12,7 @@ from analysis.formatting import with_unit
 from app.acquisition.messages import RunSettings
 from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
-from app.presenters.record.decisions import LoadedPlan, SavePlan
-from app.presenters.record.state import PlanState, RunChoices, RunForm, SeriesProgress
+from app.presenters.record.state import LoadedPlan, PlanState, RunChoices, RunForm, SavePlan, SeriesProgress
 from app.presenters.results import sentence
 from app.runs.errors import ConditionError, MetadataError
 from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries

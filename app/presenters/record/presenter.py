@@ -8,7 +8,6 @@ from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
 from app.presenters.events import TaskDone, TaskFailed
-from app.presenters.record.decisions import KeepRun, MoveToTrash, RecordTask, RestoreFromTrash, SavePlan
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
@@ -16,9 +15,14 @@ from app.presenters.record.state import (
     ClockTicked,
     Cue,
     GuidanceState,
+    KeepRun,
+    MoveToTrash,
     PullbackTarget,
     RecordEvent,
     RecordState,
+    RecordTask,
+    RestoreFromTrash,
+    SavePlan,
     ScreenEntered,
     StandContext,
     Step,

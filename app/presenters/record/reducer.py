@@ -25,15 +25,6 @@ from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
-from app.presenters.record.decisions import (
-    CountCompletedRuns,
-    KeepRun,
-    LoadPlan,
-    MoveToTrash,
-    RecordedRun,
-    RecordTask,
-    RestoreFromTrash,
-)
 from app.presenters.record.live import (
     device_chip,
     disk_chip,
@@ -42,18 +33,31 @@ from app.presenters.record.live import (
     rate_text,
     tare_chip,
 )
-from app.presenters.record.model import RECORDING_STATES, EndedRun, RecordModel, Snapshot, monitors_of
+from app.presenters.record.model import (
+    RECORDING_STATES,
+    EndedRun,
+    RecordedRun,
+    RecordModel,
+    Snapshot,
+    monitors_of,
+)
 from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.state import (
     Action,
     ClockTicked,
     Connecting,
+    CountCompletedRuns,
     Disconnected,
+    KeepRun,
     LiveEstimate,
+    LoadPlan,
+    MoveToTrash,
     NoteEdited,
     PlanEdited,
     PlotResized,
     RecordEvent,
+    RecordTask,
+    RestoreFromTrash,
     RunForm,
     RunsChanged,
     ScreenEntered,

@@ -1,4 +1,4 @@
-"""State of the Record screen: what the view draws, and the events that change it."""
+"""State of the Record screen: what the view draws, tasks for its worker, and events that change it."""
 
 import datetime
 import time
@@ -16,6 +16,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.decimated_history import Polyline
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.results import Result, ResultRow
+from app.runs.next_tests import NextTests
 from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 
@@ -284,6 +285,66 @@ class RecordState:
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
     connected: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LoadPlan:
+    """Read the stored plan of a folder, and count its completed runs."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedPlan:
+    """Answer to `LoadPlan`."""
+
+    tests: NextTests
+    completed: tuple[tuple[str, str], ...] = ()
+    """Path and series of each completed run."""
+
+
+@dataclass(frozen=True, slots=True)
+class CountCompletedRuns:
+    """List the completed runs of a folder; the answer is as `LoadedPlan.completed`."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class SavePlan:
+    """Store plan and choices."""
+
+    folder: str
+    tests: NextTests
+
+
+@dataclass(frozen=True, slots=True)
+class KeepRun:
+    """Store the note of a run if it has changed, and its analysis if it `has_results`."""
+
+    path: str
+    author: str
+    note: str | None = None
+    has_results: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MoveToTrash:
+    """Move a run to the trash, with a note if one was typed; the answer is its path there."""
+
+    path: str
+    author: str
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreFromTrash:
+    """Move a run out of the trash; the answer is its path."""
+
+    path: str
+
+
+RecordTask = LoadPlan | CountCompletedRuns | SavePlan | KeepRun | MoveToTrash | RestoreFromTrash
 
 
 @dataclass(frozen=True, slots=True)

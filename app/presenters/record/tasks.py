@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from app.presenters.base import ReportProgress
-from app.presenters.record.decisions import (
+from app.presenters.record.state import (
     CountCompletedRuns,
     KeepRun,
     LoadedPlan,

@@ -9,8 +9,7 @@ from stage import FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import ResultWarning
-from app.presenters.analysed_run import Channel, Objective
-from app.presenters.analysis_task import AnalysisTask
+from app.presenters.analysed_run import AnalysisTask, Channel, Objective
 from app.presenters.base import Progress, Tone
 from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.identify.presenter import IdentifyPresenter

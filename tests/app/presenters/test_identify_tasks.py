@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.presenters.analysis_task import AnalysisTask, analyse_run, run_analysis
+from app.presenters.analysed_run import AnalysisTask
+from app.presenters.analysis_task import analyse_run, run_analysis
 from app.presenters.base import Progress
 from app.presenters.identify.state import EstimateClassical, SimulateFriction, Span
 from app.presenters.identify.tasks import estimate_classical, simulate_friction

@@ -8,7 +8,6 @@ from stage import RUN, analysed, bench, ended, health, rows_between, standing
 from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.events import TaskProgress
-from app.presenters.record.decisions import KeepRun, MoveToTrash
 from app.presenters.record.live import LiveTraces, tare_chip
 from app.presenters.record.model import RecordModel
 from app.presenters.record.presenter import record_state
@@ -17,7 +16,9 @@ from app.presenters.record.state import (
     Action,
     Connecting,
     Disconnected,
+    KeepRun,
     LiveEstimate,
+    MoveToTrash,
     RecordEvent,
     StepStatus,
 )

@@ -10,7 +10,7 @@ import pytest
 from analysis.motion.two_mass import TwoMassParameters
 from app.__main__ import main
 from app.presenters.analysis_task import analyse_run
-from app.presenters.record.decisions import (
+from app.presenters.record.state import (
     CountCompletedRuns,
     KeepRun,
     LoadedPlan,

@@ -8,13 +8,14 @@ from stage import FakeLauncher, FakeWorker, bench, fake_workers
 
 from app.acquisition.messages import Failed
 from app.presenters import recovery
+from app.presenters.analysis_task import recover_runs
 from app.presenters.base import Notice, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.events import TaskDone, TaskFailed, TaskProgress
-from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport, recover_runs
+from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport
 from app.presenters.start_screen import StartState
-from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
+from app.presenters.window import RECONNECT, RECOVER_RUNS, WindowContext, WindowPresenter
 
 
 class Desk:
@@ -54,7 +55,7 @@ def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
     assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (RECOVER, LATER, Tone.WARN)
     assert "2 runs were cut short" in desk.notice.text
     desk.window.execute_notice_action()
-    assert desk.worker.submitted == [(recover_runs, TASK)]
+    assert desk.worker.submitted == [(RECOVER_RUNS, TASK)]
     assert desk.notice.action == ""
     desk.hear(TaskProgress(TASK, Progress("Recovering x", 0.4)))
     assert desk.notice.text == "Recovering x: 40%"

@@ -17,24 +17,22 @@ from app.acquisition.messages import (
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Tone
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed
-from app.presenters.record.decisions import (
-    CountCompletedRuns,
-    KeepRun,
-    LoadedPlan,
-    LoadPlan,
-    MoveToTrash,
-    RecordTask,
-    RestoreFromTrash,
-    SavePlan,
-)
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
     Connecting,
+    CountCompletedRuns,
     Cue,
+    KeepRun,
+    LoadedPlan,
+    LoadPlan,
+    MoveToTrash,
     NoteEdited,
     PlanEdited,
+    RecordTask,
+    RestoreFromTrash,
     RunForm,
+    SavePlan,
     ScreenEntered,
 )
 from app.runs.metadata import Conditions

@@ -25,10 +25,19 @@ from stage import (
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
 from app.presenters.events import TaskDone
-from app.presenters.record.decisions import KeepRun, LoadedPlan, LoadPlan, MoveToTrash, RecordTask
 from app.presenters.record.next_runs import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Connecting, Cue, PlanState, RunForm
+from app.presenters.record.state import (
+    Connecting,
+    Cue,
+    KeepRun,
+    LoadedPlan,
+    LoadPlan,
+    MoveToTrash,
+    PlanState,
+    RecordTask,
+    RunForm,
+)
 from app.qt.record import sound
 from app.qt.record.panels import Stepper, TargetBar
 from app.qt.record.plan_dialog import PlanDialog
