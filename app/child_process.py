@@ -54,12 +54,8 @@ class StreamDecoder(Protocol[Decoded_co]):
 class LineDecoder(Generic[Decoded]):
     """Decodes messages of one line each. Blank lines are skipped.
 
-    Parameters
-    ----------
-    decode : callable
-        Decodes one line, without its newline. Raises ValueError.
-    on_invalid : callable, optional
-        Receives the error of an undecodable line, which is skipped. Without it, `feed` raises the error.
+    `decode` takes a line without its newline and raises ValueError. `on_invalid` receives the error of an
+    undecodable line, which is skipped; without it, `feed` raises the error.
     """
 
     def __init__(
@@ -96,13 +92,8 @@ def spawn(
 ) -> "subprocess.Popen[bytes]":
     """Start `python -m module` with pipes for stdin and stdout. Raises OSError.
 
-    Parameters
-    ----------
-    is_background : bool
-        Numerical libraries use one thread. On Windows the process gets a lower priority; elsewhere it lowers
-        its own.
-    discard_stderr : bool
-        For a process whose death is reported by its parent, and whose own traceback would only confuse.
+    In the background, numerical libraries use one thread; on Windows the process gets a lower priority,
+    elsewhere it lowers its own. Discard stderr where the parent reports the death of the process.
     """
     flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console window otherwise
     if is_background:
@@ -124,14 +115,10 @@ class ChildProcess(Generic[Command, Event]):
     ----------
     process : subprocess.Popen
         With pipes for stdin and stdout, as `spawn` starts it. Belongs to this object from now on.
-    encode : callable
-        Encodes a command.
-    decode : callable
-        Decodes an event from one line. Undecodable lines are skipped.
-    on_event : callable
-        Receives each event, in the reading thread.
-    on_exit : callable, optional
-        Receives the exit code, in the same thread, after the last event.
+    encode, decode : callable
+        Encodes a command; decodes an event from one line. Undecodable lines are skipped.
+    on_event, on_exit : callable
+        Receive each event, and after the last one the exit code, in the reading thread.
     queue_size : int
         Commands that may wait until the child takes them.
     """
@@ -147,6 +134,7 @@ class ChildProcess(Generic[Command, Event]):
     ) -> None:
         if process.stdin is None or process.stdout is None:
             raise ValueError("the process has no pipes: start it with spawn()")
+        self.pid = process.pid
         self._process = process
         self._stdin, self._stdout = process.stdin, process.stdout
         self._encode = encode
@@ -166,11 +154,6 @@ class ChildProcess(Generic[Command, Event]):
             thread.start()
 
     @property
-    def pid(self) -> int:
-        """Process number."""
-        return self._process.pid
-
-    @property
     def has_ended(self) -> bool:
         """Tell whether the process has ended and its last event was delivered."""
         return self._has_ended.is_set()
@@ -181,25 +164,16 @@ class ChildProcess(Generic[Command, Event]):
         return self._process.poll() is None
 
     def send(self, command: Command, timeout_s: float = 0.0) -> bool:
-        """Queue a command for the child.
+        """Queue a command for the child; a child that has ended takes everything.
 
-        Returns
-        -------
-        bool
-            False when the queue is full, and stays full for `timeout_s`: the child takes nothing. A child
-            that has ended takes everything.
+        Returns False when the queue is full, and stays full for `timeout_s`: the child takes nothing.
         """
         return self._put(self._encode(command), timeout_s)
 
     def stop(self, timeout_s: float, *, wait_while_active: bool = False) -> None:
         """Close the child's stdin after the queued commands, and wait for its end.
 
-        Parameters
-        ----------
-        timeout_s : float
-            The child is killed after so long.
-        wait_while_active : bool
-            Count the time from the child's last event, not from this call.
+        The child is killed after `timeout_s` from this call, or from its last event while it is active.
         """
         start_s = time.monotonic()
         is_closing = self._put(None, timeout_s)
@@ -212,7 +186,7 @@ class ChildProcess(Generic[Command, Event]):
         self.kill()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_KILLED_S)
-        self._end_writing()
+        self._put(None, 0.0)
         for thread in self._threads:
             thread.join(_KILLED_S)
 
@@ -222,10 +196,6 @@ class ChildProcess(Generic[Command, Event]):
             _log.info("child %d is killed", self.pid)
             self._is_killed = True
             self._process.kill()
-
-    def _end_writing(self) -> None:
-        with contextlib.suppress(queue.Full):  # a thread that is busy writing ends with its pipe
-            self._commands.put_nowait(None)
 
     def _put(self, data: bytes | None, timeout_s: float) -> bool:
         try:
@@ -250,10 +220,10 @@ class ChildProcess(Generic[Command, Event]):
                     self._on_event(event)
         code = self._process.wait()
         level = logging.WARNING if code and not self._is_killed else logging.INFO
-        _log.log(level, "child %d ended with code %d", self._process.pid, code)
+        _log.log(level, "child %d ended with code %d", self.pid, code)
         self._on_exit(code)
         self._has_ended.set()
-        self._end_writing()
+        self._put(None, 0.0)  # a thread that is busy writing ends with its pipe
 
 
 class CommandReader(Generic[Command]):
@@ -262,8 +232,8 @@ class CommandReader(Generic[Command]):
     Parameters
     ----------
     descriptor : int
-        Read end of the pipe. It is not read through a buffered file: the lock of one would be held by the
-        thread for ever, and the interpreter could not finish.
+        Read end of the pipe. It is not read through a buffered file: its lock would be held by the thread for
+        ever, and the interpreter could not finish.
     decoder : StreamDecoder
         An error of it closes the reader like the end of the pipe.
     on_closed : callable, optional
@@ -316,14 +286,8 @@ class CommandReader(Generic[Command]):
 class EventSender(Generic[Event]):
     """Child's side: writes events to a pipe in a thread of its own.
 
-    A parent that does not read misses events; it never blocks the child.
-
-    Parameters
-    ----------
-    descriptor : int
-        Write end of the pipe.
-    is_transient : callable, optional
-        Tells of an event whether it is soon replaced by a newer one. Such events are dropped first.
+    A parent that does not read misses events; it never blocks the child. Events of which `is_transient` is
+    true, because newer ones soon replace them, are dropped first.
     """
 
     _QUEUE_EVENTS = 4096

@@ -1,9 +1,8 @@
-"""What a gauge shows while nothing moves: counts averaged over a window, for a calibration or a check."""
+"""Counts of a gauge averaged over a window, for a calibration or a check."""
 
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
@@ -17,12 +16,12 @@ if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
 
 TIMEOUT_S = 5.0
 _STALE_S = 0.1
-"""What was sent before it was asked for may still be under way."""
+"""Samples that were sent before the request may still be under way for so long."""
 OVERLOAD_FLAGS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
-_SOUND_SHARE = 0.5
-
-
+_VALID_FRACTION = 0.5
+"""Least fraction of valid samples in a window: below it the gauge is hardly in range."""
 _STEADY = 6.0
+"""Standard errors of the difference of the halves up to which a window counts as steady."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +29,9 @@ class AveragedCounts:
     """Counts of one gauge over a window."""
 
     counts: float
-    """Mean, and standard deviation of a sample."""
+    """Mean."""
     noise_counts: float
+    """Standard deviation of a sample."""
     samples: int
     creep_counts: float
     """Mean of the second half minus that of the first."""
@@ -50,11 +50,11 @@ def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
 
 
 class NoAverageError(AcquisitionError):
-    """A window that gives no average."""
+    """A window without an average."""
 
 
 class SampleStream(Protocol):
-    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
+    """The part of a `LiveStream` that is needed here."""
 
     @property
     def rate_hz(self) -> float:
@@ -67,12 +67,7 @@ class SampleStream(Protocol):
 class CountAverager:
     """Reads a stream in a thread of its own, so that none of it is lost meanwhile; use it with `with`.
 
-    Parameters
-    ----------
-    stream : Stream
-        Open; not closed here.
-    channel : int
-        0 for gauge 1, 1 for gauge 2.
+    The stream is open and is not closed here. Channel 0 is gauge 1, channel 1 is gauge 2.
     """
 
     def __init__(self, stream: SampleStream, channel: int) -> None:
@@ -81,7 +76,7 @@ class CountAverager:
         self._flag = int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])
         self._changed = threading.Condition()
         self._taken: list[NDArray[np.float64]] | None = None
-        self._unsound = 0
+        self._invalid = 0
         self._fault: Exception | None = None
         self._leaving = False
         self._thread = threading.Thread(target=self._read, name="settled counts", daemon=True)
@@ -90,26 +85,20 @@ class CountAverager:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._leaving = True
         self._thread.join()
 
     def average(self, window_s: float) -> AveragedCounts:
         """Average of the samples from now on.
 
-        Raises
-        ------
-        UnsettledError
-            Samples stay away, or under half of them are sound.
-        AcquisitionError, DriverError
-            The stream has ended.
+        Raises NoAverageError if too few samples come or are valid. Raises AcquisitionError or DriverError if
+        the stream has ended.
         """
         stale, wanted = (round(span_s * self._stream.rate_hz) for span_s in (_STALE_S, window_s))
         enough = stale + max(wanted, 2)
         with self._changed:
-            self._taken, self._unsound = [], 0
+            self._taken, self._invalid = [], 0
             came = self._changed.wait_for(
                 lambda: self._fault is not None or self._seen() >= enough, window_s + TIMEOUT_S
             )
@@ -122,21 +111,21 @@ class CountAverager:
                 samples=sum(map(len, taken)),
                 window_s=window_s + TIMEOUT_S,
             )
-        sound = np.concatenate(taken)[stale:]
-        if len(sound) < max(_SOUND_SHARE * wanted, 2):
+        valid = np.concatenate(taken)[stale:]
+        if len(valid) < max(_VALID_FRACTION * wanted, 2):
             raise NoAverageError(
-                "gauge {gauge} is overloaded or its samples are damaged: {unsound} of {samples}. Move it"
+                "gauge {gauge} is overloaded or its samples are damaged: {invalid} of {samples}. Move it"
                 " back into its range, or check the cable",
                 gauge=self._channel + 1,
-                unsound=self._unsound,
-                samples=self._unsound + sum(map(len, taken)),
+                invalid=self._invalid,
+                samples=self._invalid + sum(map(len, taken)),
             )
-        return compute_average(sound)
+        return compute_average(valid)
 
     def steady_average(
         self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
     ) -> AveragedCounts:
-        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
+        """First steady average of up to so many windows, else the last; `on_unsteady` receives the others."""
         for _ in range(windows - 1):
             average = self.average(window_s)
             if average.is_steady:
@@ -145,7 +134,7 @@ class CountAverager:
         return self.average(window_s)
 
     def _seen(self) -> int:
-        return self._unsound + sum(map(len, self._taken or []))
+        return self._invalid + sum(map(len, self._taken or []))
 
     def _read(self) -> None:
         try:
@@ -153,7 +142,7 @@ class CountAverager:
                 chunk = self._stream.next_read(0.05)
                 if chunk is not None:
                     self._take(chunk)
-        except Exception as error:  # whoever waits for an average must hear of it
+        except Exception as error:  # raised by the call that waits for an average
             with self._changed:
                 self._fault = error
                 self._changed.notify_all()
@@ -163,7 +152,7 @@ class CountAverager:
             if self._taken is None:
                 return
             for rows in chunk.rows:
-                sound = (rows.status & self._flag) == 0
-                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
-                self._unsound += int(np.count_nonzero(~sound))
+                valid = (rows.status & self._flag) == 0
+                self._taken.append(rows.counts[valid, self._channel].astype(np.float64))
+                self._invalid += int(np.count_nonzero(~valid))
             self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""Whether the disk has room for a run: before it, and while it lasts."""
+"""Free space of the disk for a run: before it, and while it lasts."""
 
 import threading
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ ROW_BYTES = 41
 """Of one sample in a run file: time, two readings, status, two counts as float64."""
 
 _RECORD_BYTES = 24.0
-"""A journal's own bytes for each read."""
+"""Header of a journal record; a read is one record."""
 _READS_PER_S = 250.0
 _LONGEST_S = 20.0
-"""A run that lasts until rest ends so long after its release at the latest."""
+"""Longest time from release to end of a run that lasts until rest."""
 _CLOSING_BYTES = 4 * MARGIN_BYTES
 _CLOSING_S = 3.0
-"""A run is ended while there is room for so many more seconds, and to close it in good order."""
+"""A run is ended while there is space for so many more seconds, and to close it regularly."""
 _WARN_S = 60.0
 
 
@@ -44,7 +44,7 @@ class DiskDemand:
 
     @property
     def bytes_per_s(self) -> float:
-        """Both."""
+        """Bytes of run and journal."""
         return self.run_bytes_per_s + self.journal_bytes_per_s
 
     def of_run(self, run: RunSettings) -> float:
@@ -58,13 +58,7 @@ class DiskDemand:
 
 
 def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Message:
-    """Make sure that a run has room, and say what else is to be known of it; "" if nothing.
-
-    Raises
-    ------
-    NoRoomError
-        The run itself would not fit.
-    """
+    """Return a warning about the free space, or EMPTY. Raises DiskSpaceError if a run does not fit."""
     free = free_bytes(folder)
     needed = demand.of_run(run)
     if free is None:
@@ -90,14 +84,14 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Mess
 
 @dataclass(frozen=True, slots=True)
 class DiskWarning:
-    """What is to be said of the room that is left, and whether the run must end now."""
+    """A warning about the free space, and whether the run must end now."""
 
     note: Message
     must_end: bool = False
 
 
 class DiskSpaceMonitor:
-    """Looks after the room on a disk while a run is recorded; `look` some times a second."""
+    """Follows the free space while a run is recorded."""
 
     def __init__(self, folder: Path, demand: DiskDemand) -> None:
         self._folder = folder
@@ -105,14 +99,9 @@ class DiskSpaceMonitor:
         self._is_warned = False
 
     def update(self, free: int | None, journal_bytes: int) -> DiskWarning | None:
-        """What is new since the last look; None if nothing is.
+        """Return a new warning, None without one. Call it a few times a second.
 
-        Parameters
-        ----------
-        free : int or None
-            Free bytes of the disk; None where nobody can tell.
-        journal_bytes : int
-            Size of the journal, which is copied into the run when it ends.
+        `free` bytes are left, None if unknown. The journal is copied into the run when it ends.
         """
         if free is None:
             return None
@@ -147,41 +136,31 @@ _POLL_PERIOD_S = 0.5
 
 
 class FreeSpacePoller:
-    """Looks after the disk of one folder after another, twice a second.
-
-    Parameters
-    ----------
-    folder : Path
-        Need not exist.
-    """
+    """Reads the free space of one folder after another, twice a second; the folder need not exist."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._free = free_bytes(folder)
+        self.free_bytes = free_bytes(folder)
+        """Of the folder that is followed; None if unknown."""
         self._changing = threading.Lock()
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._look_on, name="free space", daemon=True)
+        self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)
         self._thread.start()
 
-    @property
-    def free_bytes(self) -> int | None:
-        """Of the folder that is followed; None where nobody can tell."""
-        return self._free
-
     def set_folder(self, folder: Path) -> None:
-        """Look after another folder from now on; the first look is this one."""
+        """Follow another folder from now on; its free space is read at once."""
         with self._changing:
             self._folder = folder
-            self._free = free_bytes(folder)
+            self.free_bytes = free_bytes(folder)
 
     def stop(self) -> None:
         """End, without waiting for a disk that hangs."""
         self._stopping.set()
 
-    def _look_on(self) -> None:
+    def _poll(self) -> None:
         while not self._stopping.wait(_POLL_PERIOD_S):
             folder = self._folder
             free = free_bytes(folder)
             with self._changing:
                 if folder == self._folder:
-                    self._free = free
+                    self.free_bytes = free

@@ -1,4 +1,4 @@
-"""The handle of whoever uses an engine, window and command line alike."""
+"""The client of an engine, for the window and the command line."""
 
 import contextlib
 import queue
@@ -8,7 +8,6 @@ import subprocess
 import threading
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
@@ -52,6 +51,7 @@ class EngineClient:
     """An engine that takes no command for so long hangs; the command is lost."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        self.process_id = process.pid
         self._events: queue.Queue[Event] = queue.Queue()
         self._has_failed = False
         self._ring: RingReader | None = None
@@ -73,11 +73,6 @@ class EngineClient:
         engine = cls(spawn("app.acquisition.engine"))
         engine.send(Connect(port, stand_file, gauges_file, low_latency))
         return engine
-
-    @property
-    def process_id(self) -> int:
-        """Process number of the engine."""
-        return self._child.pid
 
     @property
     def has_ended(self) -> bool:
@@ -126,9 +121,7 @@ class EngineClient:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _on_event(self, event: Event) -> None:
@@ -178,30 +171,12 @@ def record_runs(
     on_rows: Callable[[RingRows], None] | None = None,
     count: int = 1,
 ) -> Generator[RunEnded]:
-    """Record runs one after another over one connection, yielding each at its end.
+    """Record up to `count` runs one after another over one connection, yielding each at its end.
 
-    Ctrl-C (or SIGTERM) ends the run that is being recorded and keeps it, and is the end. A run without a
-    path is none: it was interrupted before the table was pulled back.
-
-    Parameters
-    ----------
-    port, run
-        What to read, and how to record it.
-    stand_file, gauges_file : str
-        Settings in use.
-    on_event : callable, optional
-        Takes each event of the engine as it comes.
-    on_rows : callable, optional
-        Takes the latest samples, about ten times a second.
-    count : int
-        How many; fewer come if one does not end well.
-
-    Raises
-    ------
-    EngineFailedError
-        No connection, or settings that cannot be; the message is the engine's.
-    KeyboardInterrupt
-        Interrupted before anything was recorded.
+    Ctrl-C (or SIGTERM) ends the run that is being recorded and keeps it; no further run follows. A run
+    without a path was interrupted before the table was pulled back. `on_event` receives each event of the
+    engine, `on_rows` the latest samples, about ten times a second. Raises EngineFailedError without a
+    connection or with impossible settings. Raises KeyboardInterrupt if interrupted before a run was armed.
     """
     with _interrupts() as interrupted, EngineClient.start(port, stand_file, gauges_file) as engine:
         is_armed = is_stopped = False

@@ -1,4 +1,4 @@
-"""Everything that can go wrong with the engine. Each message names the fault and the remedy."""
+"""Errors of the acquisition. Each message names the fault and the remedy."""
 
 from app.acquisition.messages import EndReason
 from messages.message import Message, MessageError
@@ -9,11 +9,11 @@ class AcquisitionError(MessageError):
 
 
 class EngineFailedError(AcquisitionError):
-    """The engine could not do what it was asked; the message is the engine's own."""
+    """The engine could not execute a command; the message is its own."""
 
 
 class EngineDiedError(AcquisitionError):
-    """The engine's process ended without a word."""
+    """The process of the engine ended without an error message."""
 
 
 class RunSettingsError(AcquisitionError, ValueError):
@@ -25,7 +25,7 @@ class DiskSpaceError(AcquisitionError):
 
 
 class RingError(AcquisitionError):
-    """A file that is no ring of this version, or can no longer be read."""
+    """A file that is no live ring, or can no longer be read."""
 
 
 class JournalError(AcquisitionError):
@@ -45,4 +45,4 @@ class StreamEndedError(AcquisitionError):
 
 
 class RecoveryError(AcquisitionError):
-    """A journal from which no run can be built, or not now. It stays as it is."""
+    """A journal from which no run can be rebuilt, or not now. It stays as it is."""

@@ -24,7 +24,7 @@ from config.schema import Gauge, GaugeCheck, Gauges
 
 @dataclass(frozen=True, slots=True)
 class ReferenceStep:
-    """What the gauge is tried with."""
+    """The known step that a gauge is checked with."""
 
     value: float
     """How far it is moved (m), or by how many counts the shunt resistor shifts it."""
@@ -39,7 +39,7 @@ class ReferenceStep:
 def check_gauge(
     rest: AveragedCounts, moved: AveragedCounts, gauge: Gauge, known: ReferenceStep
 ) -> DisplacementCheck:
-    """Hold the readings at rest and with what is known against each other. Raises CalibrationError."""
+    """Compare the step between two averages with the known one. Raises CalibrationError."""
     claim = CalibrationClaim(
         gauge.gain_relative_standard_uncertainty, gauge.nonlinearity_m, gauge.repeatability_m
     )
@@ -58,7 +58,7 @@ def check_entry(
     checked_by: str = "",
     device: str = "",
 ) -> GaugeCheck:
-    """The check as it is kept, of now."""
+    """Entry of a check made now, as it is stored."""
     return GaugeCheck(
         gauge=name,
         at=datetime.datetime.now().astimezone().replace(microsecond=0),
@@ -100,7 +100,7 @@ def _displacement_m(counts: float, gauge: Gauge) -> float:
 
 
 def _step_m(counts: float, step: float, gauge: Gauge) -> float:
-    """How far a step of counts goes, from where the gauge stands."""
+    """Displacement (m) of a step of counts from the present reading."""
     return _displacement_m(counts + step, gauge) - _displacement_m(counts, gauge)
 
 

@@ -1,4 +1,4 @@
-"""The engine's side of the live identification. A run goes on without it, should it fail."""
+"""The engine's side of the live identification. If that fails, a run goes on without it."""
 
 import contextlib
 import subprocess
@@ -33,25 +33,17 @@ class LiveClient:
     """A process that leaves so many commands waiting, besides those in its pipe, is killed."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        self.pid = process.pid
         self._first_row: int | None = None
         self._latest: LiveResult | None = None
         self._child: ChildProcess[LiveCommand, LiveAnswer] = ChildProcess(
-            process,
-            encode_line,
-            decode_live_answer,
-            self._on_answer,
-            queue_size=self._QUEUE_COMMANDS,
+            process, encode_line, decode_live_answer, self._on_answer, queue_size=self._QUEUE_COMMANDS
         )
 
     @classmethod
     def start(cls) -> Self:
         """Start the process, which is ready some seconds later. Raises OSError."""
         return cls(spawn("app.acquisition.live_process", is_background=True, discard_stderr=True))
-
-    @property
-    def pid(self) -> int:
-        """Process number."""
-        return self._child.pid
 
     @property
     def has_ended(self) -> bool:
@@ -93,14 +85,7 @@ class LiveClient:
 class LiveIdentifier:
     """Has one run after another identified while it goes on.
 
-    Parameters
-    ----------
-    ring_path : str
-        Of the live ring.
-    time_base : callable
-        Gives the time base of the rows from a given one on.
-    start : callable
-        Starts the process.
+    `time_base` gives the time base of the rows from a given one on; `start` starts the process.
     """
 
     def __init__(
@@ -125,7 +110,7 @@ class LiveIdentifier:
                 self._client = self._start()
 
     def poll(self, first_row: int | None, metadata: RunMetadata, now_s: float) -> LiveResult | None:
-        """News of the run that began at `first_row` of the ring, which is None before its release."""
+        """New result of the run that began at `first_row` of the ring, which is None before its release."""
         if self._client is None:
             return None
         if self._client.has_ended:

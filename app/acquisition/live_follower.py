@@ -1,4 +1,4 @@
-"""One run followed from its first row in the ring to the newest, and identified again and again."""
+"""Follows a run from its first row in the ring to the newest, and identifies it again and again."""
 
 import contextlib
 import math
@@ -19,10 +19,10 @@ from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 PERIOD_S = 0.04
-"""Between two answers: 25 a second look continuous on a screen. Longer where one takes over half of it."""
+"""Between two answers: 25 per second look continuous on a screen. Longer where one takes over half of it."""
 _IDLE_S = 1.0
 _FOLLOWED_S = 30.0
-"""After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
+"""After the release. No test needs more than 20 s; a run of fixed duration may last for hours."""
 
 
 def serve(commands: CommandReader[LiveCommand], events: EventSender[LiveAnswer]) -> None:
@@ -62,7 +62,7 @@ def warm_up() -> None:
 
 
 class RunFollower:
-    """Answers with what is known of a run, each time of all its rows until then."""
+    """Identifies a run from all its rows until now."""
 
     def __init__(self, ring: RingReader, follow: FollowRun) -> None:
         self._ring = ring
@@ -74,7 +74,7 @@ class RunFollower:
         self._identification = LiveIdentification()
 
     def answer(self) -> LiveAnswer | None:
-        """What is known now; None when no row has come since the last time, or all is known long since."""
+        """Identify the run; None without new rows, or when the run was followed long enough."""
         rows = self._ring.read_since(self._next_row)
         if not len(rows) or rows.first_index > self._last_row:
             return None
@@ -106,12 +106,12 @@ class RunFollower:
 
 
 def result_of(state: LiveState, origin_s: float) -> LiveResult:
-    """A state of the identification as the event that tells of it; `origin_s` is its time 0 in the ring."""
+    """Convert a state of the identification to an event; `origin_s` is its time 0 in the ring."""
     return LiveResult(
         time_s=origin_s + state.time_s,
-        friction_dynamic=_told(state.friction_dynamic),
-        period=_told(state.period_s),
-        damping_n1=_told(state.damping_n1_per_s),
+        friction_dynamic=_live_value(state.friction_dynamic),
+        period=_live_value(state.period_s),
+        damping_n1=_live_value(state.damping_n1_per_s),
         law=state.law or "",
         slip_end_s=None if state.slip_end_s is None else origin_s + state.slip_end_s,
         narrowing=state.narrowing,
@@ -120,7 +120,7 @@ def result_of(state: LiveState, origin_s: float) -> LiveResult:
     )
 
 
-def _told(quantity: Quantity | None) -> LiveValue | None:
+def _live_value(quantity: Quantity | None) -> LiveValue | None:
     if quantity is None:
         return None
     return LiveValue(quantity.value, quantity.standard_uncertainty, quantity.unit)

@@ -1,4 +1,4 @@
-"""What a run is to be, checked and put together before anybody pulls the table back."""
+"""Settings, metadata and journal of a run, checked and made before the table is pulled back."""
 
 import datetime
 import math
@@ -74,13 +74,10 @@ def check_run_settings(settings: RunSettings) -> None:
 
 
 def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
-    """All that is known of a run when it is armed.
+    """Metadata of a run when it is armed.
 
-    Raises
-    ------
-    ConfigError, MetadataError
-        A series that the stand has not, a value that cannot be stored, or a history of gauge checks that
-        cannot be read.
+    Raises ConfigError or MetadataError for a series that the stand has not, a value that cannot be stored, or
+    a history of gauge checks that cannot be read.
     """
     return create_metadata(
         stand,
@@ -111,7 +108,7 @@ def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunM
 
 
 class RunSequence:
-    """What was asked for, and how much of it is left."""
+    """Runs that were requested in a row, and how many are left."""
 
     def __init__(self) -> None:
         self._next: RunSettings | None = None
@@ -124,17 +121,17 @@ class RunSequence:
         return self._done > 0
 
     def begin(self, run: RunSettings, count: int) -> None:
-        """Take what was asked for; its first run is being recorded."""
+        """Begin a sequence; its first run is being recorded."""
         self._next, self._remaining, self._done = next_run(run), count - 1, 0
 
     def stop(self) -> None:
-        """Nothing is to follow."""
+        """No run follows."""
         self._remaining = 0
 
     def next_after(self, ended: RunEnded) -> tuple[RunEnded, RunSettings | None]:
-        """Say how many runs follow one that has ended, and what the next one is to be; None if none.
+        """Add to a run's end how many runs follow, and return the next one; None if there is none.
 
-        Only a run that came to its end by itself is followed: any other calls for somebody to look.
+        Only a run that came to its end by itself is followed: any other needs somebody to look.
         """
         if not ended.ended.is_normal or self._next is None or self._remaining == 0:
             self._remaining = self._done = 0

@@ -4,7 +4,6 @@ import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from types import TracebackType
 from typing import Self, TypeAlias
 
 import numpy as np
@@ -304,9 +303,7 @@ class LiveStream:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _decode(self, read: RawRead) -> DecodedRead:
@@ -323,7 +320,7 @@ class LiveStream:
             self._rate_monitor.restart()
         if rows:
             self._on_rows(rows[-1].end_index - 1, read.arrival_ns, added)
-        self._stall_detector.add_read(read.arrival_ns, read.data, is_sense=bool(rows))
+        self._stall_detector.add_read(read.arrival_ns, read.data, has_samples=bool(rows))
         return DecodedRead(read.data, read.arrival_ns, rows, added)
 
     def _on_rows(self, last_index: int, arrival_ns: int, added: Losses) -> None:
