@@ -38,6 +38,13 @@ _KEPT = 4
 """Minima that are followed from one window to the next."""
 _FALLBACK_KEPT, _FALLBACK_STEPS = 3, 10
 """Start points and steps of an integrated law, whose steps take a hundred times as long as in closed form."""
+_FALLBACK_GRID, _FALLBACK_SCANS = np.geomspace(1.0, 2.0, 71), 4
+"""f_s over f_d in steps of 1 %, and most scans. Minima of chi-square along f_s are a few per cent wide."""
+_EXPLAINED = 1.1
+"""Chi-square a reading below which an integrated law needs no scan of f_s: its minimum is the right one."""
+_WORTH = 0.5
+"""Share of the simpler law's chi-square below which a scan of f_s is worth its second: the law explains the
+larger part, and a neighbouring minimum may explain the rest."""
 _MISFIT_MAX = 0.1
 """Residual over range of gauge 1 above which it is not friction that is wrong: f_s of three times f_d that
 falls with speed leaves 0.014 at most with a law of constant f_d."""
@@ -166,7 +173,19 @@ class Search:
         starts.sort(key=lambda point: some.chi_square(point, law))
         rough = [some.minimise(point, law, _FALLBACK_STEPS) for point in starts[:_FALLBACK_KEPT]]
         best = min(rough, key=lambda minimum: minimum.cost)
-        return fit_at_minimum(self.problem, law, self.problem.minimise(best.parameters, law, _FALLBACK_STEPS))
+        worth = _WORTH * some.chi_square(simpler.parameters, simpler.law)
+        for _ in range(_FALLBACK_SCANS if best.cost < worth else 0):
+            if best.cost < _EXPLAINED * some.sample_count:
+                break
+            grid = _FALLBACK_GRID * best.parameters[Parameter.FRICTION_DYNAMIC]
+            nearby = _scan_static_friction(some, [(best.parameters, grid)], law)[:_FALLBACK_KEPT]
+            found = [some.minimise(point, law, _FALLBACK_STEPS) for point in nearby]
+            lowest = min(found, key=lambda minimum: minimum.cost)
+            if lowest.cost > best.cost - 1.0:
+                break
+            best = lowest
+        last = self.problem.minimise(best.parameters, law, _FALLBACK_STEPS)
+        return fit_at_minimum(self.problem, law, last)
 
     def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
@@ -260,13 +279,18 @@ def _static_friction_grid(point: Floats) -> Floats:
     return np.union1d(_COARSE * point[Parameter.FRICTION_DYNAMIC], _FINE * point[Parameter.FRICTION_STATIC])
 
 
-def _scan_static_friction(window: FitProblem, lines: list[tuple[Floats, Floats]]) -> list[Floats]:
+def _scan_static_friction(
+    window: FitProblem, lines: list[tuple[Floats, Floats]], law: FrictionLaw = WIDEST_LAW
+) -> list[Floats]:
     """Lowest few local minima of chi-square along f_s; a line is a point and values of f_s to try there."""
     found: list[tuple[float, Floats]] = []
     for point, values in lines:
         line = np.tile(point, (len(values), 1))
         line[:, Parameter.FRICTION_STATIC] = np.maximum(values, point[Parameter.FRICTION_DYNAMIC])
-        costs = window.chi_squares(line)
+        if law.solver.is_closed_form:
+            costs = window.chi_squares(line)
+        else:
+            costs = np.array([window.chi_square(point, law) for point in line])
         padded = np.concatenate(([np.inf], costs, [np.inf]))
         lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
         found += [(float(costs[index]), line[index]) for index in lowest]
