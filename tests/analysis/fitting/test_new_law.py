@@ -45,9 +45,7 @@ FILM = FrictionLaw(
 
 
 def test_a_viscous_film_is_identified(monkeypatch):
-    monkeypatch.setattr(
-        "analysis.identify.FALLBACK_LAWS", (replace(FILM, own_start=SHARED_PARAMETER_COUNT),)
-    )
+    monkeypatch.setattr("analysis.identify.FALLBACK_LAWS", (replace(FILM, own_start=SHARED_PARAMETER_COUNT),))
     truth = Truth(rate_hz=500.0, friction_static=0.11, seed=3)
     motion = FILM.solver.simulate(truth.parameters(), [SLOPE_S_PER_M], truth.duration_s + 0.1)
 
