@@ -42,7 +42,7 @@ def config_directory() -> Path:
 
 
 def is_checkout() -> bool:
-    """Tell whether this is a source checkout rather than an installation."""
+    """Whether this is a source checkout rather than an installation."""
     return (_SHIPPED.parent / "pyproject.toml").is_file()
 
 
@@ -204,7 +204,7 @@ def _write_dated(stem: str, text: str) -> Path:
     while True:
         try:
             return _write_new(_free_name(stem), text)
-        except FileExistsError:  # somebody else took it just now
+        except FileExistsError:  # another process took it just now
             continue
 
 

@@ -60,7 +60,7 @@ def _finite(**values: float) -> None:
 
 
 class Contact(_Checked, frozen=True):
-    """What rubs on what."""
+    """The two surfaces that slide on each other."""
 
     name: str
 
@@ -208,7 +208,7 @@ class Gauge(_Checked, frozen=True):
         return x / self.gain_m_per_count + self.zero_count
 
     def is_expired(self, day: datetime.date) -> bool:
-        """Tell whether the calibration was valid only until before `day`."""
+        """Whether the calibration was valid only until before `day`."""
         return self.valid_until is not None and self.valid_until < day
 
 
@@ -231,7 +231,7 @@ class Gauges(_Checked, frozen=True):
 
 
 class GaugeCheck(_Checked, frozen=True):
-    """A gauge tried against a known displacement or a shunt resistor: one entry of the history of checks."""
+    """A gauge compared with a known displacement or a shunt resistor: an entry of the history of checks."""
 
     gauge: Literal["table", "relative"]
     at: datetime.datetime
@@ -262,7 +262,7 @@ class GaugeCheck(_Checked, frozen=True):
         return self.measured_m - self.expected_m
 
     def is_of(self, gauge: Gauge) -> bool:
-        """Tell whether it was this calibration of this gauge that was checked; its zero does not matter."""
+        """Whether this calibration of this gauge was checked; its zero does not matter."""
         return (self.gain_m_per_count, self.polynomial, self.serial_number) == (
             gauge.gain_m_per_count,
             gauge.polynomial,
@@ -291,9 +291,9 @@ class Settings(_Checked, frozen=True):
     recordings: str = ""
     """Folder of the runs; empty for the usual one."""
     operator: str = ""
-    """Who records, unless said otherwise."""
+    """Who records, unless a run names another operator."""
     sounds: bool = False
-    """Whether each state of a pullback is heard."""
+    """Whether each state of a pullback has a sound."""
     log_level: Literal["error", "warning", "info", "debug"] = "info"
     """What the log holds."""
 

@@ -13,7 +13,7 @@ from messages.message import EMPTY, Message, message
 
 MIN_STEPS = 5
 MIN_SPAN_S = 0.5
-"""Fewer steps, or a shorter time, do not tell a rate: a clock of 1 ms gives it to 0.2 % over 0.5 s."""
+"""Fewer steps, or a shorter time, do not give a rate: a clock of 1 ms shows it to 0.2 % over 0.5 s."""
 _ROUNDING = 1e-6
 _FIRST_WINDOW_S = 0.1
 _MIN_WINDOWS = 8
@@ -27,8 +27,8 @@ _SIGMA_PER_MAD = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
 _CLOCK_STEP_S = 1e-6
 _DELIVERY_STEP_S = 1e-3
-"""USB delivers bytes once a millisecond (USB 2.0, 8.4.3: frames of 1 ms) of the host's clock. A beat between
-that and the device's clock looks like drift: the delay is anywhere in the step at both ends."""
+"""USB delivers bytes once a millisecond (USB 2.0, 8.4.3: frames of 1 ms) of the host's clock. Interference
+between that and the device's clock looks like drift: the delay is anywhere in the step at both ends."""
 DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
 """Standard uncertainty of the difference of two evenly distributed delays (s)."""
 
@@ -101,7 +101,10 @@ class ClockFit:
         nominal_s = index * self._period_s
         self._keep(nominal_s, (arrival_ns - self._start_ns) * 1e-9 - nominal_s)
         if len(self._earliest) > _MAX_WINDOWS:
-            self._join_windows()
+            self._window_s *= 2
+            kept, self._earliest = self._earliest, {}
+            for point in kept.values():
+                self._keep(*point)
 
     def estimate(self) -> ClockEstimate | None:
         """Rate until now; None before there are 8 windows of 0.1 s."""
@@ -120,13 +123,6 @@ class ClockFit:
         before = self._earliest.get(window)
         if before is None or late_s < before[1]:
             self._earliest[window] = (nominal_s, late_s)
-
-    def _join_windows(self) -> None:
-        kept = list(self._earliest.values())
-        self._window_s *= 2
-        self._earliest = {}
-        for nominal_s, late_s in kept:
-            self._keep(nominal_s, late_s)
 
 
 @dataclass(frozen=True, slots=True)

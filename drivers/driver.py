@@ -1,4 +1,4 @@
-"""What a device folder says of itself; its modules are imported when they are used."""
+"""Description of a device folder, whose modules are imported when they are used."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -90,7 +90,7 @@ class DeviceDriver:
         return getattr(self._source(), "IDENTITY_QUERY", None)
 
     def explain(self, received: bytes) -> Message | None:
-        """Why the device sent `received` instead of samples, where its own bytes say it."""
+        """Why the device sent `received` instead of samples, where its own bytes show it."""
         explain = getattr(self._source(), "explain", None)
         return explain(received) if explain else None
 

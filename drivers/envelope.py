@@ -30,7 +30,7 @@ class StampedRead:
     arrival_ns: int
     """Host's monotonic time (ns, `drivers.host_time.host_ns`) after the read."""
     data: bytes
-    """As received; b"" says that the connection of this port broke here."""
+    """As received; b"" marks where the connection of this port broke."""
 
 
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:

@@ -16,7 +16,7 @@ class DeviceLostError(DriverError):
 
 
 class NoDataError(DriverError):
-    """The port is open and no good frame arrived. The message says what arrived instead."""
+    """The port is open and no good frame arrived. The message names what arrived instead."""
 
 
 class ProtocolError(DriverError):

@@ -1,4 +1,4 @@
-"""What in the operating system hinders reading a serial port, and what USB numbers say of its chip."""
+"""Hindrances of the operating system to reading a serial port, and names of USB chips."""
 
 import contextlib
 import os
@@ -76,7 +76,7 @@ def modem_manager_hint(port: PortInfo, processes: Path, udev_data: Path) -> Port
 
 
 def latency_ms(port: PortInfo, usb_serial: Path = USB_SERIAL) -> int | None:
-    """Latency timer of an FTDI adapter (ms); None for others, or where the system does not tell."""
+    """Latency timer of an FTDI adapter (ms); None for others, or where the system does not report it."""
     if port.vendor_id != FTDI:
         return None
     with contextlib.suppress(OSError, ValueError):

@@ -28,7 +28,7 @@ def host_ns() -> int:
 
 
 def suspended_ns() -> int:
-    """How long of `host_ns` this computer was suspended (ns); 0 where the system does not tell."""
+    """How long of `host_ns` this computer was suspended (ns); 0 where the system does not report it."""
     host, awake = _clocks()
     return host - awake
 

@@ -14,7 +14,7 @@ from drivers.packets import LOSS_FIELDS, MAX_GAP_S, count_packet, is_plausible_g
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
-"""What tells the place of a line among the others: its sequence, its time, or only its arrival."""
+"""What gives a line its place among the others: its sequence, its time, or only its arrival."""
 
 STATE = np.dtype(
     [

@@ -174,7 +174,7 @@ def count_packet(state: Record, packet: Record, is_estimated: bool) -> None:
 
 @inlined
 def is_plausible_gap(state: Record, gap: int) -> bool:
-    """Whether the host's clock agrees with the `gap` that a device tells after the connection broke.
+    """Whether the host's clock agrees with the `gap` that a device reports after the connection broke.
 
     A device that lost its power starts counting anew, and its numbers are arbitrary then.
     """

@@ -110,7 +110,7 @@ class PortConfig:
 
 
 def list_ports() -> list[PortInfo]:
-    """Serial ports of this computer, by name; none where the system cannot tell."""
+    """Serial ports of this computer, by name; none where the system cannot list them."""
     try:
         ports = list(serial_list_ports.comports())
     except PLATFORM_ERRORS:  # Windows raises while a device is being unplugged
@@ -321,7 +321,7 @@ class PortUser:
 
 
 def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
-    """Programs that have `device` open, as far as Linux tells it to the same user; none elsewhere."""
+    """Programs that have `device` open, as far as Linux shows it to the same user; none elsewhere."""
     if "://" in device:
         return []
     target = os.path.realpath(device)
@@ -378,7 +378,7 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
             "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again",
             port=url,
         )
-    # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
+    # Windows reports "permission" for a port in use, of which pyserial keeps only the text.
     if number in _BUSY or "PermissionError" in fault:
         return port_busy_error(url, port_users(url))
     if number in _ABSENT or "FileNotFoundError" in fault:

@@ -108,22 +108,22 @@ def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], Non
 def _probe_link(
     link: Port, write: bool, on_progress: Callable[[Message], None]
 ) -> tuple[ProbeOutcome, Message, ListenResult]:
-    heard = listen(link, on_progress)
-    if heard.recognition is not None:
-        return ProbeOutcome.RECOGNISED, EMPTY, heard
-    if heard.received:
-        what = describe_unrecognised(heard.received, has_baud=link.has_baud)
-        return ProbeOutcome.UNREADABLE, what, heard
+    found = listen(link, on_progress)
+    if found.recognition is not None:
+        return ProbeOutcome.RECOGNISED, EMPTY, found
+    if found.received:
+        what = describe_unrecognised(found.received, has_baud=link.has_baud)
+        return ProbeOutcome.UNREADABLE, what, found
     if not write:
         what = message("nothing sends by itself: try --write, which asks the device who it is")
-        return ProbeOutcome.SILENT, what, heard
+        return ProbeOutcome.SILENT, what, found
     answered = query_identity(link, on_progress)
     if answered is not None:
         return ProbeOutcome.RECOGNISED, EMPTY, answered
     what = message(
         "nothing is sent and nothing answers: check cable and power, and that the device is switched on"
     )
-    return ProbeOutcome.SILENT, what, heard
+    return ProbeOutcome.SILENT, what, found
 
 
 def listen(
@@ -190,7 +190,7 @@ def identity_queries() -> list[tuple[str, IdentityQuery]]:
 
 
 def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple[bytes, Recognition | None]:
-    """What comes within `wait_s` and a window after it, and what it is; unknown text is heard for longer."""
+    """What comes within `wait_s` and a window after it, and what it is; unknown text is read for longer."""
     began_s = clock()
     received = b""
     while not received and clock() - began_s < wait_s:

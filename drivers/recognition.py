@@ -9,7 +9,7 @@ from drivers.source import LineSettings
 from messages.message import EMPTY, Message, message
 
 MIN_PACKETS = 3
-"""Fewer frames or lines do not tell a protocol: one can be a coincidence, and the first is often cut."""
+"""Fewer frames or lines do not identify a protocol: one can be a coincidence, and the first is often cut."""
 CHECKED_SHARE = 0.25
 UNCHECKED_SHARE = 0.7
 """Share of the bytes that must be in good frames: with a checksum, which rejects garbage, or without."""
@@ -37,9 +37,9 @@ class Recognition:
     settings: dict[str, str] = field(default_factory=dict)
     """The device's own, as `--set` takes them."""
     rate_hz: float | None = None
-    """Samples a second by the device's own times, else by when the bytes came; None if neither tells."""
+    """Samples a second by the device's own times, else by when the bytes came; None if neither is known."""
     needs_rate: bool = False
-    """Whether `--rate` must be given, because the device does not tell its rate."""
+    """Whether `--rate` must be given, because the device does not send its rate."""
     remark: Message = EMPTY
     """What to check before recording."""
 
@@ -63,7 +63,7 @@ class IdentityQuery:
     line_settings: tuple[LineSettings, ...]
     """Usual ones of such devices."""
     parse: Callable[[bytes], Message | None]
-    """What the answer says of the device, maybe nothing; None while there is no answer."""
+    """Identity in the answer, maybe empty; None while there is no answer."""
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:
@@ -86,7 +86,7 @@ def rate_from_count(samples: int, duration_s: float | None) -> float | None:
 
 
 def describe_unreadable(received: bytes, protocol: str, baud: int | None = None) -> Message:
-    """Say what came instead of good data of `protocol` (usual rate `baud`), and what to do."""
+    """Describe what came instead of good data of `protocol` (usual rate `baud`), and what to do."""
     received = b"".join(read.data for read in Unwrapper().feed(received)) or received
     if not received:
         return message("nothing came, check cable and power, and that the device is sending")
@@ -100,7 +100,7 @@ def describe_unreadable(received: bytes, protocol: str, baud: int | None = None)
 
 
 def describe_unrecognised(received: bytes, *, has_baud: bool) -> Message:
-    """Say what unknown bytes look like (at all baud rates, if the port has any), and what to do."""
+    """Describe unknown bytes (at all baud rates, if the port has any), and what to do."""
     return message(
         "{count} bytes came, first {first}, which no built protocol knows{remedy}",
         count=len(received),

@@ -152,6 +152,6 @@ class SampleSource(ABC):
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Samples completed by `data`; an unfinished rest of bounded size is kept. Exhaust the iterator.
 
-        b"" says that the connection broke here. Missing rows are counted from the device's sequence or time
+        b"" marks where the connection broke. Missing rows are counted from the device's sequence or time
         where the host's clock agrees with it, else estimated from the host's clock.
         """

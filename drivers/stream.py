@@ -31,7 +31,7 @@ _STALL_S = 0.5
 _MIN_WAIT_S = 0.1
 """Bytes that wait in the port are looked at, even if the deadline has passed."""
 _DRAIN_S = 0.3
-"""Devices that were told to stop still send what is in their buffers."""
+"""Stopped devices still send what is in their buffers."""
 
 
 class Decoder(Protocol):
@@ -89,7 +89,7 @@ class StreamSource(SampleSource):
 
     @abstractmethod
     def make_decoder(self, data: bytes) -> Decoder | None:
-        """Decoder, once `data` (all that came so far) tell what it needs to know."""
+        """Decoder, once `data` (all bytes until now) show what it needs."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """See `SampleSource`. Raises NoDataError if a megabyte does not show what a decoder needs to know."""
@@ -122,7 +122,7 @@ class StreamSource(SampleSource):
         return received, False
 
     def await_stream(self, link: Link, is_good: Callable[[bytes], bool], timeout_s: float) -> bytes:
-        """Read until all that came is good. Raises NoDataError, which says what came instead."""
+        """Read until all that came is good. Raises NoDataError, which describes what came instead."""
         received, good = self.await_data(link, timeout_s, is_good)
         if not good:
             raise self.no_data_error(received)
@@ -155,7 +155,7 @@ class StreamSource(SampleSource):
         return received
 
     def no_data_error(self, received: bytes) -> NoDataError:
-        """Error that says what came instead of good data."""
+        """Error that describes what came instead of good data."""
         what = describe_unreadable(received, self._identity.protocol, self._baud)
         _log.info("no good data: %s", what)
         return NoDataError("no good data in {timeout_s:g} s: {what}", timeout_s=self.timeout_s, what=what)

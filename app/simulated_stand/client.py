@@ -1,4 +1,4 @@
-"""The handle of whoever starts a simulated stand; it loads nothing of the simulation itself."""
+"""Client of a simulated stand in its own process; it imports nothing of the simulation."""
 
 import contextlib
 import queue
@@ -16,7 +16,7 @@ from drivers.simulated.faults import parse_disturbance
 
 
 class Ready(msgspec.Struct, frozen=True):
-    """What a simulated stand says once it can be read; `slipstand device simulate --json` prints it."""
+    """What a reader needs to know of a simulated stand; `slipstand device simulate --json` prints it."""
 
     port: str
     protocol: str
@@ -84,7 +84,7 @@ class SimulatedStand:
 
     @property
     def is_running(self) -> bool:
-        """Tell whether the process lives."""
+        """Whether the process runs."""
         return self._child.is_running
 
     def truth(self) -> Truth:
@@ -103,7 +103,7 @@ class SimulatedStand:
         self._child.send(text, self._STOP_S)
 
     def stop(self) -> None:
-        """End the process; `truth` tells all of it from then on. Harmless when it has ended before."""
+        """End the process; may be called twice. `truth` is complete from then on."""
         self._child.stop(self._STOP_S)
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Everything that can be chosen about a simulated stand."""
+"""Options of a simulated stand."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from drivers.registry import find_driver
 from drivers.simulated.faults import parse_disturbance
 
 PULLBACK_MAX_M = 0.1
-"""Nobody pulls a stand back farther; numbers beyond are millimetres by mistake."""
+"""No stand is pulled back farther; larger numbers are millimetres by mistake."""
 
 
 class SimulatedStandError(DriverError):
@@ -66,7 +66,7 @@ _LIMITS = {
 
 
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A simulated stand: what it speaks, what is true of it, what goes wrong on its wire.
+    """A simulated stand: its protocol, its true parameters, and faults of its wire.
 
     SI units. None takes the value of the series' row in Table 1 or, for `static_friction`, that of
     `friction`. Raises ValueError (msgspec.ValidationError when decoded) for a value out of range.
@@ -99,7 +99,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     clock_ppm: float = 0.0
     """How much the device's clock is fast."""
     rate_error: float = 0.0
-    """By what fraction the device samples faster than it says; the times that it sends are right."""
+    """Fraction by which the device samples faster than it reports; the times that it sends are right."""
     first_sequence: int = 0
     """What the device's counter of samples reads at sample 0; it wraps at 2**32."""
     gauge: Literal["table", "relative"] | None = None
@@ -138,8 +138,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     truncate: float = 0.0
     """Fraction of the frames that are cut short."""
     disturbances: tuple[str, ...] = ()
-    """What happens when, after the start of the first stream: `stall 2 at 5`, `unplug 1.5 at 8`, see
-    `drivers.simulated.faults.parse_disturbance`."""
+    """Disturbances with their times after the first start: `stall 2 at 5`; see `faults.parse_disturbance`."""
     seed: int | None = None
     """Makes noise and faults repeatable."""
     truth_file: str | None = None

@@ -20,7 +20,7 @@ from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
 from drivers.errors import DriverError, SettingsError
 from drivers.simulated.faults import Disturbance, parse_disturbance
-from drivers.simulated.transport import Transport, has_pseudo_terminals, open_pseudo_terminal, open_tcp_port
+from drivers.simulated.transport import has_pseudo_terminals, open_pseudo_terminal, open_tcp_port
 
 
 def serve(
@@ -43,7 +43,8 @@ def serve(
         if on_truth is not None:
             on_truth(truth)
 
-    transport = _open_transport(options.tcp_port)
+    is_tcp = options.tcp_port is not None or not has_pseudo_terminals()
+    transport = open_tcp_port(options.tcp_port or 0) if is_tcp else open_pseudo_terminal()
     try:
         stand = SimulatedStandDevice(options, transport, tell_all)
         on_ready(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
@@ -92,12 +93,6 @@ def _decode_disturbance(line: bytes) -> Disturbance:
         return parse_disturbance(line.decode(errors="replace").strip())
     except SettingsError as error:
         raise ValueError(str(error)) from None
-
-
-def _open_transport(tcp_port: int | None) -> Transport:
-    if tcp_port is not None:
-        return open_tcp_port(tcp_port)
-    return open_pseudo_terminal() if has_pseudo_terminals() else open_tcp_port()
 
 
 def stop_on_signal_or_orphaned() -> Callable[[], bool]:

@@ -97,7 +97,7 @@ class SyntheticTest(msgspec.Struct, frozen=True):
 
 
 def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> SystematicErrors:
-    """Draw what is wrong with a stand, from what it says of itself."""
+    """Draw the errors of a stand from its stated uncertainties."""
     rng = np.random.default_rng((seed, 0))
     pair = (gauges.table, gauges.relative)
     gains = [(gauge.gain_relative_standard_uncertainty or 0.0) * rng.standard_normal() for gauge in pair]
@@ -291,7 +291,7 @@ class RecordedTest(msgspec.Struct, frozen=True):
 
 
 def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
-    """`write_test` for a crew: never raises, what goes wrong is in the answer."""
+    """`write_test` for an executor: never raises, errors are in the result."""
     try:
         return RecordedTest(write_test(test).path)
     except Exception as error:
@@ -299,7 +299,7 @@ def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
 
 
 def test_metadata(test: SyntheticTest) -> RunMetadata:
-    """What the run says of itself: the stated stand, and the truth beside it."""
+    """Metadata of the run: the stated stand, and the truth beside it."""
     return create_metadata(
         load_stand(),
         load_gauges(),

@@ -32,7 +32,7 @@ class PairLink:
 
     A device that is gone or silent is reconnected while the other one is read; an empty envelope marks where
     its connection broke. The ports are those of gauge 1 and gauge 2; they are closed here. Each source is
-    called from the thread of its port. `is_resumed` tells that the devices were started before.
+    called from the thread of its port. `is_resumed`: the devices were started before.
     """
 
     def __init__(

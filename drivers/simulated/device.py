@@ -21,7 +21,6 @@ from drivers.simulated.protocol import Command, CommandKind, CommandParser, Poll
 from drivers.simulated.stream_sender import (
     DeviceClock,
     Signal,
-    Stream,
     StreamSender,
     TransmissionLog,
     WireOutput,
@@ -105,7 +104,7 @@ class SimulatedDevice:
         self._parser = CommandParser(protocol.find_commands)
         self._has_reader = False
         self._cable_fault: DisturbanceKind | None = None
-        self._stream: Stream | None = None
+        self._stream: _Stream | None = None
         self._was_interrupted = False
         self._resumed_by_itself = False
         self._session_ns: int | None = None
@@ -220,7 +219,7 @@ class SimulatedDevice:
         signal = self._signal_at(true_rate_hz, self.log.started_s)
         self._stream = self._make_stream(signal, device_rate_hz, now_ns)
 
-    def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:
+    def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> "_Stream":
         clock = DeviceClock(device_rate_hz, self._setup.first_sequence, self._setup.first_time_s)
         return StreamSender(self._output, signal, clock, self.log, now_ns)
 
@@ -277,12 +276,12 @@ class PolledDevice(SimulatedDevice):
             takes_s = self._registers.turnaround_s + len(sent) * self._registers.byte_s
             self._answers.append((request.due_ns + round(takes_s * 1e9), sent))
 
-    def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:  # noqa: ARG002
+    def _make_stream(self, signal: Signal, _device_rate_hz: float, now_ns: int) -> "_Stream":
         return RegisterUpdater(self._registers, signal, self.log, now_ns)
 
 
 class RegisterUpdater:
-    """Takes samples at their rate into the registers of a polled device, and counts them; its `Stream`."""
+    """Takes samples at their rate into the registers of a polled device, and counts them."""
 
     _INTERVAL_S = 0.02
 
@@ -304,3 +303,6 @@ class RegisterUpdater:
             self._log.samples += due
             self._log.samples_clipped += int(np.count_nonzero(status))
         return self._INTERVAL_S
+
+
+_Stream: TypeAlias = StreamSender | RegisterUpdater

@@ -79,7 +79,8 @@ class FrameDamager:
         rates = self._rates
         draw = self._random.random()
         if draw < rates.drop:
-            return self._drop_byte(frame), FrameFault.DROP
+            at = self._choose_byte(frame)
+            return frame[:at] if self.is_line_open else frame[:at] + frame[at + 1 :], FrameFault.DROP
         if draw < rates.drop + rates.flip:
             return self._flip_bit(frame), FrameFault.FLIP
         if draw < rates.drop + rates.flip + rates.truncate:
@@ -91,10 +92,6 @@ class FrameDamager:
         data = self._random.randbytes(len(frame))
         self.is_line_open = bool(self._line_end) and data[-1] not in self._line_end
         return data, FrameFault.GARBAGE
-
-    def _drop_byte(self, frame: bytes) -> bytes:
-        at = self._choose_byte(frame)
-        return frame[:at] if self.is_line_open else frame[:at] + frame[at + 1 :]
 
     def _flip_bit(self, frame: bytes) -> bytes:
         at = self._choose_byte(frame)

@@ -60,7 +60,7 @@ class SimulatedProtocol(ABC):
     line_end = b""
     """What ends a frame; damage to its last byte damages the next frame too. b"" for frames of fixed form."""
     flags_overload = False
-    """Whether a frame says that one of its readings is clipped."""
+    """Whether a frame flags clipped readings."""
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         """Whole commands in `data`, and the number of bytes that were used; the rest may begin a command."""

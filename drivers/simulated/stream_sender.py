@@ -87,13 +87,6 @@ class Signal(Protocol):
         """Counts (count, 2) of the next samples and their overload bits of `SampleStatus` (count,)."""
 
 
-class Stream(Protocol):
-    """Samples since one start of the device."""
-
-    def send_due(self, now_ns: int, has_reader: bool) -> float:
-        """Take and send what is due at the host's monotonic time; returns seconds until the next call."""
-
-
 @dataclass(frozen=True, slots=True)
 class WireOutput:
     """The way of a frame out of the device, with its faults."""

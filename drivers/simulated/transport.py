@@ -123,7 +123,7 @@ class _TcpPort(Transport):
             return False
         try:
             self._reader, _ = self._listener.accept()
-        except OSError:  # nobody there, or gone again
+        except OSError:  # no reader, or gone again
             return False
         self._reader.setblocking(False)
         self._reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -278,7 +278,7 @@ def _open_device_end(link: Path) -> int:
         os.close(device_end)
         raise
     finally:
-        # Once it was open and closed, "no reader" and "nothing sent" can be told apart.
+        # Once it was open and closed, "no reader" and "nothing sent" differ.
         os.close(reader_end)
     os.set_blocking(device_end, False)
     return device_end

@@ -85,10 +85,10 @@ def _checksum(column: Column, line: bytes) -> bytes:
 
 
 class LineDecoder(PacketDecoder):
-    """Bytes to sample blocks; sequence or time columns tell lost samples.
+    """Bytes to sample blocks; sequence or time columns show lost samples.
 
     - A sequence proves missing samples.
-    - A time alone: a line that comes k periods after the one before says that k - 1 are lost
+    - A time alone: a line that comes k periods after the one before shows k - 1 lost ones
       (`missing_estimated`). Losses shorter than the step of the device's clock do not show.
     - Neither: a row stands for each broken line; other losses are estimated from the host's clock, in
       `losses` alone.

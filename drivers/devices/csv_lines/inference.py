@@ -1,4 +1,4 @@
-r"""Layout of lines that nobody has described, inferred from the lines.
+r"""Layout of lines, inferred from the lines.
 
 A SparkFun OpenScale with firmware 1.2 sends `[ms,]value,lbs|kg,[raw,][t,][t,]`, with firmware 1.0
 `[ms,][t,][t,]value,lbs|kg`, each ended by `\r\n`, after a banner; at 9600 baud and two lines a second unless
@@ -149,10 +149,10 @@ def _checksum(lines: list[str], separator: str) -> Column | None:
     """Kind of checksum in the last column, if it is right in most lines."""
     agree = {Column.XOR: 0, Column.CRC: 0}
     for line in lines:
-        before, _, said = line.strip().rpartition(separator)
+        before, _, checksum = line.strip().rpartition(separator)
         data = before.encode("ascii", "replace")
-        agree[Column.XOR] += said.upper() == f"{reduce(xor, data, 0):02X}"
-        agree[Column.CRC] += said.upper() == f"{crc16(data):04X}"
+        agree[Column.XOR] += checksum.upper() == f"{reduce(xor, data, 0):02X}"
+        agree[Column.CRC] += checksum.upper() == f"{crc16(data):04X}"
     found = max(agree, key=lambda column: agree[column])
     return found if agree[found] >= _ALIKE * len(lines) else None
 

@@ -245,13 +245,13 @@ def _check(buffer: UInt8s, start: int, at: int, role: int) -> int:
     digits = 4 if role == ROLE_CRC else 2
     if at + digits >= len(buffer):
         return _BROKEN
-    said = 0
+    sent = 0
     for place in range(at, at + digits):
-        said = said << 4 | int(_HEX_VALUES[buffer[place]])
+        sent = sent << 4 | int(_HEX_VALUES[buffer[place]])
     if role == ROLE_CRC:
         found = int(crc16_slice(buffer, start, at - 1))
     else:
         found = 0
         for place in range(start, at - 1):
             found ^= int(buffer[place])
-    return at + digits if said == found else _BROKEN
+    return at + digits if sent == found else _BROKEN

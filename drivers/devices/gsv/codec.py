@@ -138,7 +138,7 @@ class FrameDecoder(PacketDecoder):
     clock, in `losses` alone. A wrong bit within a value is not noticed. The sample of a frame is given once
     the next frame has begun. After a broken connection, rows stand for the time until the next frame.
 
-    An overload is marked on both gauges, because the device does not say on which input it is.
+    An overload is marked on both gauges, because the device does not report its input.
     """
 
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:

@@ -142,7 +142,7 @@ def rate_from_response(response: Response) -> float | None:
 def text_from_response(response: Response) -> str:
     """A serial number or version as text; "" if the device refuses.
 
-    The manuals do not say for all models how the bytes are to be read: letters are kept, others are dotted.
+    The manuals leave the encoding open for some models: letters are kept, other bytes become numbers.
     """
     if not response.is_ok:
         return ""

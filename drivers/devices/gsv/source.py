@@ -66,7 +66,7 @@ class GsvSource(StreamSource):
         return received
 
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
-        """Decoder once the rate is known and `data` tell how frames are laid out. Raises ProtocolError."""
+        """Decoder once the rate is known and `data` show the layout of frames. Raises ProtocolError."""
         if self._rate_hz is None:
             return None
         if self._layout is None:

@@ -276,9 +276,9 @@ def encode_events(times_s: Floats, counts: Counts, table: int = 0, relative: int
 
 
 class EventDecoder(PacketDecoder):
-    """Bytes to sample blocks; the device's times tell lost samples.
+    """Bytes to sample blocks; the device's times show lost samples.
 
-    An event that comes k periods after the one before says that k - 1 are lost (`missing_estimated`); as many
+    An event that comes k periods after the one before shows k - 1 lost ones (`missing_estimated`); as many
     of them as the bytes between can have held are damaged. Other messages are skipped. A time out of sequence
     is believed only if the next event confirms it, because a checksum of eight bits passes one in 256 damaged
     events. `table` and `relative` are the channels of the gauges, 0 to 7. Readings of `overload_count` and

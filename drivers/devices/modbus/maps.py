@@ -219,4 +219,4 @@ _ALLOWED = {
     "zero_value": _whole(0, 0xFFFF),
     "zero_function": message("{first} or {second}", first=6, second=16),
 }
-"""What messages say is allowed, by the keys of a map."""
+"""Allowed values in messages, by the keys of a map."""

@@ -38,7 +38,7 @@ def find_commands(data: bytes) -> tuple[list[Command], int]:
 
 
 def _request_bytes(data: bytes, at: int) -> int:
-    """Length of the request at `at`; 0 while it cannot be told."""
+    """Length of the request at `at`; 0 while it is not known."""
     if len(data) < at + _READ_BYTES:
         return 0
     return 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES

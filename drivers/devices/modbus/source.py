@@ -97,7 +97,7 @@ class ModbusSource(StreamSource):
 
     @property
     def run_note(self) -> Message:
-        """That the rate is quasi-static, the caution of the map, and the skew of two requests."""
+        """Quasi-static rate, caution of the map, and skew of two requests."""
         parts: list[Message] = []
         if self.rate_hz < QUASI_STATIC_HZ:
             parts.append(
@@ -336,7 +336,7 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
 
 
 def explain(received: bytes) -> Message | None:
-    """What a Modbus exception in `received` says; None without one."""
+    """Meaning of a Modbus exception in `received`; None without one."""
     refused = frames.find_exception(received)
     if refused is None:
         return None

@@ -1,4 +1,4 @@
-"""A device that speaks Slipstand binary, as a `SampleSource`."""
+"""A device with the Slipstand binary protocol, as a `SampleSource`."""
 
 import time
 
