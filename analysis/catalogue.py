@@ -4,11 +4,12 @@ The window, the command line, the campaign's table, reports, exports and LaTeX r
 row; with `column` it is also a column of the campaign's table.
 """
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
-from analysis.formatting import FormattedValue, format_value
+from analysis.formatting import FormattedValue, format_fixed, format_value
 from analysis.quantities import Quantity
 from messages.i18n import N_
 
@@ -87,6 +88,18 @@ class Unit:
         """Unit in LaTeX."""
         return self.latex or self.symbol
 
+    def number(self, value: float, decimals: int) -> str:
+        """Write an SI value in this unit with fixed decimals: `12.30`; a dash for NaN."""
+        return format_fixed(self.scale * value, decimals) if math.isfinite(value) else "–"
+
+    def text(self, value: float, decimals: int) -> str:
+        """Write an SI value with this unit: `12.30 mm`."""
+        return f"{self.number(value, decimals)} {self.symbol}"
+
+    def labelled(self, name: str) -> str:
+        """Label of an axis or column: `residual (µm)`."""
+        return f"{name} ({self.symbol})"
+
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
@@ -150,15 +163,18 @@ class QuantityDefinition:
 
 
 _NUMBER = Unit("")
-_MILLIMETRE = Unit("mm", 1e3)
-_MILLISECOND = Unit("ms", 1e3)
-_MILLIRADIAN = Unit("mrad", 1e3)
-_PER_SECOND = Unit("1/s", latex="s$^{-1}$")
+MICROMETRE = Unit("µm", 1e6)
+MILLIMETRE = Unit("mm", 1e3)
+MILLISECOND = Unit("ms", 1e3)
+SECOND = Unit("s")
+MILLIRADIAN = Unit("mrad", 1e3)
+PER_SECOND = Unit("1/s", latex="s$^{-1}$")
 _RADIANS_PER_SECOND = Unit("rad/s", latex="s$^{-1}$")
 _MILLIMETRES_PER_SECOND = Unit("mm/s", 1e3)
-_METRES_PER_SECOND = Unit("m/s")
-_ACCELERATION = Unit("m/s²", latex="m/s$^2$")
-_IN_METRES = {Place.TABLE: _METRES_PER_SECOND, Place.REPORT: _METRES_PER_SECOND}
+METRES_PER_SECOND = Unit("m/s")
+KILOGRAM = Unit("kg")
+ACCELERATION = Unit("m/s²", latex="m/s$^2$")
+_IN_METRES = {Place.TABLE: METRES_PER_SECOND, Place.REPORT: METRES_PER_SECOND}
 
 CATALOGUE: Final = (
     QuantityDefinition(
@@ -183,9 +199,9 @@ CATALOGUE: Final = (
     QuantityDefinition(
         "stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"), _MILLIMETRES_PER_SECOND
     ),
-    QuantityDefinition("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), _MILLIRADIAN),
+    QuantityDefinition("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), MILLIRADIAN),
     QuantityDefinition(
-        "period_s", Symbol("T"), "s", N_("period"), _MILLISECOND, {Place.TABLE: Unit("s")},
+        "period_s", Symbol("T"), "s", N_("period"), MILLISECOND, {Place.TABLE: SECOND},
         column=TableColumn(3, "period_s", is_of_stand=True),
     ),
     QuantityDefinition(
@@ -196,14 +212,14 @@ CATALOGUE: Final = (
         N_("log decrement of the turning points"), _NUMBER, is_minor=True,
     ),
     QuantityDefinition(
-        "damping_n1_per_s", Symbol("n", "1"), "1/s", N_("damping"), _PER_SECOND,
+        "damping_n1_per_s", Symbol("n", "1"), "1/s", N_("damping"), PER_SECOND,
         column=TableColumn(5, "damping_n1_per_s", is_of_stand=True),
     ),
     QuantityDefinition(
-        "damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), _PER_SECOND,
+        "damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), PER_SECOND,
         column=TableColumn(6, "damping_n2_per_s", is_of_stand=True),
     ),
-    QuantityDefinition("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), _PER_SECOND),
+    QuantityDefinition("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), PER_SECOND),
     QuantityDefinition(
         "stiffness_n_per_m", Symbol("c"), "N/m", N_("stiffness"), Unit("N/m"), {Place.WINDOW: Unit("kN/m",
         1e-3)},
@@ -228,16 +244,16 @@ CATALOGUE: Final = (
     QuantityDefinition(
         "damping_ratio", Symbol("ζ", ascii="damping ratio"), "1", N_("damping ratio"), _NUMBER, is_minor=True
     ),
-    QuantityDefinition("pullback_m", Symbol("u", "0"), "m", N_("pullback"), _MILLIMETRE),
+    QuantityDefinition("pullback_m", Symbol("u", "0"), "m", N_("pullback"), MILLIMETRE),
     QuantityDefinition(
-        "residual_displacement_m", Symbol("u", "s"), "m", N_("residual displacement"), _MILLIMETRE,
+        "residual_displacement_m", Symbol("u", "s"), "m", N_("residual displacement"), MILLIMETRE,
         column=TableColumn(
             4, "residual_displacement_m", is_proportional=False,
             missing=N_("Slip had not ended when the record did: u_s is not known."),
         ),
     ),
     QuantityDefinition(
-        "coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), _MILLIMETRE
+        "coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), MILLIMETRE
     ),
     QuantityDefinition(
         "table_velocity_max_m_per_s", Symbol("v", "max"), "m/s", N_("table velocity"),
@@ -250,15 +266,15 @@ CATALOGUE: Final = (
     ),
     QuantityDefinition(
         "table_acceleration_max_m_per_s2", Symbol("a", "max"), "m/s2", N_("table acceleration"),
-        _ACCELERATION,
+        ACCELERATION,
         column=TableColumn(10, "acceleration_max_m_per_s2"),
     ),
     QuantityDefinition(
-        "plate_acceleration_max_m_per_s2", Symbol("a", "2"), "m/s2", N_("plate acceleration"), _ACCELERATION,
+        "plate_acceleration_max_m_per_s2", Symbol("a", "2"), "m/s2", N_("plate acceleration"), ACCELERATION,
         is_minor=True,
     ),
     QuantityDefinition(
-        "plate_mass_kg", Symbol("m", "2"), "kg", N_("plate mass"), Unit("kg"),
+        "plate_mass_kg", Symbol("m", "2"), "kg", N_("plate mass"), KILOGRAM,
         column=TableColumn(1, "plate_mass_kg"), is_minor=True,
     ),
 )  # fmt: skip

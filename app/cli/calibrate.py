@@ -11,6 +11,7 @@ import typer
 from analysis.calibration.calibrate import Calibration, DialGauge
 from analysis.calibration.calibrate import calibrate as find_calibration
 from analysis.calibration.points import CalibrationPoints
+from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.formatting import format_value
 from app.acquisition.messages import PortSettings
 from app.cli import output as out
@@ -277,7 +278,14 @@ def calibration_document(
 def _say_readings(found: Calibration) -> None:
     readings, most_m = found.points, float(max(abs(found.residual_m))) or 1.0
     out.print_table(
-        ("round", "way", "dial (mm)", "counts", "residual (µm)", _scale(most_m)),
+        (
+            "round",
+            "way",
+            MILLIMETRE.labelled("dial"),
+            "counts",
+            MICROMETRE.labelled("residual"),
+            _scale(most_m),
+        ),
         [
             (
                 str(readings.round_number[i]),
@@ -318,6 +326,6 @@ def _say_result(found: Calibration) -> None:
         out.print_line(f"polynomial     {terms} (1/m, 1/m²)")
     for name, label in _MERITS:
         value_m = getattr(found.characteristics, name)
-        out.print_line(f"{label:14} {'not known' if value_m is None else f'{value_m * 1e6:.1f} µm'}")
-    whole_um = found.displacement_standard_uncertainty_m * 1e6
-    out.print_line(f"displacement   standard uncertainty {whole_um:.1f} µm within the readings")
+        out.print_line(f"{label:14} {'not known' if value_m is None else MICROMETRE.text(value_m, 1)}")
+    whole = MICROMETRE.text(found.displacement_standard_uncertainty_m, 1)
+    out.print_line(f"displacement   standard uncertainty {whole} within the readings")

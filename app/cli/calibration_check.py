@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal, cast
 import typer
 
 from analysis.calibration.known_displacement import DisplacementCheck
+from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.formatting import format_signed
 from app.acquisition.averaged_counts import AveragedCounts, CountAverager
 from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
 from app.acquisition.run_setup import complete_port_settings
@@ -155,12 +157,11 @@ def _report(found: DisplacementCheck, entry: GaugeCheck, as_json: bool) -> None:
         ("measured", found.measured_m),
         ("deviation", found.deviation_m),
     ):
-        out.print_line(f"{label:10} {value_m * 1e3:+.4f} mm")
-    out.print_line(
-        f"{'tolerance':10} {found.tolerance_m * 1e3:.4f} mm, twice the combined standard uncertainty of"
-    )
+        out.print_line(f"{label:10} {format_signed(MILLIMETRE.scale * value_m, 4)} {MILLIMETRE.symbol}")
+    tolerance = MILLIMETRE.text(found.tolerance_m, 4)
+    out.print_line(f"{'tolerance':10} {tolerance}, twice the combined standard uncertainty of")
     for line in found.budget:
-        said = f"{line.standard_uncertainty * 1e6:.1f} µm"
+        said = MICROMETRE.text(line.standard_uncertainty, 1)
         out.print_line(
             f"           {'not stated' if math.isnan(line.standard_uncertainty) else said:>10}  {line.source}"
         )

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from analysis.catalogue import definition
+from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, definition
 from analysis.formatting import format_value
 from app.cli import output as out
 from app.cli.motion_options import MotionOptions, check_samples
@@ -67,21 +67,20 @@ def _print_plan(document: dict[str, Any]) -> None:
 
 def _print_motion(document: dict[str, Any]) -> None:
     slip_end = f"{document['slip_end_s']:.2f} s after release, in {document['phases']} phases"
-    out.print_line(f"residual displacement  {document['residual_displacement_m'] * 1e3:.2f} mm")
+    out.print_line(f"residual displacement  {MILLIMETRE.text(document['residual_displacement_m'], 2)}")
     out.print_line(f"slip ends              {slip_end if document['slip_end_s'] else 'never began'}")
     if (rest_s := document["rest_s"]) is not None:
         out.print_line(f"at rest                {rest_s:.0f} s after release (swing as small as the noise)")
     for body in ("table", "plate"):
-        velocity, acceleration = (
-            document[f"{body}_{name}"] for name in ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
-        )
-        out.print_line(f"{body} at most          {velocity:.3f} m/s, {acceleration:.2f} m/s²")
+        velocity = METRES_PER_SECOND.text(document[f"{body}_velocity_max_m_per_s"], 3)
+        acceleration = ACCELERATION.text(document[f"{body}_acceleration_max_m_per_s2"], 2)
+        out.print_line(f"{body} at most          {velocity}, {acceleration}")
     out.print_line(f"MSK-64                 degree {document['msk64_degree']}")
 
 
 def _print_gauges(document: dict[str, Any]) -> None:
     for channel, (name, use) in enumerate(document["gauges"].items(), start=1):
-        reach = f"{use['lowest_m'] * 1e3:.2f} to {use['highest_m'] * 1e3:.2f} mm"
+        reach = f"{MILLIMETRE.number(use['lowest_m'], 2)} to {MILLIMETRE.text(use['highest_m'], 2)}"
         share = "" if use["share"] is None else f", {100 * use['share']:.0f} % of its range"
         out.print_line(f"gauge {channel} ({name})".ljust(23) + reach + share)
     tests = document["tests_without_recentring"]

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, definition
 from analysis.motion.paper_method import simulate as simulate_by_paper
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from app.cli import output as out
@@ -131,14 +132,17 @@ def _write_csv(path: Path, motion: Motion, rate_hz: float, *, replace: bool) -> 
 
 
 def _print_motion(document: dict[str, Any]) -> None:
-    out.print_line(f"residual displacement   {document['residual_displacement_m'] * 1e3:.4f} mm")
+    out.print_line(f"residual displacement   {MILLIMETRE.text(document['residual_displacement_m'], 4)}")
     out.print_line(
         f"slip ends               {document['slip_end_s']:.4f} s after {document['phases']} phases"
     )
     for body in ("table", "plate"):
-        out.print_line(
-            f"{body} at most          {document[f'{body}_velocity_max_m_per_s']:.4f} m/s, "
-            f"{document[f'{body}_acceleration_max_m_per_s2']:.3f} m/s²"
-        )
-    out.print_line(f"stiffness c             {document['stiffness_n_per_m']:.1f} N/m")
-    out.print_line(f"damping coefficient mu  {document['damping_coefficient_kg_per_s']:.3f} kg/s")
+        velocity = METRES_PER_SECOND.text(document[f"{body}_velocity_max_m_per_s"], 4)
+        acceleration = ACCELERATION.text(document[f"{body}_acceleration_max_m_per_s2"], 3)
+        out.print_line(f"{body} at most          {velocity}, {acceleration}")
+    for label, name, decimals in (
+        ("stiffness c", "stiffness_n_per_m", 1),
+        ("damping coefficient mu", "damping_coefficient_kg_per_s", 3),
+    ):
+        unit = definition(name).unit_at(Place.TERMINAL)
+        out.print_line(f"{label:23} {unit.text(document[name], decimals)}")

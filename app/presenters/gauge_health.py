@@ -5,10 +5,11 @@ from typing import Final
 
 import numpy as np
 
+from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.formatting import MINUS, with_unit
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
 from app.presenters.base import LabelledValue
-from app.presenters.number_text import format_fixed
+from app.presenters.number_text import format_fixed, format_in
 from messages.i18n import gettext, translate
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
@@ -61,7 +62,7 @@ def _figures(health: GaugeHealth) -> list[LabelledValue]:
         value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty_m_per_min)
     )
     return [
-        LabelledValue(gettext("reading"), with_unit(format_fixed(health.mean_m * 1e3, 3), "mm")),
+        LabelledValue(gettext("reading"), format_in(MILLIMETRE, health.mean_m, 3)),
         LabelledValue(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
         LabelledValue(
             gettext("drift"),
@@ -86,5 +87,6 @@ def _hum(hum: Hum) -> str:
 
 
 def _micrometres(value_m: float) -> str:
-    size_um = value_m * 1e6  # from the nanometres of a converter's step to the millimetres of a moving table
-    return with_unit(f"{size_um:.3g}" if size_um < 100.0 else format_fixed(size_um, 0), "µm")
+    # From the nanometres of a converter's step to the millimetres of a moving table.
+    size_um = MICROMETRE.scale * value_m
+    return with_unit(f"{size_um:.3g}" if size_um < 100.0 else format_fixed(size_um, 0), MICROMETRE.symbol)

@@ -3,6 +3,7 @@
 import math
 
 from analysis import formatting
+from analysis.catalogue import MILLIMETRE, Unit
 from analysis.formatting import MINUS, format_value, typeset, with_unit
 from analysis.quantities import Quantity
 from messages.message import MessageError
@@ -46,7 +47,12 @@ def format_uncertain(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
 
 def format_millimetres(value_m: float, decimals: int = 1) -> str:
     """Write a length (m) in millimetres, without unit; a dash for NaN."""
-    return format_fixed(value_m * 1e3, decimals) if math.isfinite(value_m) else "–"
+    return typeset(MILLIMETRE.number(value_m, decimals))
+
+
+def format_in(unit: Unit, value: float, decimals: int = 1) -> str:
+    """Write an SI value with its unit; a dash for NaN."""
+    return with_unit(typeset(unit.number(value, decimals)), unit.symbol)
 
 
 def format_fixed(value: float, decimals: int) -> str:

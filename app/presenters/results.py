@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 
-from analysis.catalogue import CATALOGUE, Place, QuantityDefinition, definition
+from analysis.catalogue import CATALOGUE, MICROMETRE, Place, QuantityDefinition, definition
 from analysis.formatting import typeset, with_unit
 from analysis.identification import ModelSelection
 from analysis.quantities import Quantity, ResultWarning
@@ -172,8 +172,7 @@ def in_words(message: Message | str) -> str:
 
 def format_micrometres(length_m: float) -> str:
     """Write a small length (m) as `21 µm`."""
-    size_um = length_m * 1e6
-    return with_unit(number_text.format_fixed(size_um, 0 if size_um >= 10.0 else 1), "µm")
+    return number_text.format_in(MICROMETRE, length_m, 0 if length_m >= 10e-6 else 1)
 
 
 def headline_key(run: AnalysedRun) -> str:

@@ -6,9 +6,10 @@ from typing import Final
 
 import msgspec
 
+from analysis.catalogue import KILOGRAM, MILLIMETRE, MILLIRADIAN, MILLISECOND, PER_SECOND
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
-from app.presenters.number_text import format_fixed, format_millimetres, parse_field
+from app.presenters.number_text import format_in, parse_field
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
@@ -146,12 +147,12 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
         gettext("series"): stand.series,
         "f<sub>d</sub>": f"{stand.friction_dynamic:.5g}",
         "f<sub>s</sub>": f"{stand.friction_static:.5g}",
-        gettext("tilt"): with_unit(typeset(f"{stand.tilt_rad * 1e3:.3g}"), "mrad"),
-        gettext("pullback"): with_unit(format_millimetres(stand.pullback_m, 2), "mm"),
-        "T": with_unit(format_fixed(stand.period_s * 1e3, 2), "ms"),
-        "n<sub>1</sub>": with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s"),
-        gettext("table, plate"): with_unit(masses, "kg"),
-        gettext("slip of a release"): with_unit(format_millimetres(truth.residual_displacement_m, 3), "mm"),
+        gettext("tilt"): with_unit(typeset(f"{MILLIRADIAN.scale * stand.tilt_rad:.3g}"), MILLIRADIAN.symbol),
+        gettext("pullback"): format_in(MILLIMETRE, stand.pullback_m, 2),
+        "T": format_in(MILLISECOND, stand.period_s, 2),
+        "n<sub>1</sub>": with_unit(f"{stand.damping_n1_per_s:.4g}", PER_SECOND.symbol),
+        gettext("table, plate"): with_unit(masses, KILOGRAM.symbol),
+        gettext("slip of a release"): format_in(MILLIMETRE, truth.residual_displacement_m, 3),
         gettext("releases"): releases,
         gettext("frames sent"): f"{wire.frames}",
         gettext("damaged, lost"): f"{wire.frames_damaged}, {wire.frames_lost}",

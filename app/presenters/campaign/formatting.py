@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.catalogue import Place, QuantityDefinition, TableColumn, table_columns
+from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn, table_columns
 from analysis.formatting import typeset, with_unit
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -254,7 +254,7 @@ def _expectations(expected: PlannedTest) -> tuple[str, ...]:
     if expected.friction is not None:
         said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
-        length = with_unit(number_text.format_millimetres(abs(expected.residual_displacement_m)), "mm")
+        length = number_text.format_in(MILLIMETRE, abs(expected.residual_displacement_m))
         said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
     return (*said, *expected.warnings)
 

@@ -4,10 +4,11 @@ import datetime
 from collections.abc import Iterator
 from typing import Final
 
-from analysis.formatting import typeset, with_unit
+from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.formatting import format_signed, typeset, with_unit
 from app.presenters.base import Chip, LabelledValue, Tone
 from app.presenters.gauges.state import NAMES, GaugeCard
-from app.presenters.number_text import format_fixed, format_millimetres
+from app.presenters.number_text import format_in
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext
 
@@ -54,15 +55,14 @@ def last_check_chip(check: GaugeCheck | None) -> Chip:
     """Outcome of the last check of the calibration in use."""
     if check is None:
         return Chip(gettext("Not checked yet"), Tone.PLAIN, gettext(_CHECK))
-    off = with_unit(f"{check.deviation_m * 1e6:+.0f}".replace("-", "\u2212"), "µm")
-    allowed = with_unit(f"{check.tolerance_m * 1e6:.0f}", "µm")
+    off = typeset(format_signed(MICROMETRE.scale * check.deviation_m, 0))
     reference_kind = gettext("Known shunt") if check.kind == "shunt" else gettext("Known displacement")
     text = gettext(
         "{time}: {off} at {known}, {allowed} allowed",
         time=f"{check.at:%Y-%m-%d %H:%M}",
-        off=off,
-        known=with_unit(format_millimetres(check.expected_m, 3), "mm"),
-        allowed=allowed,
+        off=with_unit(off, MICROMETRE.symbol),
+        known=format_in(MILLIMETRE, check.expected_m, 3),
+        allowed=format_in(MICROMETRE, check.tolerance_m, 0),
     )
     by = f"{reference_kind}. {check.reference} {check.checked_by}".strip()
     if check.passed:
@@ -79,7 +79,9 @@ def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.dat
 
 
 def _values(gauge: Gauge) -> Iterator[LabelledValue]:
-    gain = with_unit(typeset(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
+    gain = with_unit(
+        typeset(f"{MICROMETRE.scale * gauge.gain_m_per_count:.6g}"), f"{MICROMETRE.symbol}/count"
+    )
     relative = gauge.gain_relative_standard_uncertainty
     yield LabelledValue(gettext("gain"), gain)
     yield LabelledValue(
@@ -93,9 +95,7 @@ def _values(gauge: Gauge) -> Iterator[LabelledValue]:
         )
     yield LabelledValue(gettext("range"), _range(gauge.range_m))
     if gauge.nonlinearity_m is not None:
-        yield LabelledValue(
-            gettext("non-linearity"), with_unit(format_fixed(gauge.nonlinearity_m * 1e6, 1), "µm")
-        )
+        yield LabelledValue(gettext("non-linearity"), format_in(MICROMETRE, gauge.nonlinearity_m))
     yield LabelledValue(gettext("calibrated"), gauge.date.isoformat() if gauge.date else gettext(_NOT_STATED))
     yield LabelledValue(gettext("by"), gauge.calibrated_by or gettext(_NOT_STATED))
     yield LabelledValue(gettext("reference"), gauge.reference or gettext(_NOT_STATED))
@@ -104,4 +104,6 @@ def _values(gauge: Gauge) -> Iterator[LabelledValue]:
 
 
 def _range(range_m: float | None) -> str:
-    return gettext(_NOT_STATED) if range_m is None else with_unit(f"± {range_m * 1e3:g}", "mm")
+    if range_m is None:
+        return gettext(_NOT_STATED)
+    return with_unit(f"± {MILLIMETRE.scale * range_m:g}", MILLIMETRE.symbol)

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 from analysis.calibration.calibrate import Calibration, DialGauge, calibrate
 from analysis.calibration.known_displacement import DisplacementCheck
 from analysis.calibration.points import CalibrationPoints
+from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
 from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge, gauge_samples
@@ -25,7 +26,7 @@ from app.presenters.gauges.tasks import (
     SaveCalibration,
     SavedCalibration,
 )
-from app.presenters.number_text import format_fixed
+from app.presenters.number_text import format_in
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, write_points
 from config.files import (
     activate_calibration,
@@ -132,7 +133,7 @@ def _calibration_fit(found: Calibration) -> CalibrationFit:
 def _micrometres(value_m: float | None) -> str:
     if value_m is None or not math.isfinite(value_m):
         return gettext("not known yet")
-    return with_unit(format_fixed(value_m * 1e6, 1), "µm")
+    return format_in(MICROMETRE, value_m)
 
 
 def _save_calibration(task: SaveCalibration) -> SavedCalibration:
@@ -179,7 +180,7 @@ def _check_values(found: DisplacementCheck) -> Iterator[LabelledValue]:
         (gettext("off by"), found.deviation_m),
         (gettext("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
-        yield LabelledValue(words, with_unit(format_fixed(value_m * 1e3, 4), "mm"))
+        yield LabelledValue(words, format_in(MILLIMETRE, value_m, 4))
     for line in found.budget:
         value = line.standard_uncertainty
         yield LabelledValue(

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.catalogue import MILLIMETRE
 from analysis.formatting import THIN_SPACE, with_unit
 from analysis.quantities import Quantity
 from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition
@@ -272,9 +273,7 @@ def tare_chip(live: LiveTraces | None) -> Chip:
     """Offsets of the tare that was set; None if the stand moved."""
     if live is None:
         return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
-    by = gettext(" and ").join(
-        with_unit(number_text.format_millimetres(m, 2), "mm") for m in live.tare_m.tolist()
-    )
+    by = gettext(" and ").join(number_text.format_in(MILLIMETRE, m, 2) for m in live.tare_m.tolist())
     hint = gettext("The calibration and what is stored stay as they are")
     return Chip(gettext("Tared by {by}", by=by), Tone.OK, hint)
 
@@ -370,7 +369,7 @@ class GaugeMonitor:
         value_m = (rows.table_m, rows.relative_m)[self.channel][-1]
         range_m, until = self.gauge.range_m, self.gauge.valid_until
         if range_m is not None and abs(value_m) > _NEAR_LIMIT * range_m:
-            at = with_unit(number_text.format_millimetres(value_m), "mm")
+            at = number_text.format_in(MILLIMETRE, value_m)
             hint = gettext("It stands at {at}.", at=at)
             return Chip(gettext("{name} at its limit", name=self.name), Tone.WARN, hint)
         if until is not None and until < today:

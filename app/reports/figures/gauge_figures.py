@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.calibration.calibrate import Calibration
+from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.gauge_health import GaugeHealth
 from analysis.preparation.noise import MAINS_HZ
 from app.reports.figures.style import DASHED, MUTED, PLATE, SIMULATION, TABLE, print_style, save_figure
@@ -29,20 +30,19 @@ def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
 def _draw_calibration(curve: Axes, residual: Axes, found: Calibration) -> None:
     readings = found.points
     counts = np.linspace(readings.counts.min(), readings.counts.max(), 201)
-    curve.plot(
-        found.displacement_m(counts) * 1e3, counts, color=SIMULATION, linewidth=0.9, label="calibration"
-    )
+    curve_mm = MILLIMETRE.scale * found.displacement_m(counts)
+    curve.plot(curve_mm, counts, color=SIMULATION, linewidth=0.9, label="calibration")
     for way, label, colour, mark in _BRANCHES:
         shown = readings.direction == way
-        dial_mm = readings.dial_m[shown] * 1e3
+        dial_mm = readings.dial_m[shown] * MILLIMETRE.scale
         style: dict[str, Any] = {"linestyle": "", "marker": mark, "color": colour, "label": label}
         curve.plot(dial_mm, readings.counts[shown], **style)
-        residual.plot(dial_mm, found.residual_m[shown] * 1e6, **style)
+        residual.plot(dial_mm, found.residual_m[shown] * MICROMETRE.scale, **style)
     residual.axhline(0.0, color=MUTED, linewidth=0.8)
     curve.set_ylabel("counts")
     curve.legend()
-    residual.set_ylabel("dial − calibration (µm)")
-    residual.set_xlabel("dial gauge (mm)")
+    residual.set_ylabel(MICROMETRE.labelled("dial − calibration"))
+    residual.set_xlabel(MILLIMETRE.labelled("dial gauge"))
 
 
 def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:
@@ -57,8 +57,8 @@ def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequenc
 def _draw_spectra(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> None:
     for health, name, colour, dash in zip(gauges, names, (TABLE, PLATE), ("-", DASHED), strict=False):
         spectrum = health.spectrum
-        label = f"{name}, {health.noise_rms_m * 1e6:.3g} µm rms"
-        density_um = spectrum.density_m_per_sqrt_hz[1:] * 1e6
+        label = f"{name}, {MICROMETRE.scale * health.noise_rms_m:.3g} {MICROMETRE.symbol} rms"
+        density_um = spectrum.density_m_per_sqrt_hz[1:] * MICROMETRE.scale
         axes.loglog(spectrum.frequency_hz[1:], density_um, color=colour, linestyle=dash, label=label)
     for frequency_hz in MAINS_HZ:
         axes.axvline(frequency_hz, color=MUTED, linewidth=0.8, linestyle=(0, (2, 3)))

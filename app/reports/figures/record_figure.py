@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.identification import Curves, Identification
 from analysis.record import Record
 from app.reports.figures.style import PLATE, SIMULATION, TABLE, decimate_for_print, print_style, save_figure
@@ -37,10 +38,10 @@ def record_figure(record: Record, identification: Identification) -> Figure:
     time_s = record.time_s - (identification.events.release_s or 0.0)
     shown = _shown(time_s, identification)
     curves = identification.curves(record.time_s[shown]) if identification.curves else None
-    label = "plate $u_2$ (mm)" if record.gauge_2_measures_plate else r"relative $u_2 - u_1$ (mm)"
+    label = "plate $u_2$" if record.gauge_2_measures_plate else "relative $u_2 - u_1$"
     fits = (curves.table_displacement_m, curves.relative_displacement_m) if curves else (None, None)
     channels = [
-        ("table $u_1$ (mm)", TABLE, record.table_displacement_m, fits[0]),
+        ("table $u_1$", TABLE, record.table_displacement_m, fits[0]),
         (label, PLATE, record.relative_displacement_m, fits[1]),
     ]
     panels = [(name, colour, read[shown], fit) for name, colour, read, fit in channels if read is not None]
@@ -69,19 +70,13 @@ def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.boo
 def _channel(
     axes: Axes, label: str, colour: str, time_s: FloatArray, reading_m: FloatArray, fit_m: FloatArray | None
 ) -> None:
-    axes.plot(
-        *decimate_for_print(time_s, reading_m * 1e3), color=colour, linewidth=2.0, alpha=0.6, label="record"
-    )
+    record = decimate_for_print(time_s, MILLIMETRE.scale * reading_m)
+    axes.plot(*record, color=colour, linewidth=2.0, alpha=0.6, label="record")
     if fit_m is not None:
-        axes.plot(
-            *decimate_for_print(time_s, fit_m * 1e3),
-            color=SIMULATION,
-            linewidth=0.9,
-            linestyle=(0, (4, 3)),
-            label="simulation",
-        )
+        simulation = decimate_for_print(time_s, MILLIMETRE.scale * fit_m)
+        axes.plot(*simulation, color=SIMULATION, linewidth=0.9, linestyle=(0, (4, 3)), label="simulation")
     axes.legend(loc="upper right", ncols=2)
-    axes.set_ylabel(label)
+    axes.set_ylabel(MILLIMETRE.labelled(label))
 
 
 def _residual(
@@ -92,16 +87,18 @@ def _residual(
     curves: Curves,
     identification: Identification,
 ) -> None:
-    axes.set_ylabel("record − simulation (µm)")
-    residual_m = record.table_displacement_m[shown] - curves.table_displacement_m
-    axes.plot(*decimate_for_print(time_s, residual_m * 1e6), color=TABLE, linewidth=0.5, label="table")
-    if record.relative_displacement_m is not None and curves.relative_displacement_m is not None:
-        residual_m = record.relative_displacement_m[shown] - curves.relative_displacement_m
-        axes.plot(*decimate_for_print(time_s, residual_m * 1e6), color=PLATE, linewidth=0.5, label="relative")
+    axes.set_ylabel(MICROMETRE.labelled("record − simulation"))
+    for reading_m, fit_m, colour, label in (
+        (record.table_displacement_m, curves.table_displacement_m, TABLE, "table"),
+        (record.relative_displacement_m, curves.relative_displacement_m, PLATE, "relative"),
+    ):
+        if reading_m is not None and fit_m is not None:
+            residual = decimate_for_print(time_s, MICROMETRE.scale * (reading_m[shown] - fit_m))
+            axes.plot(*residual, color=colour, linewidth=0.5, label=label)
     if identification.model:
-        noise_um = identification.model.noise_rms_m * 1e6
-        for level, label in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):
-            axes.axhline(level, color=SIMULATION, linewidth=0.8, linestyle=":", label=label)
+        noise_um = MICROMETRE.scale * identification.model.noise_rms_m
+        for level, text in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):
+            axes.axhline(level, color=SIMULATION, linewidth=0.8, linestyle=":", label=text)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
     axes.legend(loc="upper right", ncols=3)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.catalogue import Place, definition
+from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, definition
 from analysis.identification import Identification
 from analysis.laws.catalogue import law_with_own_parameters
 from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
@@ -178,48 +178,47 @@ class RunFigure:
 def _table_displacement(axes: Axes, run: RunFigureData) -> None:
     _experiment(axes, run, run.table_m, TABLE)
     if run.motion is not None:
-        _simulated(axes, run.motion.time_s, run.motion.table_displacement_m * 1e3)
-    axes.set_ylabel("table $u_1$ (mm)")
+        _simulated(axes, run.motion.time_s, run.motion.table_displacement_m * MILLIMETRE.scale)
+    axes.set_ylabel(MILLIMETRE.labelled("table $u_1$"))
 
 
 def _both_displacements(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
-    table, relative = motion.table_displacement_m, motion.relative_displacement_m
-    _bodies(axes, motion.time_s, (table * 1e3, (table + relative) * 1e3), ("table $u_1$", "plate $u_2$"))
-    axes.set_ylabel("displacement (mm)")
+    table = MILLIMETRE.scale * motion.table_displacement_m
+    plate = table + MILLIMETRE.scale * motion.relative_displacement_m
+    _bodies(axes, motion.time_s, (table, plate), ("table $u_1$", "plate $u_2$"))
+    axes.set_ylabel(MILLIMETRE.labelled("displacement"))
 
 
 def _relative_displacement(axes: Axes, run: RunFigureData) -> None:
     if run.relative_m is not None:
-        axes.plot(
-            run.time_s, run.relative_m * 1e3, color=PLATE, linewidth=2.2, alpha=0.45, label="experiment"
-        )
+        relative = MILLIMETRE.scale * run.relative_m
+        axes.plot(run.time_s, relative, color=PLATE, linewidth=2.2, alpha=0.45, label="experiment")
     if run.motion is not None:
-        _simulated(axes, run.motion.time_s, run.motion.relative_displacement_m * 1e3)
-    axes.set_ylabel("relative $u_2 - u_1$ (mm)")
+        _simulated(axes, run.motion.time_s, run.motion.relative_displacement_m * MILLIMETRE.scale)
+    axes.set_ylabel(MILLIMETRE.labelled("relative $u_2 - u_1$"))
 
 
 def _velocities(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     both = motion.table_velocity_m_per_s, motion.plate_velocity_m_per_s
-    _rates(axes, run, both, ("v", "velocity", "m/s"), "velocity_max_m_per_s")
+    _rates(axes, run, both, "v", METRES_PER_SECOND.labelled("velocity"), "velocity_max_m_per_s")
 
 
 def _accelerations(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     both = motion.table_acceleration_m_per_s2, motion.plate_acceleration_m_per_s2
-    _rates(axes, run, both, ("a", "acceleration", "m/s²"), "acceleration_max_m_per_s2")
+    _rates(axes, run, both, "a", ACCELERATION.labelled("acceleration"), "acceleration_max_m_per_s2")
 
 
 def _rates(
-    axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], words: tuple[str, str, str], largest: str
+    axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], symbol: str, label: str, largest: str
 ) -> None:
-    """Draw both bodies with their largest values; `words` are symbol, name and unit."""
-    symbol, name, unit = words
+    """Draw both bodies with their largest values."""
     table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}')}"
     plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}')}"
     _bodies(axes, _motion(run).time_s, both, (table, plate))
-    axes.set_ylabel(f"{name} ({unit})")
+    axes.set_ylabel(label)
 
 
 def _relative_acceleration(axes: Axes, run: RunFigureData) -> None:
@@ -227,7 +226,7 @@ def _relative_acceleration(axes: Axes, run: RunFigureData) -> None:
     relative = motion.plate_acceleration_m_per_s2 - motion.table_acceleration_m_per_s2
     label = f"$a_2 - a_1$, at most {np.abs(relative).max():.3g}"
     axes.plot(motion.time_s, relative, color=PLATE, linewidth=0.9, label=label)
-    axes.set_ylabel("relative acceleration (m/s²)")
+    axes.set_ylabel(ACCELERATION.labelled("relative acceleration"))
 
 
 RUN_FIGURES: Final = (
@@ -255,13 +254,8 @@ def _motion(run: RunFigureData) -> MotionSamples:
 def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) -> None:
     """Draw readings: broad and pale under the simulation, a plain line without one."""
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
-    axes.plot(
-        *decimate_for_print(run.time_s, reading_m * 1e3),
-        color=colour,
-        linewidth=width,
-        alpha=alpha,
-        label="experiment",
-    )
+    curve = decimate_for_print(run.time_s, MILLIMETRE.scale * reading_m)
+    axes.plot(*curve, color=colour, linewidth=width, alpha=alpha, label="experiment")
 
 
 def _simulated(axes: Axes, time_s: Floats, value: Floats) -> None:

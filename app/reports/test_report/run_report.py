@@ -4,8 +4,18 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from analysis.catalogue import CATALOGUE, Place, QuantityDefinition, definition
-from analysis.formatting import format_fixed, format_interval, format_uncertainty, typeset
+from analysis.catalogue import (
+    CATALOGUE,
+    KILOGRAM,
+    MICROMETRE,
+    MILLIMETRE,
+    SECOND,
+    Place,
+    QuantityDefinition,
+    Unit,
+    definition,
+)
+from analysis.formatting import format_interval, format_uncertainty, typeset
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
@@ -29,8 +39,8 @@ from app.reports.test_report.shared import (
     fingerprint_columns,
     format_time,
     gauges_section,
+    in_unit,
     procedure,
-    scaled,
     signatures,
     stand_section,
     without_empty,
@@ -105,9 +115,12 @@ def _result(found: Identification) -> Iterator[Block]:
         )
         yield Conclusion(symbol, value, text, "warn", relation or "=")
         return
-    residual, noise = found.model.residual_rms_m * 1e6, found.model.noise_rms_m * 1e6
+    residual, noise = (
+        f"{MICROMETRE.scale * size_m:.3g} {MICROMETRE.symbol}"
+        for size_m in (found.model.residual_rms_m, found.model.noise_rms_m)
+    )
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
-    text = f"The law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
+    text = f"The law {found.model.name} {fits} (residual {residual}, noise {noise})."
     yield Conclusion(symbol, value, text, "ok" if found.model.adequate else "bad")
     yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(row, quantity)}.")
 
@@ -123,16 +136,16 @@ def _test(analysis: Analysis) -> Facts:
         ("contact", metadata.contact),
         ("begun", format_time(metadata.start_time)),
         ("operator", metadata.operator),
-        ("nominal pullback", scaled(metadata.pullback_m, 1e3, 2, "mm")),
-        ("table mass m1", f"{metadata.table_mass_kg:g} kg"),
-        ("plate mass m2", f"{metadata.plate_mass_kg:g} kg"),
+        ("nominal pullback", in_unit(metadata.pullback_m, MILLIMETRE, 2)),
+        ("table mass m1", f"{metadata.table_mass_kg:g} {KILOGRAM.symbol}"),
+        ("plate mass m2", f"{metadata.plate_mass_kg:g} {KILOGRAM.symbol}"),
         ("device", " ".join(filter(None, (device.name, device.firmware, device.serial_number)))),
         ("protocol", device.protocol),
         ("port", metadata.port),
         ("nominal rate", "" if metadata.rate_hz is None else f"{metadata.rate_hz:g} samples a second"),
         ("source", metadata.source),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
-        ("hold before release", "" if ending is None else scaled(ending.dwell_s, 1.0, 2, "s")),
+        ("hold before release", "" if ending is None else in_unit(ending.dwell_s, SECOND, 2)),
         ("slip lasted", _slip(events.release_s, events.slip_end_s)),
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
@@ -148,16 +161,14 @@ def _samples(losses: Losses) -> str:
 
 
 def _slip(release_s: float | None, slip_end_s: float | None) -> str:
-    return (
-        "" if release_s is None or slip_end_s is None else f"{format_fixed(slip_end_s - release_s, 3)}\u00a0s"
-    )
+    return "" if release_s is None or slip_end_s is None else in_unit(slip_end_s - release_s, SECOND, 3)
 
 
 def _conditions(metadata: RunMetadata) -> Facts:
     conditions: Conditions = metadata.conditions
     rows = [
-        ("temperature", scaled(conditions.temperature_c, 1.0, 1, "°C")),
-        ("humidity", scaled(conditions.humidity_percent, 1.0, 0, "%")),
+        ("temperature", in_unit(conditions.temperature_c, Unit("°C"), 1)),
+        ("humidity", in_unit(conditions.humidity_percent, Unit("%"), 0)),
         ("plate", conditions.plate_id),
         ("surfaces", conditions.contact_id),
         ("surface preparation", conditions.surface_preparation),
@@ -193,13 +204,13 @@ def _results(found: Identification) -> Iterator[Block]:
     yield Grid(header, rows, numbers=4)
     if found.model is not None and found.model.tried:
         yield Grid(
-            ["friction law", Symbol("f_d"), "BIC", "residual, µm"],
+            ["friction law", Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"],
             [
                 [
                     law.name,
                     f"{law.friction_dynamic:.6f}",
                     typeset(f"{law.bic:.1f}"),
-                    f"{law.residual_rms_m * 1e6:.2f}",
+                    f"{MICROMETRE.number(law.residual_rms_m, 2)}",
                 ]
                 for law in found.model.tried
             ],

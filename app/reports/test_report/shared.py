@@ -6,10 +6,10 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
+from analysis.catalogue import MICROMETRE, MILLIMETRE, Unit
 from analysis.formatting import (
     NO_BREAK_SPACE,
     format_compact,
-    format_fixed,
     format_value,
     format_with_prefix,
     typeset,
@@ -87,9 +87,9 @@ def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:
     return Facts([(name, value) for name, value in rows if value])
 
 
-def scaled(value: float | None, scale: float, decimals: int, unit: str) -> str:
-    """Format a value in its unit; "" for None."""
-    return "" if value is None else f"{typeset(format_fixed(value * scale, decimals))}{NO_BREAK_SPACE}{unit}"
+def in_unit(value: float | None, unit: Unit, decimals: int) -> str:
+    """Write an SI value with its unit; "" for None."""
+    return "" if value is None else typeset(unit.text(value, decimals)).replace(" ", NO_BREAK_SPACE)
 
 
 def _stand(stand: Stand) -> Facts:
@@ -134,7 +134,7 @@ def _gain_uncertainty(gauge: Gauge) -> str:
 
 
 def _micrometres(length_m: float | None) -> str:
-    return "" if length_m is None else typeset(f"{length_m * 1e6:.3g} µm")
+    return "" if length_m is None else typeset(f"{MICROMETRE.scale * length_m:.3g} {MICROMETRE.symbol}")
 
 
 def _delay(gauge: Gauge) -> str:
@@ -151,10 +151,7 @@ _OF_GAUGE: Final = (
     ("hysteresis", lambda gauge: _micrometres(gauge.hysteresis_m)),
     ("repeatability", lambda gauge: _micrometres(gauge.repeatability_m)),
     ("delay", _delay),
-    (
-        "range",
-        lambda gauge: scaled(gauge.range_m, 1e3, 2, "mm") and f"± {scaled(gauge.range_m, 1e3, 2, 'mm')}",
-    ),
+    ("range", lambda gauge: (gauge.range_m and f"± {in_unit(gauge.range_m, MILLIMETRE, 2)}") or ""),
     ("reference", lambda gauge: gauge.reference),
     ("certificate", lambda gauge: gauge.certificate),
     ("calibrated by", lambda gauge: gauge.calibrated_by),
