@@ -232,7 +232,6 @@ class TimeBase(msgspec.Struct, frozen=True):
         return cls(clock.scale, clock.scale_standard_uncertainty).with_skew(skew)
 
     def with_skew(self, skew: Skew | None) -> "TimeBase":
-        """The same clock with another skew."""
         if skew is None:
             return TimeBase(self.scale, self.scale_standard_uncertainty)
         return TimeBase(self.scale, self.scale_standard_uncertainty, skew.mean_s, skew.standard_uncertainty_s)

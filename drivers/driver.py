@@ -60,7 +60,6 @@ class DeviceDriver:
 
     @property
     def available(self) -> bool:
-        """Whether the device is built."""
         return bool(self.package)
 
     def default_baud_for(self, settings: Mapping[str, str]) -> int:

@@ -41,7 +41,6 @@ class ActiveTimer:
         self.restart()
 
     def restart(self) -> None:
-        """Count from now on."""
         self._called_ns, self._elapsed_ns = host_ns(), 0
 
     def elapsed_s(self) -> float:

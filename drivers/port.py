@@ -96,7 +96,6 @@ class PortConfig:
     parity: str = "N"
 
     def open(self) -> OpenPort:
-        """Open it. Raises DriverError."""
         return open_port(self.url, self.baud, self.parity)
 
     def reopen(self, lost: PortInfo) -> OpenPort:
@@ -254,7 +253,6 @@ class Port:
             raise self._lost(error) from error
 
     def close(self) -> None:
-        """Close the port; may be called twice, and when the device is gone."""
         if self._is_socket and self._wire.is_open:
             self._wire._socket.close()  # pyserial leaves it open when the other end is gone
         with contextlib.suppress(*PLATFORM_ERRORS):

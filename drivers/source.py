@@ -53,12 +53,10 @@ class CancellableLink:
         self._cancelled = cancelled
 
     def read(self) -> bytes:
-        """See `Link`."""
         self._check()
         return self._link.read()
 
     def write(self, data: bytes) -> None:
-        """See `Link`."""
         self._check()
         self._link.write(data)
 

@@ -66,12 +66,10 @@ class StreamSource(SampleSource):
 
     @property
     def identity(self) -> DeviceIdentity:
-        """See `SampleSource`."""
         return self._identity
 
     @property
     def rate_hz(self) -> float:
-        """See `SampleSource`."""
         if self._rate_hz is None:
             raise ProtocolError(
                 "{protocol}: the rate is not known before the first samples", protocol=self._identity.protocol
@@ -80,11 +78,9 @@ class StreamSource(SampleSource):
 
     @property
     def losses(self) -> Losses:
-        """See `SampleSource`."""
         return self._decoder.losses if self._decoder else Losses()
 
     def read(self, link: Link) -> bytes:
-        """See `SampleSource`."""
         return self._reader.read(link, self.batch_delay_s)
 
     @abstractmethod
@@ -345,7 +341,6 @@ class PortReader:
         self._thread = threading.Thread(target=self._run, name="port reader", daemon=True)
 
     def start(self) -> None:
-        """Begin to read."""
         self._thread.start()
 
     def stop(self) -> None:

@@ -74,17 +74,14 @@ class SimulatedStand:
 
     @property
     def port(self) -> str:
-        """What a reader opens."""
         return self._ready.port
 
     @property
     def process_id(self) -> int:
-        """Of the stand's process."""
         return self._child.pid
 
     @property
     def is_running(self) -> bool:
-        """Whether the process runs."""
         return self._child.is_running
 
     def truth(self) -> Truth:

@@ -42,7 +42,6 @@ class Timetable:
 
     @property
     def parts_s(self) -> float:
-        """All parts of one test together."""
         return self.release_s + self.decay_s + self.recentre_s
 
     @property
@@ -162,7 +161,6 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         return settings, self.gauge == "relative" and column == 0
 
     def timetable(self) -> Timetable:
-        """What the stand does when."""
         return msgspec.convert(self, Timetable, from_attributes=True)
 
 

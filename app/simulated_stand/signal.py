@@ -23,7 +23,6 @@ class SwappedChannels:
         self._signal = signal
 
     def take(self, count: int) -> tuple[Int32s, UInt8s]:
-        """Counts (count, 2) of the next samples and their overload flags (count,)."""
         counts, status = self._signal.take(count)
         clipped = [(status & flag) != 0 for flag in (_RELATIVE, _TABLE)]
         turned = np.where(clipped[0], _TABLE, np.uint8(0)) | np.where(clipped[1], _RELATIVE, np.uint8(0))
@@ -64,7 +63,6 @@ class StandSignal:
         self._status: UInt8s = np.empty(0, dtype=np.uint8)
 
     def take(self, count: int) -> tuple[Int32s, UInt8s]:
-        """Counts (count, 2) of the next samples and their overload flags (count,)."""
         while count > len(self._status):
             self._make(max(self._AHEAD_LEAST, int(self._AHEAD_S * self._rate_hz)))
         counts, self._counts = self._counts[:count], self._counts[count:]

@@ -63,7 +63,6 @@ class SimulatedStandDevice:
         return wait_s
 
     def truth(self) -> Truth:
-        """The truth until now."""
         tests = np.arange(self._releases(), dtype=np.float64)
         releases = tests * self._timetable.cycle_s + self._timetable.release_s
         return Truth(
@@ -81,7 +80,6 @@ class SimulatedStandDevice:
         )
 
     def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
-        """Let something happen to the device, at its time or at once."""
         self._device.disturb(disturbance, now_ns)
 
     def _signal_at(self, rate_hz: float, started_s: float) -> Signal:

@@ -207,7 +207,6 @@ class Comparison(msgspec.Struct, frozen=True):
 
     @property
     def normalized_error(self) -> float:
-        """Error in standard uncertainties."""
         return (self.value - self.truth) / self.standard_uncertainty
 
     @property

@@ -80,7 +80,6 @@ class PairDecoder:
         )
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `SampleSource`."""
         return self._skew_statistics.skew(first_index, end_index)
 
     def take_warnings(self) -> list[Message]:
@@ -89,14 +88,12 @@ class PairDecoder:
         return warnings
 
     def expect_restart(self) -> None:
-        """The connections of both broke."""
         for channel, line in zip(self._channels, self._time_fits, strict=True):
             list(channel.source.decode(b"", self._now_ns))
             line.reset()
         self._lost_ns = [None, None]
 
     def feed(self, data: bytes) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; exhaust it."""
         for read in self._unwrapper.feed(data):
             if read.port < len(self._channels):
                 yield from self._decode_read(read.port, read)

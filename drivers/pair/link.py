@@ -59,12 +59,10 @@ class PairLink:
 
     @property
     def info(self) -> PortInfo:
-        """Both ports in one description."""
         return PortInfo(" + ".join(reader.info.identity for reader in self._readers))
 
     @property
     def url(self) -> str:
-        """Both addresses."""
         return " + ".join(reader.info.device for reader in self._readers)
 
     def read(self) -> bytes:
@@ -136,15 +134,12 @@ class _ChannelReader:
         self._thread = threading.Thread(target=self._run, name=f"port of gauge {gauge + 1}", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
         self._thread.start()
 
     def ask_to_stop(self) -> None:
-        """End the thread after the read under way."""
         self._stopping.set()
 
     def join(self) -> None:
-        """Wait for the end of the thread, stop the device, and close the port."""
         self._thread.join()
         if self._port is not None:
             self._source.stop(self._port)

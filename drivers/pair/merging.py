@@ -41,7 +41,6 @@ class ChannelSamples:
         return len(self.status)
 
     def take(self, which: slice | Ints) -> "ChannelSamples":
-        """A part of them."""
         return ChannelSamples(self.host_ns[which], self.counts[which], self.status[which])
 
     def append(self, more: "ChannelSamples") -> "ChannelSamples":

@@ -76,7 +76,6 @@ class PairSource(SampleSource):
 
     @property
     def losses(self) -> Losses:
-        """See `SampleSource`."""
         return self._decoder.losses if self._decoder else Losses()
 
     @property
@@ -86,7 +85,6 @@ class PairSource(SampleSource):
         return joined(list({str(note): note for note in notes if note}.values()), "; ")
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `SampleSource`."""
         return self._decoder.skew(first_index, end_index) if self._decoder else None
 
     def take_warnings(self) -> list[Message]:
@@ -95,7 +93,6 @@ class PairSource(SampleSource):
         return own + (self._decoder.take_warnings() if self._decoder else [])
 
     def prepare(self) -> None:
-        """Compile what decoding needs."""
         for channel in self.channel_sources:
             channel.source.prepare()
 

@@ -117,7 +117,6 @@ class SimulatedDevice:
 
     @property
     def is_streaming(self) -> bool:
-        """Whether samples are being sent."""
         return self._stream is not None
 
     @property
@@ -127,11 +126,9 @@ class SimulatedDevice:
 
     @property
     def is_plugged_in(self) -> bool:
-        """Whether there is a port."""
         return self._cable_fault is None
 
     def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
-        """Add a disturbance, at its time or at once."""
         _log.info("disturbance: %s", disturbance)
         self._schedule.add(disturbance, self._time_s(now_ns))
 
@@ -249,7 +246,6 @@ class PolledDevice(SimulatedDevice):
         self._answers: deque[tuple[int, bytes]] = deque()
 
     def step(self, now_ns: int) -> float:
-        """Do what is due at `now_ns` of the host's monotonic clock; returns seconds to wait at most."""
         wait_s = super().step(now_ns)
         if not self._has_reader:
             self._requests.clear()

@@ -194,7 +194,6 @@ class DisturbanceSchedule:
         self.disturbances = self._planned
 
     def add(self, disturbance: Disturbance, now_s: float) -> None:
-        """Add one, at its time or now."""
         at_s = now_s if disturbance.at_s is None else disturbance.at_s
         self.disturbances += (replace(disturbance, at_s=at_s),)
 

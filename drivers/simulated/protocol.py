@@ -44,7 +44,6 @@ class CommandParser:
         self._unfinished = b""
 
     def feed(self, data: bytes) -> list[Command]:
-        """Commands completed by `data`."""
         data = self._unfinished + data
         commands, used = self._find(data)
         self._unfinished = data[used:][-_MAX_UNFINISHED_BYTES:]

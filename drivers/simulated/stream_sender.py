@@ -59,7 +59,6 @@ class TransmissionLog:
     damage: list[DamagedStretch] = field(default_factory=list)
 
     def add(self, samples: int, fault: FrameFault | None) -> None:
-        """Count the next frame."""
         if fault is not None:
             self._add_fault(samples, fault)
         self.frames += 1

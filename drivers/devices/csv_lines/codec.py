@@ -134,14 +134,12 @@ class LineDecoder(PacketDecoder):
 
     @property
     def losses(self) -> Losses:
-        """Counts until now."""
         losses = super().losses
         if self._loss_estimator is not None:
             losses.missing_estimated += self._loss_estimator.lost
         return losses
 
     def expect_restart(self) -> None:
-        """See `PacketDecoder`."""
         self._state["broken"] += self._state["started"] * bool(self._unfinished)
         self._skipping = True
         super().expect_restart()

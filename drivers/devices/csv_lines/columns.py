@@ -88,12 +88,10 @@ class LineFormat:
 
     @property
     def channels(self) -> int:
-        """Gauges of the device: 1 or 2."""
         return 1 if Column.VALUE in self.columns else 2
 
     @property
     def time_column(self) -> Column | None:
-        """The column with the device's time, if there is one."""
         return next((column for column in self.columns if column in TIME_UNIT_S), None)
 
     @property
@@ -109,7 +107,6 @@ class LineFormat:
 
     @property
     def checksum(self) -> Column | None:
-        """The checksum column, if there is one."""
         return self.columns[-1] if self.columns[-1] in CHECKSUMS else None
 
 

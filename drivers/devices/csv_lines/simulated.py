@@ -19,7 +19,6 @@ class SimulatedCsv(SimulatedProtocol):
         self._layout = layout or LineFormat()
 
     def encode(self, first_sequence: int, counts: Int32s, _status: UInt8s, times_s: Floats) -> list[bytes]:
-        """Lines."""
         return encode_lines(self._layout, times_s, counts, first_sequence)
 
 

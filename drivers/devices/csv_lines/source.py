@@ -88,7 +88,6 @@ class CsvLinesSource(StreamSource):
         return 1 if self._layout is None else self._layout.channels
 
     def prepare(self) -> None:
-        """Compile the decoder, which takes seconds on the very first use."""
         layout = self._layout or LineFormat()
         list(LineDecoder(layout, 1.0).feed(b"\n" + codec.encode_line(layout, 0.0, 0, 0), 0))
 
@@ -174,7 +173,6 @@ class OpenScaleSource(CsvLinesSource):
         super().__init__(None, rate_hz, overload_count)
 
     def find_layout(self, data: bytes) -> LineFormat | None:
-        """See `drivers.devices.csv_lines.inference`."""
         return find_openscale_format(data)
 
 

@@ -34,7 +34,6 @@ class ValueKind(IntEnum):
 
     @property
     def size(self) -> int:
-        """Bytes of a value."""
         return self + 1
 
 
@@ -66,7 +65,6 @@ class FrameLayout:
 
     @property
     def length(self) -> int:
-        """Bytes of a frame."""
         return HEADER_BYTES + self.channels * self.kind.size + 1
 
     @property
@@ -151,13 +149,11 @@ class FrameDecoder(PacketDecoder):
 
     @property
     def losses(self) -> Losses:
-        """Counts until now."""
         losses = super().losses
         losses.missing_estimated += self._loss_estimator.lost
         return losses
 
     def expect_restart(self) -> None:
-        """See `PacketDecoder`."""
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 

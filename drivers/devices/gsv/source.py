@@ -50,7 +50,6 @@ class GsvSource(StreamSource):
         self._layout: FrameLayout | None = None
 
     def prepare(self) -> None:
-        """Compile the decoder, which takes seconds on the very first use."""
         layout = FrameLayout(2)
         list(FrameDecoder(layout, 1.0).feed(codec.encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
 

@@ -70,7 +70,6 @@ class HarpMessage:
 
     @property
     def number(self) -> int:
-        """The payload as a whole number."""
         return int.from_bytes(self.payload, "little")
 
 
@@ -308,7 +307,6 @@ class EventDecoder(PacketDecoder):
         self._garbage = 0
 
     def expect_restart(self) -> None:
-        """See `PacketDecoder`."""
         self._state["broken"] += self._state["started"] * bool(self._unfinished)
         self._garbage = 0
         super().expect_restart()

@@ -55,7 +55,6 @@ class SimulatedHarp(SimulatedProtocol):
         return [row.tobytes() for row in codec.encode_events(times_s, counts, *self._channels)]
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
-        """Reply to a request, with the new value of the register."""
         kind, given = command.parameters[0], command.parameters[1:]
         if command.code not in self._registers:
             return codec.encode(HarpMessage(kind | codec.ERROR, command.code), codec.U8, self._ticks)

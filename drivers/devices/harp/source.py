@@ -43,7 +43,6 @@ class HarpSource(StreamSource):
         self._settings = settings
 
     def prepare(self) -> None:
-        """Compile the decoder, which takes seconds on the very first use."""
         list(EventDecoder(1.0).feed(codec.encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
@@ -72,7 +71,6 @@ class HarpSource(StreamSource):
         return received
 
     def make_decoder(self, data: bytes) -> EventDecoder:  # noqa: ARG002 - all is known
-        """Decoder at the rate of the device."""
         settings = self._settings
         return EventDecoder(self.rate_hz, settings.table, settings.relative, settings.overload_count)
 

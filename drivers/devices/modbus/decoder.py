@@ -64,11 +64,9 @@ class ResponseDecoder:
 
     @property
     def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, fewer than the longest envelope."""
         return self._unwrapper.unfinished_bytes
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `SampleSource`; None where one request reads both gauges."""
         return self._skew_statistics.skew(first_index, end_index) if self._skew_statistics else None
 
     def expect_restart(self) -> None:
@@ -76,7 +74,6 @@ class ResponseDecoder:
         self._responses = None
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in the envelopes
-        """Blocks that `data` completes; bytes of an unfinished envelope are kept. Exhaust it."""
         first_index, last_time_s = self.losses.samples, self._row_time_s
         discarded = self._unwrapper.discarded_bytes
         for read in self._unwrapper.feed(data):

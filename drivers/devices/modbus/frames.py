@@ -62,7 +62,6 @@ class Request:
     """Values to write; none where registers are read."""
 
     def encode(self) -> bytes:
-        """Bytes on the wire."""
         return with_crc(struct.pack(">BB", self.unit, self.function) + self._body())
 
     @property

@@ -54,7 +54,6 @@ class Transaction:
 
     @property
     def duration_s(self) -> float:
-        """From the request to the end of the response (s)."""
         return (self.received_ns - self.sent_ns) / _NS
 
 

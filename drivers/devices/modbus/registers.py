@@ -72,7 +72,6 @@ class Channel(Struct, frozen=True):
 
     @property
     def registers(self) -> int:
-        """Number of registers."""
         return struct.calcsize(_CODES[self.kind]) // 2
 
 

@@ -60,11 +60,9 @@ class SimulatedModbus(PolledProtocol):
         self.store_sample(np.zeros(2, dtype=np.int32), 0)
 
     def request_bytes(self, command: Command) -> int:
-        """See `PolledProtocol`."""
         return len(command.parameters) + 3
 
     def store_sample(self, counts: Int32s, status: int) -> None:
-        """See `PolledProtocol`."""
         self._latest = dict(zip(GAUGES, counts.tolist(), strict=True))
         states: dict[tuple[int, int, int], int] = {}
         for gauge, channel in self._channels.items():

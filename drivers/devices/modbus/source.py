@@ -56,7 +56,6 @@ class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def gauges(self) -> tuple[str, ...]:
-        """Gauges to read."""
         return GAUGES if self.channel == "both" else (self.channel,)
 
 
@@ -92,7 +91,6 @@ class ModbusSource(StreamSource):
 
     @property
     def channels(self) -> int:
-        """As set."""
         return len(self._settings.gauges)
 
     @property
@@ -118,12 +116,10 @@ class ModbusSource(StreamSource):
         return joined(parts, "; ")
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """See `SampleSource`; None where one request reads both gauges."""
         decoder = self._decoder
         return decoder.skew(first_index, end_index) if isinstance(decoder, ResponseDecoder) else None
 
     def prepare(self) -> None:
-        """Compile what makes rows, which takes a second on the very first use."""
         decoder = self._decoder_at(1.0)
         for number, request in enumerate(self._poll.requests):
             data = frames.encode_read_response(request.unit, request.function, bytes(2 * request.count))
@@ -179,7 +175,6 @@ class ModbusSource(StreamSource):
         return [self._warnings.popleft() for _ in range(len(self._warnings))]
 
     def make_decoder(self, data: bytes) -> ResponseDecoder:  # noqa: ARG002 - settings and rate are enough
-        """Decoder at the rate of the polls."""
         return self._decoder_at(self.rate_hz)
 
     def _decoder_at(self, rate_hz: float) -> ResponseDecoder:

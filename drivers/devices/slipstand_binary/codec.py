@@ -170,7 +170,6 @@ class FrameDecoder(PacketDecoder):
         self._state["max_gap"] = self._max_gap
 
     def expect_restart(self) -> None:
-        """See `PacketDecoder`."""
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
 

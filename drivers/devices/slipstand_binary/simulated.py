@@ -27,7 +27,6 @@ class SimulatedBinary(SimulatedProtocol):
     flags_overload = True
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
-        """See `SimulatedProtocol`."""
         matches = list(_COMMAND.finditer(data))
         unfinished = data.rfind(b"R", matches[-1].end() if matches else 0)
         commands = [

@@ -36,7 +36,6 @@ class SlipstandBinarySource(StreamSource):
         super().__init__(DeviceIdentity(DRIVER.name, "Slipstand binary"), DRIVER.default_baud, rate_hz)
 
     def prepare(self) -> None:
-        """Compile the decoder, which takes seconds on the very first use."""
         frame = codec.encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))
         list(FrameDecoder(1.0).feed(frame, 0))
 
@@ -57,7 +56,6 @@ class SlipstandBinarySource(StreamSource):
         return self._await_frames(link, deadline_s - time.monotonic(), measure=device is None)
 
     def resume(self, link: Link) -> bytes:
-        """Continue; see `drivers.source.SampleSource`. Raises like `start`."""
         received, sends = self.await_data(link, _LISTEN_S, _has_frame)
         if sends:
             more, _ = self.await_data(link, _RATE_S, lambda data: _has_rate(received + data))
