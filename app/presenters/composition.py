@@ -69,7 +69,7 @@ def make_window_presenter(
             _start_state(context, simulation),
             personal,
             simulation,
-            list_port_choices,
+            _list_ports,
             lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(context.directory)),
         ),
         errors,
@@ -80,36 +80,28 @@ def _save(settings: Settings) -> Path | None:
     return save_settings(settings, datetime.datetime.now().astimezone().date())
 
 
-def list_port_choices() -> tuple[PortChoice, ...]:
-    """Serial ports of this computer."""
+def _list_ports() -> tuple[PortChoice, ...]:
     from drivers.port import list_ports
 
     return tuple(PortChoice(port.device, port.description) for port in list_ports())
 
 
 def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> StartState:
-    device = context.gauges.device
-    return StartState(
-        all_series=tuple(published_table()),
-        series=simulation.series,
-        protocols=_protocols(),
-        form=ConnectForm(
-            protocol=device.protocol,
-            baud="" if device.baud is None else str(device.baud),
-            rate_hz="" if device.rate_hz is None else f"{device.rate_hz:g}",
-        ),
-        recordings=str(context.directory),
-    )
-
-
-def _protocols() -> tuple[ProtocolChoice, ...]:
     from drivers.registry import DRIVERS
 
-    return tuple(
+    device = context.gauges.device
+    form = ConnectForm(
+        protocol=device.protocol,
+        baud="" if device.baud is None else str(device.baud),
+        rate_hz="" if device.rate_hz is None else f"{device.rate_hz:g}",
+    )
+    protocols = tuple(
         ProtocolChoice(entry.name, entry.title, entry.default_baud, entry.verified)
         for entry in DRIVERS.values()
         if entry.available
     )
+    all_series, folder = tuple(published_table()), str(context.directory)
+    return StartState(all_series, simulation.series, protocols, form=form, recordings=folder)
 
 
 def start_engine(port: PortSettings) -> EngineClient:

@@ -1,4 +1,4 @@
-"""How the gauges do, in words and figures: for the window's screen of the gauges and the command line."""
+"""Health of gauges as texts and figures, for the window and the command line."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -27,7 +27,7 @@ class SymptomText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GaugeHealthState:
-    """What is shown of one gauge."""
+    """Health of one gauge as shown."""
 
     name: str
     verdict: HealthGrade
@@ -37,47 +37,39 @@ class GaugeHealthState:
     """The same lines for each gauge."""
     frequency_hz: np.ndarray
     density_um: np.ndarray
-    """frequency_hz/density_um: Its spectrum, in um/sqrt(Hz)."""
+    """Noise spectrum (µm/√Hz)."""
 
 
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
-    """Figures of a gauge in words, with what they mean."""
+    """Describe the health of a gauge: figures and symptoms."""
     symptoms = diagnose(health)
     return GaugeHealthState(
         name,
         worst_grade(symptoms),
-        tuple(
-            SymptomText(one.code, one.grade, translate(one.message), translate(one.remedy))
-            for one in symptoms
-        ),
-        tuple(_figures(health)),
+        tuple(SymptomText(s.code, s.grade, translate(s.message), translate(s.remedy)) for s in symptoms),
+        _figures(health),
         health.spectrum.frequency_hz,
         health.spectrum.density_m_per_sqrt_hz * 1e6,
     )
 
 
-def _figures(health: GaugeHealth) -> list[LabelledValue]:
+def _figures(health: GaugeHealth) -> tuple[LabelledValue, ...]:
     used = health.range_fraction
-    drift_um, drift_uncertainty_um = (
-        value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty_m_per_min)
-    )
-    return [
-        LabelledValue(gettext("reading"), format_in(MILLIMETRE, health.mean_m, 3)),
-        LabelledValue(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
-        LabelledValue(
-            gettext("drift"),
-            with_unit(f"{format_fixed(drift_um, 1)} ± {format_fixed(drift_uncertainty_um, 1)}", "µm/min"),
-        ),
-        *(
-            LabelledValue(gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum))
-            for hum in health.hum
-        ),
-        LabelledValue(gettext("range used"), MINUS if used is None else f"{used:.0%}"),
-        LabelledValue(gettext("converter step"), _micrometres(health.resolution_m)),
-        LabelledValue(gettext("overloaded"), f"{health.overload_fraction:.2%}"),
-        LabelledValue(gettext("clipped"), f"{health.clipped_fraction:.2%}"),
-        LabelledValue(gettext("missing"), f"{health.missing_fraction:.2%}"),
-    ]
+    drift = format_fixed(health.drift_m_per_min * 1e6, 1)
+    uncertainty = format_fixed(health.drift_standard_uncertainty_m_per_min * 1e6, 1)
+    hums = {gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz): _hum(hum) for hum in health.hum}
+    figures = {
+        gettext("reading"): format_in(MILLIMETRE, health.mean_m, 3),
+        gettext("noise, rms"): _micrometres(health.noise_rms_m),
+        gettext("drift"): with_unit(f"{drift} ± {uncertainty}", "µm/min"),
+        **hums,
+        gettext("range used"): MINUS if used is None else f"{used:.0%}",
+        gettext("converter step"): _micrometres(health.resolution_m),
+        gettext("overloaded"): f"{health.overload_fraction:.2%}",
+        gettext("clipped"): f"{health.clipped_fraction:.2%}",
+        gettext("missing"): f"{health.missing_fraction:.2%}",
+    }
+    return tuple(LabelledValue(label, value) for label, value in figures.items())
 
 
 def _hum(hum: Hum) -> str:

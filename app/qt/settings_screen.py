@@ -1,6 +1,6 @@
 """View of the Settings screen: look, recording, and the files of the other settings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Qt, QUrl
@@ -25,7 +25,7 @@ from app.presenters.settings_screen import (
     SettingsState,
 )
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox
+from app.qt.widgets.inputs import CheckBox, ComboBox, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -49,12 +49,14 @@ class SettingsScreen(QWidget):
         super().__init__()
         self._presenter = presenter
         self._state = SettingsState()
-        self._theme = _choice(THEMES, lambda name: presenter.change(theme=name))
-        self._language = _choice(LANGUAGES, lambda name: presenter.change(language=name))
-        self._scale = _choice(
-            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: presenter.change(scale=scale)
-        )
-        self._log_level = _choice(LOG_LEVELS, lambda level: presenter.change(log_level=level))
+        scales = {scale: f"{scale:.0%}" for scale in SCALES}
+        choices: dict[str, Mapping[Any, str]] = {
+            "theme": THEMES,
+            "language": LANGUAGES,
+            "scale": scales,
+            "log_level": LOG_LEVELS,
+        }
+        self._choices = {name: _choice(presenter, name, items) for name, items in choices.items()}
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
         self._browse = QPushButton(gettext("Browse…"))
@@ -70,16 +72,9 @@ class SettingsScreen(QWidget):
     def show_state(self, state: SettingsState) -> None:
         old, self._state = self._state, state
         settings = state.settings
-        for choice, value in (
-            (self._theme, settings.theme),
-            (self._language, settings.language),
-            (self._scale, settings.scale),
-            (self._log_level, settings.log_level),
-        ):
-            choice.setCurrentIndex(choice.findData(value))
-        for field, text in ((self._operator, settings.operator), (self._recordings, settings.recordings)):
-            if field.text() != text:
-                field.setText(text)
+        for name, choice in self._choices.items():
+            choice.setCurrentIndex(choice.findData(getattr(settings, name)))
+        show_texts({"operator": self._operator, "recordings": self._recordings}, settings)
         self._recordings.setPlaceholderText(state.recordings)
         self._sounds.setChecked(settings.sounds)
         self._undo.setEnabled(state.can_undo)
@@ -142,9 +137,9 @@ class SettingsScreen(QWidget):
 
     def _look_card(self) -> QFrame:
         fields = (
-            (gettext("Theme"), self._theme),
-            (gettext("Language"), self._language),
-            (gettext("Size"), self._scale),
+            (gettext("Theme"), self._choices["theme"]),
+            (gettext("Language"), self._choices["language"]),
+            (gettext("Size"), self._choices["scale"]),
         )
         return _card(gettext("Look"), "", make_form_grid(fields, wide=False))
 
@@ -162,7 +157,7 @@ class SettingsScreen(QWidget):
         self._files.setHorizontalSpacing(12)
         self._files.setVerticalSpacing(8)
         self._files.setColumnStretch(1, 1)
-        log = make_form_grid(((gettext("Log"), self._log_level),), wide=False)
+        log = make_form_grid(((gettext("Log"), self._choices["log_level"]),), wide=False)
         return _card(gettext("Files"), hint, self._files, log)
 
 
@@ -172,12 +167,13 @@ def _card(title: str, hint: str, *parts: Item) -> QFrame:
     return card
 
 
-def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> ComboBox:
+def _choice(presenter: SettingsPresenter, name: str, items: Mapping[Any, str]) -> ComboBox:
+    """Make a combo box that changes the setting `name`; `items` are its values and their texts."""
     made = ComboBox()
     for value, words in items.items():
         made.addItem(gettext(words), value)
     made.setMinimumWidth(200)
-    made.activated.connect(lambda _: chosen(made.currentData()))
+    made.activated.connect(lambda _: presenter.change(**{name: made.currentData()}))
     return made
 
 

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidg
 from app.presenters.stand_screen import StandForm, StandPresenter, StandState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
-from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.inputs import ComboBox, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, plain_text, set_text_or_hide, show_chip
@@ -56,12 +56,10 @@ class StandScreen(QWidget):
         if self._series.count() != len(state.all_series):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.form.series)
+        show_texts(self._fields, state.form)
         for name, field in self._fields.items():
-            if field.text() != getattr(state.form, name):
-                field.setText(getattr(state.form, name))
             field.setPlaceholderText(getattr(state.defaults, name))
-        if self._seconds.text() != state.fault_duration_s:
-            self._seconds.setText(state.fault_duration_s)
+        show_texts({"fault_duration_s": self._seconds}, state)
         set_property(self._start, "primary", "false" if state.is_running else "true")
         show_chip(self._message, state.message)
         for button in self._faults.values():

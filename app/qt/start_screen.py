@@ -10,7 +10,7 @@ from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
 from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.inputs import ComboBox, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -121,15 +121,12 @@ class _Form(QWidget):
         self._port.setEditable(True)
         self._port.setPlaceholderText(gettext("No port found: write one"))
         self._protocol = ComboBox()
-        self._baud = QLineEdit()
-        self._rate = QLineEdit()
-        self._rate.setPlaceholderText(gettext("as the device is set"))
         self._parity = ComboBox()
         self._parity.addItems([gettext(words) for words in _PARITIES.values()])
-        self._settings = QLineEdit()
-        self._settings.setPlaceholderText("KEY=VALUE KEY=VALUE")
-        self._relative = QLineEdit()
-        self._relative.setPlaceholderText(gettext("if it has a device of its own"))
+        self._fields = {name: QLineEdit() for name in ("baud", "rate_hz", "settings", "relative_port")}
+        self._fields["rate_hz"].setPlaceholderText(gettext("as the device is set"))
+        self._fields["settings"].setPlaceholderText("KEY=VALUE KEY=VALUE")
+        self._fields["relative_port"].setPlaceholderText(gettext("if it has a device of its own"))
         self._more = QPushButton(gettext("More settings"))
         self._more.setCheckable(True)
         self._more.toggled.connect(self._show_rare)
@@ -139,7 +136,7 @@ class _Form(QWidget):
         self._port.currentTextChanged.connect(lambda _: presenter.set_form(self._read()))
         self._protocol.activated.connect(lambda _: presenter.set_form(self._read()))
         self._parity.activated.connect(lambda _: presenter.set_form(self._read()))
-        for field in (self._baud, self._rate, self._settings, self._relative):
+        for field in self._fields.values():
             field.textEdited.connect(lambda _: presenter.set_form(self._read()))
 
     def show_form(self, state: StartState) -> None:
@@ -150,29 +147,19 @@ class _Form(QWidget):
         _refill(self._protocol, [(choice.name, choice.title) for choice in state.protocols])
         self._protocol.setCurrentText(state.form.protocol)
         form = state.form
-        for field, text in (
-            (self._baud, form.baud),
-            (self._rate, form.rate_hz),
-            (self._settings, form.settings),
-            (self._relative, form.relative_port),
-        ):
-            if field.text() != text:
-                field.setText(text)
+        show_texts(self._fields, form)
         self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
         if form.settings or form.relative_port or form.parity != "N":
             self._more.setChecked(True)
         usual = state.selected_protocol.default_baud if state.selected_protocol else None
-        self._baud.setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
+        self._fields["baud"].setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
 
     def _read(self) -> ConnectForm:
         return ConnectForm(
-            self._port.currentText(),
-            self._protocol.currentText(),
-            self._baud.text(),
-            self._rate.text(),
-            list(_PARITIES)[self._parity.currentIndex()],
-            self._settings.text(),
-            self._relative.text(),
+            port=self._port.currentText(),
+            protocol=self._protocol.currentText(),
+            parity=list(_PARITIES)[self._parity.currentIndex()],
+            **{name: field.text() for name, field in self._fields.items()},
         )
 
     def _show_rare(self, shown: bool) -> None:
@@ -184,20 +171,20 @@ class _Form(QWidget):
             [
                 (gettext("Port"), self._port),
                 (gettext("Protocol"), self._protocol),
-                (gettext("Baud"), self._baud),
-                (gettext("Rate, Hz"), self._rate),
+                (gettext("Baud"), self._fields["baud"]),
+                (gettext("Rate, Hz"), self._fields["rate_hz"]),
             ]
         )
         rare = make_form_grid(
             [
                 (gettext("Parity"), self._parity),
-                (gettext("Settings"), self._settings),
-                (gettext("Port 2"), self._relative),
+                (gettext("Settings"), self._fields["settings"]),
+                (gettext("Port 2"), self._fields["relative_port"]),
             ]
         )
-        self._relative.setAccessibleName(gettext("Port of gauge 2"))
+        self._fields["relative_port"].setAccessibleName(gettext("Port of gauge 2"))
         hint = gettext("Port of gauge 2, where each gauge has a device and a port of its own")
-        self._relative.setToolTip(hint)
+        self._fields["relative_port"].setToolTip(hint)
         rare.setContentsMargins(0, 0, 0, 0)
         self._rare.setLayout(rare)
         self._rare.hide()

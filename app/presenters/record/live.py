@@ -37,7 +37,7 @@ _MEAN_S = 0.05
 """Readings are means over this time: noise is suppressed, a pull by hand is followed."""
 _READINGS_EVERY_S = 0.1
 """Digits that change more often cannot be read."""
-_PIXELS_MIN = 64
+PIXELS_MIN = 64
 _SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
 _LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
 """Axes grow in steps, so that they seldom change."""
@@ -105,9 +105,6 @@ class LiveTraces:
         return self.samples.mean(end_s - _MEAN_S, end_s + 1e-9)
 
     # --- changes ---
-
-    def with_width(self, width_px: int) -> "LiveTraces":
-        return replace(self, width_px=max(width_px, _PIXELS_MIN))
 
     def reconnected(self, gauges: Gauges) -> "LiveTraces":
         """Begin with another device; the drawn traces stay until samples come or `cleared`."""

@@ -45,18 +45,16 @@ class NextRuns:
     tests: NextTests = field(default_factory=NextTests)
     """Plan, series, operator and conditions, as they are stored in the folder of runs."""
     saved: NextTests = field(default_factory=NextTests)
-    """As stored last."""
     is_requested: bool = False
     is_loaded: bool = False
-    """is_requested/is_loaded: The stored plan was asked for; was read."""
+    """The stored plan was requested; was read."""
     is_edited: bool = False
     """The operator has changed form or plan before the stored ones were read."""
     completed: CompletedRuns = ()
-    """Path and series of each completed run."""
     undecided_path: str = ""
     """Run that waits for a decision, and does not count until then; empty without one."""
     suggested_operator: str = ""
-    """Operator of the person's settings."""
+    """Operator in the settings."""
 
     @classmethod
     def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
@@ -111,23 +109,20 @@ class NextRuns:
         if not self.is_edited:
             stored = loaded.tests
             is_possible = stored.series in self.choices.all_series and not self.choices.series_fixed
-            series, form = (
-                stored.series if is_possible else self.series,
-                _stored_form(stored, self.choices.form),
-            )
+            series = stored.series if is_possible else self.series
+            texts = {name: _text(getattr(stored.conditions, name)) for name in CONDITION_FIELDS}
+            operator = stored.operator or self.choices.form.operator
+            form = replace(self.choices.form, **texts, operator=operator)
             changed = replace(changed, tests=stored).with_choices(series=series, form=form)
         return changed.with_completed(loaded.completed).with_next_series()
 
     def with_completed(self, completed: CompletedRuns) -> "NextRuns":
         return replace(self, completed=completed)._counted()
 
-    def with_kept_run(self, path: str, series: str) -> "NextRuns":
-        """Count a run that is being kept, before it is read from the folder."""
-        return self.with_completed((*(run for run in self.completed if run[0] != path), (path, series)))
-
-    def with_removed_run(self, path: str) -> "NextRuns":
-        """Do not count a run that is being moved to the trash."""
-        return self.with_completed(tuple(run for run in self.completed if run[0] != path))
+    def with_run(self, path: str, series: str = "") -> "NextRuns":
+        """Count a run that is being kept, or with no series not one that is being moved to the trash."""
+        others = tuple(run for run in self.completed if run[0] != path)
+        return self.with_completed((*others, (path, series)) if series else others)
 
     def with_undecided(self, path: str) -> "NextRuns":
         """Do not count the run at `path` until it is decided about; none if empty."""
@@ -292,11 +287,6 @@ def _parse_count(form: RunForm) -> int:
             "runs in a row = {text!r} is no whole number from 1 to {most}", text=text, most=REPEATS_MAX
         )
     return int(text)
-
-
-def _stored_form(tests: NextTests, form: RunForm) -> RunForm:
-    stored = {name: _text(getattr(tests.conditions, name)) for name in CONDITION_FIELDS}
-    return replace(form, **stored, operator=tests.operator or form.operator)
 
 
 def _text(value: object) -> str:

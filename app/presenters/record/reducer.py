@@ -26,6 +26,7 @@ from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.record.live import (
+    PIXELS_MIN,
     device_chip,
     disk_chip,
     live_estimate,
@@ -109,11 +110,13 @@ class _Reduction:
                 if model.next_runs.choices.editable:
                     self._save(model.next_runs.with_form(event))
             case PlanEdited(text):
-                self._on_plan(model.next_runs.with_plan(text))
+                self._set(next_runs=model.next_runs.with_plan(text))
+                if not self.model.next_runs.plan.error:
+                    self._save(self.model.next_runs)
             case NoteEdited(note):
                 self._set(decisions=model.decisions.with_note(note))
             case PlotResized(width_px):
-                self._set(live=model.live.with_width(width_px))
+                self._set(live=replace(model.live, width_px=max(width_px, PIXELS_MIN)))
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
             case AnalysedRun() | TaskFailed(str()) | TaskProgress():
@@ -181,11 +184,6 @@ class _Reduction:
                 self._move_to_trash()
                 self._close_ended()
 
-    def _on_plan(self, next_runs: NextRuns) -> None:
-        self._set(next_runs=next_runs)
-        if not next_runs.plan.error:
-            self._save(next_runs)
-
     def _choose_series(self, series: str) -> None:
         if self.model.next_runs.can_choose_series:
             self._save(self.model.next_runs.with_choices(series=series))
@@ -223,7 +221,7 @@ class _Reduction:
             self._set(decisions=self.model.decisions.moving(run))
             self.effects.append(MoveToTrash(run.path, self.model.author, run.note_to_store))
         if self.model.ended is not None and self.model.ended.result is not None:
-            self._set(next_runs=self.model.next_runs.with_removed_run(self.model.ended.result.path))
+            self._set(next_runs=self.model.next_runs.with_run(self.model.ended.result.path))
 
     def _close_ended(self) -> None:
         """Prepare the next run: the one that is shown is kept unless it was decided about."""
@@ -240,7 +238,7 @@ class _Reduction:
         if run is not None:
             self._keep(run)
         if run is not None and run.has_results:
-            next_runs = next_runs.with_kept_run(run.path, ended.series).with_next_series()
+            next_runs = next_runs.with_run(run.path, ended.series).with_next_series()
         self._set(next_runs=next_runs, live=self.model.live.restarted(), ended=None)
         self._set_session(live_estimate=LiveEstimate())
 

@@ -1,7 +1,5 @@
 """Bar at the bottom of Record: series and plan, form of the next runs, large buttons."""
 
-from dataclasses import asdict
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePolicy, QToolButton, QWidget
@@ -9,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePol
 from app.presenters.conditions import CONDITION_TITLES
 from app.presenters.record.state import Action, PlanState, RunChoices, RunForm, SeriesProgress
 from app.qt.theme import TextRole, font, set_property
-from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit
+from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label
@@ -271,11 +269,9 @@ class RunFormFields(QWidget):
             grid.setColumnStretch(column, 1)
 
     def show_form(self, form: RunForm, *, editable: bool) -> None:
-        for name, text in asdict(form).items():
-            field = self._fields[name]
+        show_texts(self._fields, form)
+        for field in self._fields.values():
             field.setEnabled(editable)
-            if field.text() != text:
-                field.setText(text)
 
     def take_focus(self) -> None:
         next(iter(self._fields.values())).setFocus()

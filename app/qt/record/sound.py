@@ -1,13 +1,12 @@
 """Sound cues for states of a pullback test, played by a program of the system."""
 
 import io
-import math
 import shutil
-import struct
 import sys
 import wave
 from pathlib import Path
 
+import numpy as np
 import platformdirs
 from PySide6.QtCore import QProcess
 from PySide6.QtWidgets import QApplication
@@ -16,7 +15,7 @@ from app.presenters.record.state import Cue
 
 _RATE_HZ = 22_050
 _LOUDNESS = 0.3
-_EDGE_S = 0.01
+_FADE_S = 0.01
 _PLAYERS = (("pw-play",), ("paplay",), ("aplay", "-q"), ("afplay",))
 _TUNES: dict[Cue, tuple[tuple[float, float], ...]] = {
     Cue.PULL: ((440.0, 0.12),),
@@ -68,13 +67,10 @@ def cue_wav(cue: Cue) -> bytes:
 
 def _tone(frequency_hz: float, length_s: float) -> bytes:
     """Samples of one tone, faded in and out so that it does not click."""
-    count = round(length_s * _RATE_HZ)
-    samples = []
-    for i in range(count):
-        at_s = i / _RATE_HZ
-        edge = min(1.0, at_s / _EDGE_S, (length_s - at_s) / _EDGE_S)
-        samples.append(round(32_767 * _LOUDNESS * edge * math.sin(2.0 * math.pi * frequency_hz * at_s)))
-    return struct.pack(f"<{count}h", *samples)
+    time_s = np.arange(round(length_s * _RATE_HZ)) / _RATE_HZ
+    fade = np.minimum(1.0, np.minimum(time_s, length_s - time_s) / _FADE_S)
+    samples = 32_767 * _LOUDNESS * fade * np.sin(2.0 * np.pi * frequency_hz * time_s)
+    return np.rint(samples).astype("<i2").tobytes()
 
 
 def _play(path: Path) -> bool:

@@ -1,6 +1,6 @@
 """Check box, combo box and line edit. Their marks are drawn: a style sheet takes them only from files."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
@@ -68,3 +68,10 @@ class ShortcutSafeEdit(QLineEdit):
             self.left.emit()
             return True
         return super().event(event)
+
+
+def show_texts(fields: Mapping[str, QLineEdit], form: object) -> None:
+    """Show the texts of a form by the names of its fields; a field with the same text keeps its cursor."""
+    for name, field in fields.items():
+        if field.text() != getattr(form, name):
+            field.setText(getattr(form, name))
