@@ -155,12 +155,10 @@ class ChildProcess(Generic[Command, Event]):
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the process has ended and its last event was delivered."""
         return self._has_ended.is_set()
 
     @property
     def is_running(self) -> bool:
-        """Tell whether the process lives."""
         return self._process.poll() is None
 
     def send(self, command: Command, timeout_s: float = 0.0) -> bool:
@@ -262,7 +260,6 @@ class CommandReader(Generic[Command]):
         return self._is_closed
 
     def take(self, timeout_s: float = 0.0) -> Command | None:
-        """Return the next command; None if none comes in time, and from the end of the pipe on."""
         if self._is_closed:
             return None
         try:
@@ -302,7 +299,6 @@ class EventSender(Generic[Event]):
         self._thread.start()
 
     def send(self, event: Event) -> None:
-        """Queue an event for the parent."""
         if self._events.qsize() < self._QUEUE_EVENTS // (2 if self._is_transient(event) else 1):
             self._events.put(event)
 

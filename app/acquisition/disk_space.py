@@ -44,7 +44,6 @@ class DiskDemand:
 
     @property
     def bytes_per_s(self) -> float:
-        """Bytes of run and journal."""
         return self.run_bytes_per_s + self.journal_bytes_per_s
 
     def of_run(self, run: RunSettings) -> float:
@@ -148,7 +147,6 @@ class FreeSpacePoller:
         self._thread.start()
 
     def set_folder(self, folder: Path) -> None:
-        """Follow another folder from now on; its free space is read at once."""
         with self._changing:
             self._folder = folder
             self.free_bytes = free_bytes(folder)

@@ -107,7 +107,6 @@ class PollSchedule:
         return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
 
     def wait(self, latency: Latency) -> None:
-        """Sleep until the next step is due, where reads may wait for it."""
         if latency is not Latency.BATCHED or self._is_watched:
             return
         time.sleep(max(0.0, self._due_s - time.monotonic()))
@@ -213,7 +212,6 @@ class Engine:
         return Latency.BATCHED if self._recording is None else self._recording.latency
 
     def _take_reads(self) -> None:
-        """Take the reads that wait; where none does, wait for one."""
         reads, wait_s = list[DecodedRead](), _WAIT_S
         try:
             while len(reads) < _READS_PER_STEP and (read := self._stream.next_read(wait_s)) is not None:
@@ -276,7 +274,6 @@ class Engine:
         return self._recording is not None
 
     def _refuse(self, reason: EndReason, message: Message) -> None:
-        """End a run that has not begun; the connection stays."""
         _log.warning("run refused (%s): %s", reason, message)
         self._sequence.stop()
         self._events.send(RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
@@ -342,7 +339,6 @@ class Engine:
             self._try_to_arm(following)
 
     def _follow_live(self, recording: Recording) -> None:
-        """Pass on results of the live identification, and end a run that it knows enough of."""
         now_s = self._history.next_index / self._rate_hz
         result = self._live.poll(recording.confirmed_start_index, recording.metadata, now_s)
         if result is not None:
@@ -351,7 +347,6 @@ class Engine:
                 recording.end_if_enough()
 
     def _finish(self, reason: EndReason, message: Message) -> None:
-        """End and store a run without any more samples."""
         self._sequence.stop()
         if self._recording is not None:
             self._recording.end(reason, message)

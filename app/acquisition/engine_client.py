@@ -76,7 +76,6 @@ class EngineClient:
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the process has ended and all its events were taken."""
         return self._child.has_ended and self._events.empty()
 
     def send(self, command: Command) -> None:
@@ -94,7 +93,6 @@ class EngineClient:
         return events
 
     def wait(self, timeout_s: float) -> Event | None:
-        """Next event; None if none comes in time."""
         with contextlib.suppress(queue.Empty):
             return self._events.get(timeout=timeout_s)
         return None

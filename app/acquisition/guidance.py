@@ -65,7 +65,6 @@ class PullbackSituation:
 
     @property
     def is_device_lost(self) -> bool:
-        """Tell whether the test waits for the device."""
         return bool(self.loss_reason) and self.state in _NEEDS_DEVICE
 
     @property
@@ -150,7 +149,6 @@ def _pull(situation: PullbackSituation) -> tuple[Message, Message]:
 
 
 def _push_back(situation: PullbackSituation) -> tuple[Message, Message]:
-    """How far to push the plate, and to which side."""
     wanted_m = situation.position.plate_wanted_m
     if wanted_m is None:
         wanted_m = situation.plate_range.best_m if situation.plate_range else 0.0

@@ -47,20 +47,16 @@ class LiveClient:
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the process has ended."""
         return self._child.has_ended
 
     def follow(self, command: FollowRun) -> None:
-        """Identify a run from now on."""
         self._latest, self._first_row = None, command.first_row
         self._send(command)
 
     def update_clock(self, time_base: TimeBase) -> None:
-        """Pass on the latest estimate of the time base."""
         self._send(ClockUpdate(time_base))
 
     def end_run(self) -> None:
-        """Stop identifying: the run has ended."""
         self._first_row = None
         self._send(EndRun())
 
@@ -70,7 +66,6 @@ class LiveClient:
         return None if self._first_row is None else latest
 
     def stop(self) -> None:
-        """End the process."""
         self._child.stop(self._STOP_S)
 
     def _send(self, command: LiveCommand) -> None:
@@ -126,13 +121,11 @@ class LiveIdentifier:
         return self._client.take_result()
 
     def end_run(self) -> None:
-        """The run has ended."""
         if self._client is not None and self._first_row is not None:
             self._client.end_run()
         self._first_row = None
 
     def stop(self) -> None:
-        """End the process."""
         if self._client is not None:
             self._client.stop()
         self._client, self._first_row = None, None

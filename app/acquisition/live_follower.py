@@ -88,7 +88,6 @@ class RunFollower:
         return LiveAnswer(self._follow.first_row, result_of(state, float(time_s[0])))
 
     def update_clock(self, time_base: TimeBase) -> None:
-        """Use a newer estimate of the time base."""
         self._time_base = time_base
 
     def _take(self, rows: RingRows) -> None:

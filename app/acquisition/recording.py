@@ -120,12 +120,10 @@ class Recording:
 
     @property
     def is_unattended(self) -> bool:
-        """Tell whether it comes to its end without anybody at the stand."""
         return self._trigger.is_unattended
 
     @property
     def latency(self) -> Latency:
-        """How soon what comes must be followed."""
         if self._trigger.awaits_release:
             return Latency.IMMEDIATE
         is_free = self.is_unattended or self._settings.trigger == "none"
@@ -151,7 +149,6 @@ class Recording:
 
     @property
     def is_ending(self) -> bool:
-        """Tell whether nothing more is recorded."""
         return self._ended is not None
 
     def add(self, reads: Sequence[DecodedRead]) -> None:
@@ -191,7 +188,6 @@ class Recording:
             self._file.close(self._ending(self._file))
 
     def end_if_enough(self) -> None:
-        """End the run if it was to last until no more is gained by waiting."""
         if self._settings.duration_s is None and self._settings.trigger == "pullback":
             self.end(EndReason.ENOUGH)
 
@@ -243,7 +239,6 @@ class Recording:
             raise
 
     def _follow_pending(self) -> None:
-        """Follow what has come since the last time, in one piece."""
         pending, self._pending = self._pending, []
         if self.is_ending or not pending:
             return

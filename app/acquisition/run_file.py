@@ -59,7 +59,6 @@ class SampleStatistics:
                 setattr(self._losses, field.name, total)
 
     def losses(self) -> Losses:
-        """Counts until now."""
         estimated = self._losses.missing_estimated
         if self._absent:  # the first and the last read may have lost samples that are not of this run
             estimated = min(estimated, self._absent)
@@ -248,7 +247,6 @@ class RunFile:
     def _result(
         self, stored: StoredRun | None, samples: int, fault: Exception | None, journal_fault: Exception | None
     ) -> CloseResult:
-        """Report how it went, and remove the journal if all that it has is in the run file."""
         path = stored.path if stored else self._known_path()
         missing = self.statistics.losses().samples - samples
         first = fault or journal_fault

@@ -121,11 +121,9 @@ class RunSequence:
         return self._done > 0
 
     def begin(self, run: RunSettings, count: int) -> None:
-        """Begin a sequence; its first run is being recorded."""
         self._next, self._remaining, self._done = next_run(run), count - 1, 0
 
     def stop(self) -> None:
-        """No run follows."""
         self._remaining = 0
 
     def next_after(self, ended: RunEnded) -> tuple[RunEnded, RunSettings | None]:

@@ -32,7 +32,6 @@ class Syncer:
 
     @property
     def is_idle(self) -> bool:
-        """Tell whether the last sync is done."""
         return self._is_idle.is_set()
 
     def begin(self, descriptor: int) -> None:
@@ -44,7 +43,6 @@ class Syncer:
         self._handles.put(os.dup(descriptor))
 
     def wait(self) -> None:
-        """Return when the last sync is done."""
         self._is_idle.wait()
 
     def take_failure(self) -> OSError | None:
@@ -53,7 +51,6 @@ class Syncer:
         return failure
 
     def stop(self, *, wait: bool = True) -> None:
-        """End the thread when the last sync is done; wait for that."""
         self._handles.put(None)
         if self._thread is not None and wait:
             self._thread.join()
@@ -138,12 +135,10 @@ class JournalFile:
             self._move(failure)
 
     def close(self) -> None:
-        """Close it; the lock is still held."""
         self._syncer.stop()
         self._file.close()
 
     def remove(self) -> None:
-        """Remove the closed file."""
         with contextlib.suppress(OSError):
             self.path.unlink()
 

@@ -102,7 +102,6 @@ class Journal:
         return start
 
     def append_metadata(self, note: MetadataRecord) -> None:
-        """Append metadata of the run. Raises like `append`."""
         self.append(encode_metadata_record(note), time.monotonic_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
@@ -118,7 +117,6 @@ class Journal:
             )
 
     def remove(self) -> None:
-        """Remove the file of a closed journal whose run is safe."""
         self._file.remove()
         self.release()
 

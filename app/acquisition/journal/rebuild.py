@@ -120,7 +120,6 @@ def _absent(first_index: int, end_index: int, like: CalibratedBlock) -> Calibrat
 
 
 def _opening(summary: JournalSummary) -> Opened | None:
-    """Where a run begins whose file was not begun yet; None without a sample."""
     places = list[tuple[int, int]]()
     """Byte of the journal at which a read begins, and the index after its last sample."""
     first_index, layout = 0, BlockLayout()
@@ -164,7 +163,6 @@ def _ending(
     statistics: SampleStatistics,
     replay: Replay,
 ) -> EndMetadata:
-    """End metadata of a run that its engine did not live to end."""
     untimed = TimeBase.from_estimates(None, None)
     mark = summary.checkpoint or Mark(next_index, opened.start_index, Known(), untimed)
     known, rate_hz = mark.known, summary.rate_hz

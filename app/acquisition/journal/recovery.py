@@ -200,7 +200,6 @@ def _earlier_file(summary: JournalSummary, folder: Path) -> Path | None:
 
 
 def _identifier(path: Path) -> str:
-    """UUID of a run file; empty where it cannot be read."""
     earlier = inspect_run(path)
     return earlier.identifier if earlier else ""
 

@@ -55,7 +55,6 @@ class Replay:
 
     @property
     def _is_in_run(self) -> bool:
-        """Tell whether the read that is decoded next came after the run file was begun."""
         return self._opened_after is not None and self._reads >= self._opened_after
 
     def __iter__(self) -> Iterator[ReplayedReads]:
@@ -131,7 +130,6 @@ class Replay:
 
 
 def _joined(blocks: list[SampleBlock]) -> SampleBlock:
-    """Blocks of one source, which follow each other without a hole, as one."""
     if len(blocks) == 1:
         return blocks[0]
     return SampleBlock(

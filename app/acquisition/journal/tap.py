@@ -62,7 +62,6 @@ class JournalTap:
         return self._places[place][1] < self._journal.written
 
     def offset_of(self, index: int) -> int:
-        """Byte of the journal from which on the bytes of sample `index` are found."""
         return max((start for end_index, start in self._places if end_index <= index), default=0)
 
 

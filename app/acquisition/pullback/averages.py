@@ -111,7 +111,6 @@ class SlidingWindow:
         self._count = 0
 
     def add(self, index: Floats, value_m: Floats) -> None:
-        """Add readings (n,), later than all before."""
         index, value_m = index[-self._kept :], value_m[-self._kept :]
         end = self._count + len(index)
         if end > len(self._rows):
@@ -163,7 +162,6 @@ class RecentAverages:
         self.relative = SlidingWindow(_KEPT_S, samples_per_bin, rate_hz)
 
     def add(self, bins: BinAverages) -> None:
-        """Add the next averages, at least one; where gauge 2 has no reading, its is NaN."""
         self.table.add(bins.center, bins.table_m)
         present = ~np.isnan(bins.relative_m)
         self.relative.add(bins.center[present], bins.relative_m[present])
@@ -260,27 +258,22 @@ class ZeroEstimator:
         self._levels: deque[ZeroLevel] = deque(maxlen=round(_ZEROS_KEPT_S / tick_s))
 
     def add(self, level: ZeroLevel) -> None:
-        """Add the latest moment of rest."""
         self._levels.append(level)
 
     def reset(self) -> None:
-        """Begin anew: table or plate were moved."""
         self._levels.clear()
 
     @property
     def has_levels(self) -> bool:
-        """Tell whether there was any moment of rest."""
         return bool(self._levels)
 
     @property
     def is_known(self) -> bool:
-        """Tell whether there was rest enough for a zero."""
         levels = self._levels
         return self.has_levels and levels[-1].since - levels[0].since >= _KNOWN_S * self._rate_hz
 
     @property
     def latest(self) -> ZeroLevel:
-        """The last moment of rest. Raises IndexError before any."""
         return self._levels[-1]
 
     def pulled_m(self, table_m: float) -> float:

@@ -96,7 +96,6 @@ class Hold:
 
     @property
     def is_leaving(self) -> bool:
-        """Tell whether the latest average was beyond the limit."""
         return self._beyond > 0
 
     def update(self, level: StationaryLevel, reference: HoldReference) -> None:

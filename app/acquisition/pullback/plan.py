@@ -47,7 +47,6 @@ class AllowedPlateRange:
 
     @property
     def exists(self) -> bool:
-        """Tell whether the plate can stand anywhere."""
         return self.low_m <= self.high_m
 
     def fits(self, plate_m: float, margin_m: float = 0.0) -> bool:
@@ -119,7 +118,6 @@ class PullbackPlan:
 
     @property
     def hold_tolerance_m(self) -> float:
-        """How far off the pullback the table may be held (m)."""
         if self.tolerance_m is not None:
             return self.tolerance_m
         return max(_TOLERANCE * self.nominal_m, _TOLERANCE_MIN_M)
@@ -172,5 +170,4 @@ class PullbackMeasurement:
 
     @property
     def side(self) -> float:
-        """1 or -1: to which side the table was pulled."""
         return math.copysign(1.0, self.pulled_m)

@@ -106,7 +106,6 @@ class PullbackStateMachine:
 
     @property
     def position(self) -> StandPosition:
-        """Where table and plate stand, for the instruction to the operator."""
         facts, must_move = self.measurement, self.state is PullbackState.RECENTRE
         return StandPosition(
             pullback_m=self._plan.target_m,
@@ -142,7 +141,6 @@ class PullbackStateMachine:
         return self.state not in _WAITING
 
     def _on_bins(self, bins: BinAverages) -> None:
-        """Take one bin, or those until the next tick."""
         self._readings.add(bins)
         self._bins += len(bins)
         is_tick = self._bins % self._bins_per_tick == 0
@@ -182,12 +180,10 @@ class PullbackStateMachine:
             self._check_plate(index)
 
     def _is_plate_moving(self, index: float) -> bool:
-        """Tell whether there is a hand on the plate."""
         is_seen = not math.isnan(self._readings.relative.mean(_ZERO_S, index))
         return is_seen and self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
 
     def _check_plate(self, index: float) -> None:
-        """Ask for the plate to be put back, or for the pull."""
         room, plate_m = self._room, math.nan if self.measurement.plate_m is None else self.measurement.plate_m
         is_recentring = self.state is PullbackState.RECENTRE
         if room is not None and room.exists:
@@ -279,7 +275,6 @@ class PullbackStateMachine:
         return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
     def _on_returned(self, index: float) -> None:
-        """The table is where it was before the pull."""
         was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m
         self._is_pulled = False
         self._hold = None
@@ -294,7 +289,6 @@ class PullbackStateMachine:
         self._enter(PullbackState.RELEASED, self.measurement.release_index or index)
 
     def _remark(self, hold: Hold, index: float) -> Message:
-        """Remark on a release that came before the hold was armed."""
         if self.state is PullbackState.ARMED:
             return EMPTY
         if self.state is PullbackState.PULLING and self._plan.target_m is not None:

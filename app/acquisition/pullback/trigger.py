@@ -40,17 +40,14 @@ class Trigger:
 
     @property
     def measurement(self) -> PullbackMeasurement:
-        """What was found of the pullback."""
         return self._test.measurement
 
     @property
     def state(self) -> PullbackState:
-        """State of the run."""
         return PullbackState.RECORDING
 
     @property
     def position(self) -> StandPosition:
-        """Where table and plate stand."""
         return StandPosition()
 
     @property
@@ -100,34 +97,28 @@ class PullbackTrigger(Trigger):
 
     @property
     def state(self) -> PullbackState:
-        """State of the test."""
         return self._test.state
 
     @property
     def position(self) -> StandPosition:
-        """Where table and plate stand."""
         return self._test.position
 
     @property
     def start_index(self) -> int | None:
-        """First sample to store; known once the release is confirmed."""
         if not self.measurement.release_confirmed or self.measurement.release_index is None:
             return None
         return self.measurement.release_index - self._pretrigger
 
     @property
     def is_unattended(self) -> bool:
-        """Tell whether the release is confirmed."""
         return self.measurement.release_confirmed
 
     @property
     def awaits_release(self) -> bool:
-        """Tell whether the table is held, or the release is not confirmed yet."""
         return self._test.awaits_release
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether the table has not been pulled back yet."""
         return self._test.is_at_rest
 
     def add_samples(self, rows: CalibratedBlock) -> list[Transition]:

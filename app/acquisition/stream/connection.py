@@ -45,7 +45,6 @@ class ReadQueue:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether all reads were taken."""
         return not self._waiting
 
     def put(self, arrival_ns: int, data: bytes) -> None:
@@ -174,7 +173,6 @@ class Connection:
         return self._ended if self._queue.is_empty else None
 
     def close(self, *, stop_device: bool = False) -> None:
-        """Close the port; the device may be told to stop before that."""
         self._reader.stop()
         if stop_device:
             self._source.stop(self.port)

@@ -89,7 +89,6 @@ class ReadHistory:
         """Index of the sample that comes next."""
 
     def add(self, read: DecodedRead) -> None:
-        """Add the latest read and forget those that have become too old."""
         self._reads.append(read)
         if read.rows:
             self.next_index = read.rows[-1].end_index
@@ -98,13 +97,11 @@ class ReadHistory:
 
     @property
     def bytes_per_sample(self) -> float:
-        """Bytes that the device sends for each sample."""
         samples = self.next_index - self.first_index
         return sum(len(read.data) for read in self._reads) / samples if samples else _BYTES_PER_SAMPLE
 
     @property
     def first_index(self) -> int:
-        """Index of the oldest sample that is kept."""
         return next((read.rows[0].first_index for read in self._reads if read.rows), self.next_index)
 
     def reads(self, first_index: int = -1) -> Iterator[DecodedRead]:
@@ -143,7 +140,6 @@ class DeviceFound:
 
     @property
     def message(self) -> Message:
-        """What has happened."""
         return message(
             "the device was away and is back at {port}: {gap_s:.2f} s are missing and marked",
             port=self.url,
@@ -216,12 +212,10 @@ class LiveStream:
 
     @property
     def identity(self) -> DeviceIdentity:
-        """What the device said of itself."""
         return self._source.identity
 
     @property
     def port_identity(self) -> str:
-        """Address of each port and, for USB, vendor, product and serial number."""
         return self._port.identity
 
     @property
@@ -231,7 +225,6 @@ class LiveStream:
 
     @property
     def is_disconnected(self) -> bool:
-        """Tell whether the device is being looked for."""
         return self._search is not None
 
     @property
@@ -268,7 +261,6 @@ class LiveStream:
         return TimeBase.from_estimates(clock, self._source.skew(first_index, end_index))
 
     def take_events(self) -> list[StreamEvent]:
-        """What has happened to the stream since the last call."""
         events = list(self._events)
         self._events.clear()
         return events
@@ -294,7 +286,6 @@ class LiveStream:
         self._source.batch_delay_s = pause_s
 
     def close(self) -> None:
-        """Stop the device and close the port."""
         if self._search is not None:
             self._search.stop()
         if self._connection is not None:

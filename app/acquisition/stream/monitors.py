@@ -44,7 +44,6 @@ class RateMonitor:
         self._begin()
 
     def restart(self) -> None:
-        """Begin anew after a gap whose length is only estimated."""
         self._longest = self.estimate()
         self._begin()
 
@@ -156,7 +155,6 @@ class StallDetector:
         self.restart(start_ns)
 
     def restart(self, now_ns: int) -> None:
-        """A connection began."""
         self._quiet_ns = self._checked_ns = now_ns
         self._garbage = b""
 
@@ -169,7 +167,6 @@ class StallDetector:
             self._garbage += data[:_KEPT_BYTES]
 
     def silent_s(self) -> float:
-        """Seconds since the last good sample."""
         return (host_ns() - self._last_sample_ns) * 1e-9
 
     def is_stalled(self, read_ns: int) -> bool:
@@ -185,7 +182,6 @@ class StallDetector:
         return now_ns - self._quiet_ns > self._limit_s * 1e9
 
     def message(self) -> Message:
-        """Report the stall."""
         if not self._garbage:
             return message(
                 "port {port} is open but silent for {limit_s:g} s: check the device, reset it and record"
