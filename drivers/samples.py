@@ -1,6 +1,6 @@
 """What leaves a driver: blocks of samples with their flags, and counts of what was lost."""
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from enum import IntFlag
 
 from drivers.arrays import Counts, Floats, UInt8s
@@ -75,6 +75,12 @@ class Losses:
     """Frames or lines that came twice; one of the two was left out."""
     unexplained_drops: int = 0
     """How often the device reported dropped samples while its sequence shows no gap."""
+
+    def __add__(self, other: "Losses") -> "Losses":
+        return Losses(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __sub__(self, other: "Losses") -> "Losses":
+        return Losses(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,6 @@ from app.acquisition.messages import (
     PortSettings,
     PullbackState,
     Quit,
-    Reconnected,
     Reconnecting,
     RunEnded,
     RunSettings,
@@ -49,11 +48,8 @@ from app.acquisition.run_setup import (
 )
 from app.acquisition.stream.live_stream import (
     DecodedRead,
-    DeviceFound,
-    DeviceLost,
     LiveStream,
     ReadHistory,
-    SearchFailed,
     StreamNotice,
     concatenate,
     open_stream,
@@ -228,16 +224,14 @@ class Engine:
     def _follow_stream(self) -> None:
         """Report what has become of the connection, and end a run that would wait too long for it."""
         for event in self._stream.take_events():
-            if isinstance(event, DeviceLost | SearchFailed):
-                self._events.send(Reconnecting(event.message))
-            elif isinstance(event, DeviceFound):
-                self._events.send(Reconnected(event.gap_s, event.message))
+            if not isinstance(event, StreamNotice):
+                self._events.send(event)
             if self._recording is None:
                 self._send_idle(event.message)
-            elif isinstance(event, DeviceFound | StreamNotice):
-                self._recording.add_note(event.message)
-            else:
+            elif isinstance(event, Reconnecting):
                 self._recording.show_note(event.message)
+            else:
+                self._recording.add_note(event.message)
         fault = self._stream.fault
         if fault is not None and self._recording is not None:
             self._end_all(fault.reason, fault.message)

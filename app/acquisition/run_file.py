@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,51 +20,49 @@ from app.acquisition.journal.records import Ended, Named, Opened
 from app.acquisition.journal.tap import JournalTap
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.live_stream import DecodedRead
-from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun
+from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun, count_flags
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.metadata import EndMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.host_time import host_ns
-from drivers.samples import INCOMPLETE, Losses, SampleStatus
+from drivers.samples import Losses
 from messages.message import EMPTY, Message, joined, message, message_of
 
 _log = logging.getLogger(__name__)
-
-_OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
-_COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
 
 
 class SampleStatistics:
     """Counts the rows of one run by status, each once."""
 
     def __init__(self) -> None:
-        self._losses = Losses()
-        self._absent = 0
+        self._rows = Losses()
+        self._reads = Losses()
 
-    def add(self, rows: CalibratedBlock, sign: int = 1) -> None:
-        """Count rows by their flags; `sign` -1 takes back rows that were counted before."""
-        self._losses.samples += sign * len(rows)
-        if not rows.status.any():
-            return
-        self._losses.damaged += sign * int(np.count_nonzero(rows.status & SampleStatus.DAMAGED))
-        self._losses.overloaded += sign * int(np.count_nonzero(rows.status & _OVERLOAD))
-        self._absent += sign * int(np.count_nonzero(rows.status & INCOMPLETE))
+    def add(self, rows: CalibratedBlock) -> None:
+        """Count rows by their flags."""
+        self._rows += count_flags(rows.status)
+
+    def remove(self, rows: CalibratedBlock) -> None:
+        """Take back rows that were counted before."""
+        self._rows -= count_flags(rows.status)
 
     def add_losses(self, added: Losses) -> None:
         """Add what a read lost beside its rows, such as how many of the missing samples are estimated."""
-        self._losses.missing_estimated += added.missing_estimated
-        for field in fields(Losses):
-            if field.name not in _COUNTED_BY_ROW:
-                total = getattr(self._losses, field.name) + getattr(added, field.name)
-                setattr(self._losses, field.name, total)
+        self._reads += added
 
     def losses(self) -> Losses:
-        estimated = self._losses.missing_estimated
-        if self._absent:  # the first and the last read may have lost samples that are not of this run
-            estimated = min(estimated, self._absent)
-        # A device without time and sequence has no rows for what the rate says is missing.
-        missing = max(0, self._absent - estimated)
-        return replace(self._losses, missing_estimated=estimated, missing=missing)
+        absent, estimated = self._rows.missing, self._reads.missing_estimated
+        if absent:  # the first and the last read may have lost samples that are not of this run
+            estimated = min(estimated, absent)
+        return replace(
+            self._reads,
+            samples=self._rows.samples,
+            # A device without time and sequence has no rows for what the rate says is missing.
+            missing=max(0, absent - estimated),
+            missing_estimated=estimated,
+            damaged=self._rows.damaged,
+            overloaded=self._rows.overloaded,
+        )
 
 
 class UncommittedRows:
@@ -223,7 +221,7 @@ class RunFile:
         samples = getattr(fault, "stored_samples", 0) if stored is None else stored.samples
         lost = self._uncommitted.lost_after(self.start_index + samples)
         for rows in lost:
-            self.statistics.add(rows, -1)
+            self.statistics.remove(rows)
         result = self._result(stored, samples, fault, journal_fault)
         self._journal.release()
         if lost:

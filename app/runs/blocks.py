@@ -79,7 +79,9 @@ class StoredRun(msgspec.Struct, frozen=True):
 
 
 def count_flags(status: NDArray[np.uint8]) -> Losses:
-    """Account of rows from their flags (n,)."""
+    """Counts of rows by their flags (n,)."""
+    if not status.any():
+        return Losses(samples=len(status))
     overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
     return Losses(
         samples=len(status),

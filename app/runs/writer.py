@@ -193,7 +193,7 @@ class RunWriter:
         self._reserve(pending_bytes)
         self._pending.append(columns)
         self._pending_bytes = pending_bytes
-        _add(self.losses, count_flags(block.status))
+        self.losses += count_flags(block.status)
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
@@ -296,13 +296,6 @@ class RunWriter:
                         path=self.path,
                         dataset=dataset.name,
                     )
-
-
-def _add(losses: Losses, more: Losses) -> None:
-    losses.samples += more.samples
-    losses.missing += more.missing
-    losses.damaged += more.damaged
-    losses.overloaded += more.overloaded
 
 
 _QUEUE_COMMANDS = 64

@@ -13,7 +13,7 @@ from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.connection import ReadQueue
-from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, losses_between
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory
 from app.runs.blocks import calibrate
 from app.runs.metadata import create_metadata
 from app.runs.writer_client import WriterClient
@@ -117,7 +117,7 @@ class Desk:
         arrival_ns, data = read.arrival_ns, read.data
         rows = tuple(calibrate(block, load_gauges()) for block in self._source.decode(data, arrival_ns))
         before, self._losses = self._losses, Losses(**_fields(self._source.losses))
-        chunk = DecodedRead(data, arrival_ns, rows, losses_between(self._losses, before))
+        chunk = DecodedRead(data, arrival_ns, rows, self._losses - before)
         self.history.add(chunk)
         if self.recording is not None:
             self.recording.add([chunk])

@@ -9,7 +9,6 @@ import numpy as np
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.records import JournalSummary, Mark, Opened, decode_metadata_record
 from app.acquisition.stream.connection import create_source
-from app.acquisition.stream.live_stream import losses_between
 from app.runs.blocks import CalibratedBlock, calibrate
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.clock import Skew
@@ -97,7 +96,7 @@ class Replay:
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = calibrate(_joined(blocks), self._summary.header.metadata.gauges) if blocks else None
-        return ReplayedReads(rows, losses_between(self._losses, before), reads[0].start, is_in_run)
+        return ReplayedReads(rows, self._losses - before, reads[0].start, is_in_run)
 
     def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
         blocks = list(self._source.decode(read.data, read.arrival_ns))

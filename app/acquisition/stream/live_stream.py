@@ -3,13 +3,13 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Self, TypeAlias
 
 import numpy as np
 
 from app.acquisition.errors import StreamEndedError
-from app.acquisition.messages import EndReason, PortSettings
+from app.acquisition.messages import EndReason, PortSettings, Reconnected, Reconnecting
 from app.acquisition.stream.connection import (
     Connection,
     PortOpener,
@@ -69,14 +69,9 @@ def merge_reads(reads: Sequence[DecodedRead]) -> DecodedRead:
     if len(reads) == 1:
         return reads[0]
     rows = tuple(rows for read in reads for rows in read.rows)
-    losses = Losses(**{f.name: sum(getattr(read.losses, f.name) for read in reads) for f in fields(Losses)})
+    losses = sum((read.losses for read in reads), Losses())
     data = b"".join(read.data for read in reads)
     return DecodedRead(data, reads[-1].arrival_ns, concatenate(rows), losses)
-
-
-def losses_between(after: Losses, before: Losses) -> Losses:
-    """Difference of two counts of losses."""
-    return Losses(**{f.name: getattr(after, f.name) - getattr(before, f.name) for f in fields(Losses)})
 
 
 class ReadHistory:
@@ -115,51 +110,18 @@ def _end_index(read: DecodedRead) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceLost:
-    """The device is gone, or sends nothing intelligible: it is looked for from now on."""
-
-    reason: EndReason
-    message: Message
-    tried: Message = EMPTY
-    """Why the latest attempt to find it failed."""
-
-
-@dataclass(frozen=True, slots=True)
-class SearchFailed:
-    """The device was not found, for another reason than before."""
-
-    message: Message
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceFound:
-    """The device is back at `url`, and samples of `gap_s` are missing."""
-
-    url: str
-    gap_s: float
-
-    @property
-    def message(self) -> Message:
-        return message(
-            "the device was away and is back at {port}: {gap_s:.2f} s are missing and marked",
-            port=self.url,
-            gap_s=self.gap_s,
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class StreamNotice:
     """A remark on the samples that come, or on this computer."""
 
     message: Message
 
 
-StreamEvent: TypeAlias = DeviceLost | SearchFailed | DeviceFound | StreamNotice
+StreamEvent: TypeAlias = Reconnecting | Reconnected | StreamNotice
 
 
 @dataclass(frozen=True, slots=True)
 class StreamFault:
-    """Why a run that waits for samples must end."""
+    """Why the device is lost, or why a run that waits for it must end."""
 
     reason: EndReason
     message: Message
@@ -204,7 +166,8 @@ class LiveStream:
         self._port = connection.port.info
         self._search: Reconnection | None = None
         self._is_returning = False
-        self._lost = DeviceLost(EndReason.DEVICE_LOST, EMPTY)
+        self._lost = StreamFault(EndReason.DEVICE_LOST, EMPTY)
+        self._search_failure = EMPTY
         self._stall_detector = StallDetector(self._port.device, source, connection.start_ns)
         self._rate_monitor = RateMonitor(source.rate_hz)
         self._host = HostMonitor()
@@ -306,7 +269,7 @@ class LiveStream:
         rows = tuple(calibrate(block, self._gauges) for block in blocks)
         self._events.extend(StreamNotice(as_message(note)) for note in self._source.take_warnings())
         before, self.losses = self.losses, replace(self._source.losses)
-        added = losses_between(self.losses, before)
+        added = self.losses - before
         if added.restarts:
             self._rate_monitor.restart()
         if rows:
@@ -318,9 +281,14 @@ class LiveStream:
         if self._is_returning and self._connection is not None:
             self._is_returning = False
             absent = added.missing + added.missing_estimated + added.damaged
-            found = DeviceFound(self._connection.port.url, absent / self.rate_hz)
-            _log.info("reconnected: %s", found.message)
-            self._events.append(found)
+            gap_s = absent / self.rate_hz
+            found = message(
+                "the device was away and is back at {port}: {gap_s:.2f} s are missing and marked",
+                port=self._connection.port.url,
+                gap_s=gap_s,
+            )
+            _log.info("%s", found)
+            self._events.append(Reconnected(gap_s, found))
         note = self._rate_monitor.add(last_index, arrival_ns)
         if note:
             self._events.append(StreamNotice(note))
@@ -331,15 +299,15 @@ class LiveStream:
             if is_all_taken:
                 raise StreamEndedError(EndReason.WRITE_ERROR, as_message(ended.message))
         elif ended is not None:
-            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, as_message(ended.message)))
+            self._lose(connection, StreamFault(EndReason.DEVICE_LOST, as_message(ended.message)))
         elif self._stall_detector.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
-            self._lose(connection, DeviceLost(EndReason.STALLED, self._stall_detector.message()))
+            self._lose(connection, StreamFault(EndReason.STALLED, self._stall_detector.message()))
 
-    def _lose(self, connection: Connection, lost: DeviceLost) -> None:
+    def _lose(self, connection: Connection, lost: StreamFault) -> None:
         _log.warning("device lost (%s): %s", lost.reason, lost.message)
         connection.close()
-        self._connection, self._lost = None, lost
-        self._events.append(lost)
+        self._connection, self._lost, self._search_failure = None, lost, EMPTY
+        self._events.append(Reconnecting(lost.message))
         self._search = Reconnection(self._reopen, self._source, self.read_queue)
 
     def _look_for_device(self, timeout_s: float) -> None:
@@ -349,10 +317,10 @@ class LiveStream:
         if connection is not None:
             self._search, self._connection, self._is_returning = None, connection, True
             self._stall_detector.restart(connection.start_ns)
-        elif (error := self._search.failure) is not None and message_of(error) != self._lost.tried:
-            self._lost = replace(self._lost, tried=message_of(error))
+        elif (error := self._search.failure) is not None and message_of(error) != self._search_failure:
+            self._search_failure = message_of(error)
             _log.warning("not found: %s", error)
-            self._events.append(SearchFailed(message_of(error)))
+            self._events.append(Reconnecting(self._search_failure))
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:

@@ -6,9 +6,9 @@ import time
 import numpy as np
 import pytest
 
-from app.acquisition.messages import EndReason
+from app.acquisition.messages import EndReason, Reconnected, Reconnecting
 from app.acquisition.stream.connection import Connection, ReadQueue
-from app.acquisition.stream.live_stream import DeviceFound, DeviceLost, LiveStream, SearchFailed, StreamNotice
+from app.acquisition.stream.live_stream import LiveStream, StreamNotice
 from config.files import load_gauges
 from drivers.devices.slipstand_binary.codec import encode_frames
 from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_source
@@ -156,7 +156,7 @@ def replug(listener: Listener, device: Device, away_s: float, power: bool) -> No
     device.unplug(power)
     listener.listen_for(away_s)
     device.plug_in()
-    listener.listen(lambda: listener.heard(DeviceFound))
+    listener.listen(lambda: listener.heard(Reconnected))
     listener.listen_for(0.3)
 
 
@@ -169,9 +169,8 @@ def test_a_device_with_its_own_power_tells_exactly_what_is_missing(device, liste
     assert (losses.missing, losses.missing_estimated, losses.restarts) == (missing, 0, 0)
     assert missing >= 500
     lost, *_, found = listener.news
-    assert isinstance(lost, DeviceLost)
-    assert lost.reason is EndReason.DEVICE_LOST
-    assert isinstance(found, DeviceFound)
+    assert isinstance(lost, Reconnecting)
+    assert isinstance(found, Reconnected)
     assert found.gap_s == pytest.approx(missing / RATE_HZ)
     assert listener.stream.fault is None
 
@@ -207,9 +206,9 @@ def test_a_run_waits_for_a_lost_device_only_so_long_and_the_search_goes_on(devic
     fault = listener.stream.fault
     assert fault.reason is EndReason.DEVICE_LOST
     assert "plug its cable in again; it was not back within 1 s, and the last 1." in str(fault.message)
-    assert sum(isinstance(news, SearchFailed) for news in listener.news) == 1
+    assert sum(isinstance(news, Reconnecting) for news in listener.news) == 2, "lost, and not found"
     device.plug_in()
-    listener.listen(lambda: listener.heard(DeviceFound))
+    listener.listen(lambda: listener.heard(Reconnected))
     assert listener.stream.fault is None
 
 
@@ -225,7 +224,7 @@ def test_a_stall_is_met_with_one_attempt_to_begin_anew(device, listener, says, w
     assert words in str(fault.message)
     assert device.opened >= 2
     device.says = "samples"
-    listener.listen(lambda: listener.heard(DeviceFound))
+    listener.listen(lambda: listener.heard(Reconnected))
     listener.listen_for(0.1)
     assert listener.stream.fault is None
     assert listener.stream.losses.missing > 300
@@ -233,11 +232,11 @@ def test_a_stall_is_met_with_one_attempt_to_begin_anew(device, listener, says, w
 
 def test_a_device_that_answers_the_attempt_goes_on(device, listener):
     device.says = "nothing"
-    listener.listen(lambda: listener.heard(DeviceLost))
+    listener.listen(lambda: listener.heard(Reconnecting))
     device.says = "samples"
-    listener.listen(lambda: listener.heard(DeviceFound))
+    listener.listen(lambda: listener.heard(Reconnected))
     listener.listen_for(0.1)
-    assert not any(isinstance(news, SearchFailed) for news in listener.news)
+    assert sum(isinstance(news, Reconnecting) for news in listener.news) == 1, "lost, and found at once"
     assert listener.stream.losses.missing > 300
 
 
@@ -245,7 +244,7 @@ def test_nobody_listening_is_no_silence(device, listener):
     time.sleep(0.5)
     device.says = "nothing"
     listener.listen_for(0.1)
-    assert not listener.heard(DeviceLost)
+    assert not listener.heard(Reconnecting)
 
 
 def test_a_wrong_rate_is_said_while_it_lasts():
@@ -261,7 +260,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
 
 def test_a_stream_that_is_closed_while_its_device_is_away_leaves_nothing(device, listener):
     device.unplug()
-    listener.listen(lambda: listener.heard(DeviceLost))
+    listener.listen(lambda: listener.heard(Reconnecting))
     begin = time.monotonic()
     listener.stream.close()
     assert time.monotonic() - begin < 5.0

@@ -14,7 +14,7 @@ from app.acquisition.pullback.averages import (
     noise_m,
     stationary_level,
 )
-from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, losses_between
+from app.acquisition.stream.live_stream import DecodedRead, ReadHistory
 from app.runs.blocks import calibrate
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
@@ -141,6 +141,4 @@ def test_history_keeps_what_a_pretrigger_needs_and_no_more():
 
 
 def test_losses_of_one_read_are_the_difference():
-    assert losses_between(Losses(samples=10, missing=3), Losses(samples=4, missing=1)) == Losses(
-        samples=6, missing=2
-    )
+    assert Losses(samples=10, missing=3) - Losses(samples=4, missing=1) == Losses(samples=6, missing=2)
