@@ -5,8 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
+import msgspec
+
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.records import Known, Mark, end_metadata
 from app.acquisition.journal.tap import CheckpointWriter, JournalTap
 from app.acquisition.messages import (
     EndReason,
@@ -26,7 +29,7 @@ from app.acquisition.stream.monitors import RATE_TEMPLATE, is_rate_wrong, rate_n
 from app.runs.blocks import BlockLayout
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
-from app.runs.metadata import EndMetadata, Events, RunMetadata
+from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.clock import TimeBase
 from drivers.samples import Losses
@@ -310,32 +313,20 @@ class Recording:
         self._file.append_all(reads, end_index)
 
     def _ending(self, file: RunFile) -> EndMetadata:
-        measurement = self._trigger.measurement
         self._time_base = self._context.time_base(file.start_index, file.next_index)
         is_rate_noted = any(note.template == RATE_TEMPLATE for note in self._notes)
         if is_rate_wrong(self._time_base) and not is_rate_noted:
             self._store_note(rate_note(self._time_base.scale, self._rate_hz))
         self._store_note(self._time_base.skew_message)
-        dwell_s = None
-        if measurement.release_index is not None and measurement.held_index is not None:
-            dwell_s = (measurement.release_index - measurement.held_index) / self._rate_hz
-        return EndMetadata(
-            ended=str(self._ended),
-            end_time=file.current_time(),
-            events=Events(
-                pulled_back_s=file.time_s(measurement.held_index),
-                armed_s=file.time_s(self._armed_index),
-                release_s=file.time_s(measurement.release_index),
-                slip_end_s=file.time_s(measurement.slip_end_index),
-                rest_s=file.time_s(measurement.rest_index),
-            ),
-            losses=file.statistics.losses(),
-            time_base=self._time_base,
-            dwell_s=dwell_s,
-            zero_m=measurement.zero_m,
-            relative_zero_m=measurement.relative_zero_m,
-            held_m=measurement.held_m,
-            message=str(self._message()),
+        known = msgspec.convert(self._trigger.measurement, Known, from_attributes=True)
+        return end_metadata(
+            Mark(file.next_index, self._armed_index, known, self._time_base),
+            file.start_index,
+            self._rate_hz,
+            str(self._ended),
+            file.current_time(),
+            file.statistics.losses(),
+            str(self._message()),
         )
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:

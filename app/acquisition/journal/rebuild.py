@@ -5,15 +5,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
-from app.acquisition.journal.records import JournalSummary, Known, Mark, Opened
+from app.acquisition.journal.records import JournalSummary, Known, Mark, Opened, end_metadata
 from app.acquisition.journal.replay import Replay, ReplayedReads
 from app.acquisition.messages import EndReason
 from app.acquisition.run_file import SampleStatistics, run_block
 from app.runs.blocks import BlockLayout, CalibratedBlock, StoredRun
 from app.runs.journal import JournalSpan
-from app.runs.metadata import EndMetadata, Events
+from app.runs.metadata import EndMetadata
 from app.runs.writer import RunWriter, create_run
 from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
@@ -165,35 +166,19 @@ def _ending(
 ) -> EndMetadata:
     untimed = TimeBase.from_estimates(None, None)
     mark = summary.checkpoint or Mark(next_index, opened.start_index, Known(), untimed)
-    known, rate_hz = mark.known, summary.rate_hz
     time_base = mark.time_base.with_skew(replay.skew(opened.start_index, next_index))
     notes = (
         INTERRUPTED_NOTE,
         DIFFERS_NOTE.capitalize() if replay.differs else "",
         str(time_base.skew_message),
     )
-    dwell_s = None
-    if known.held_index is not None and known.release_index is not None:
-        dwell_s = (known.release_index - known.held_index) / rate_hz
-
-    def time_s(index: int | None) -> float | None:
-        return None if index is None else (index - opened.start_index) / rate_hz
-
-    return EndMetadata(
-        ended=str(EndReason.INTERRUPTED),
-        end_time=opened.start_time + datetime.timedelta(seconds=(next_index - opened.start_index) / rate_hz),
-        events=Events(
-            pulled_back_s=time_s(known.held_index),
-            armed_s=time_s(mark.armed_index),
-            release_s=time_s(known.release_index),
-            slip_end_s=time_s(known.slip_end_index),
-            rest_s=time_s(known.rest_index),
-        ),
-        losses=statistics.losses(),
-        time_base=time_base,
-        dwell_s=dwell_s,
-        zero_m=known.zero_m,
-        relative_zero_m=known.relative_zero_m,
-        held_m=known.held_m,
-        message=". ".join(filter(None, notes)),
+    length_s = (next_index - opened.start_index) / summary.rate_hz
+    return end_metadata(
+        msgspec.structs.replace(mark, time_base=time_base),
+        opened.start_index,
+        summary.rate_hz,
+        str(EndReason.INTERRUPTED),
+        opened.start_time + datetime.timedelta(seconds=length_s),
+        statistics.losses(),
+        ". ".join(filter(None, notes)),
     )

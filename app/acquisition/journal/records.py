@@ -11,8 +11,9 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalRecord, RecordKind, read_journal
-from app.runs.metadata import EndMetadata, RunMetadata
+from app.runs.metadata import EndMetadata, Events, RunMetadata
 from drivers.clock import TimeBase
+from drivers.samples import Losses
 
 
 class JournalHeader(msgspec.Struct, frozen=True, tag=True):
@@ -77,6 +78,43 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     end_index: int
     """Sample before which the run ends."""
     ending: EndMetadata
+
+
+def end_metadata(
+    mark: Mark,
+    start_index: int,
+    rate_hz: float,
+    ended: str,
+    end_time: datetime.datetime,
+    losses: Losses,
+    notes: str,
+) -> EndMetadata:
+    """End metadata of a run that began at sample `start_index`, from its last checkpoint."""
+    known, dwell_s = mark.known, None
+    if known.release_index is not None and known.held_index is not None:
+        dwell_s = (known.release_index - known.held_index) / rate_hz
+
+    def time_s(index: int | None) -> float | None:
+        return None if index is None else (index - start_index) / rate_hz
+
+    return EndMetadata(
+        ended=ended,
+        end_time=end_time,
+        events=Events(
+            pulled_back_s=time_s(known.held_index),
+            armed_s=time_s(mark.armed_index),
+            release_s=time_s(known.release_index),
+            slip_end_s=time_s(known.slip_end_index),
+            rest_s=time_s(known.rest_index),
+        ),
+        losses=losses,
+        time_base=mark.time_base,
+        dwell_s=dwell_s,
+        zero_m=known.zero_m,
+        relative_zero_m=known.relative_zero_m,
+        held_m=known.held_m,
+        message=notes,
+    )
 
 
 MetadataRecord = JournalHeader | Mark | Opened | Named | Ended
