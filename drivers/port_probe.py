@@ -18,7 +18,7 @@ from drivers.recognition import (
 )
 from drivers.registry import AVAILABLE
 from drivers.source import ConfigurableLink, LineSettings, Link
-from messages.message import EMPTY, Message, message
+from messages.message import EMPTY, Message, message, option
 
 FIRST_WAIT_S = 3.5
 """A board that is reset by opening its port is silent for two seconds and more."""
@@ -115,7 +115,9 @@ def _probe_link(
         what = describe_unrecognised(found.received, has_baud=link.has_baud)
         return ProbeOutcome.UNREADABLE, what, found
     if not write:
-        what = message("nothing sends by itself: try --write, which asks the device who it is")
+        what = message(
+            "nothing sends by itself: try {option}, which asks the device who it is", option=option("--write")
+        )
         return ProbeOutcome.SILENT, what, found
     answered = query_identity(link, on_progress)
     if answered is not None:

@@ -6,7 +6,7 @@ is a look-up of the template (`messages.i18n`); no code reads a sentence.
 
 import enum
 import gettext
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Protocol, SupportsFloat, TypeAlias, Union, cast
 
@@ -77,6 +77,10 @@ class Message(msgspec.Struct, frozen=True):
         )
 
 
+class Option(Message, frozen=True):
+    """An option of the command line in a message; a window names its control instead (`replace_options`)."""
+
+
 EMPTY = Message("")
 """Nothing to say; false in a condition."""
 
@@ -111,6 +115,35 @@ def message(template: str, /, *, plural: str = "", **values: object) -> Message:
     everything else become text.
     """
     return Message(template, {name: _value(value) for name, value in values.items()}, plural)
+
+
+def option(name: str) -> Option:
+    """Name an option of the command line, such as `--skip`, as value of a message."""
+    return Option(name)
+
+
+def options_in(text: Message) -> tuple[str, ...]:
+    """Names of the options that a message names, in their order."""
+    names: list[str] = []
+    for value in text.values.values():
+        if isinstance(value, Option):
+            names.append(value.template)
+        elif isinstance(value, Message):
+            names += options_in(value)
+    return tuple(names)
+
+
+def replace_options(text: Message, labels: Mapping[str, Message]) -> Message:
+    """Replace options by the labels of a window's controls; options without a label stay."""
+    values: dict[str, Value] = {}
+    for name, value in text.values.items():
+        if isinstance(value, Option):
+            values[name] = labels.get(value.template, value)
+        elif isinstance(value, Message):
+            values[name] = replace_options(value, labels)
+        else:
+            values[name] = value
+    return Message(text.template, values, text.plural)
 
 
 def joined(parts: Sequence[Message | str], separator: str = " ") -> Message:

@@ -7,7 +7,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from messages.message import Message, MessageError, joined, message, message_of
+from messages.message import (
+    Message,
+    MessageError,
+    joined,
+    message,
+    message_of,
+    option,
+    options_in,
+    replace_options,
+)
 
 
 class Backwards(gettext.NullTranslations):
@@ -81,3 +90,13 @@ def test_message_of_any_error_is_one_line():
 def test_an_empty_message_is_false_and_stays_empty_in_every_language():
     assert not message("")
     assert message("").render(Backwards()) == ""
+
+
+def test_options_of_the_command_line_become_controls_of_a_window():
+    remedy = message("add {option} {number}", option=option("--skip"), number=3)
+    fault = message("{cell!r} is not a number: {remedy}", cell="--skip", remedy=remedy)
+    assert str(fault) == "'--skip' is not a number: add --skip 3"
+    assert options_in(pickle.loads(pickle.dumps(fault))) == ("--skip",)
+    shown = replace_options(fault, {"--skip": message("Lines skipped")})
+    assert str(shown) == "'--skip' is not a number: add Lines skipped 3"
+    assert replace_options(fault, {}) == fault

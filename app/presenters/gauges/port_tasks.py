@@ -14,8 +14,10 @@ from drivers.port_probe import PortReport, ProbeOutcome, probe_port
 from drivers.recognition import Recognition
 from drivers.registry import DRIVERS
 from messages.i18n import N_, gettext, translate
-from messages.message import Message, message
+from messages.message import Message, message, replace_options
 
+_LABELS = {"--write": message("“Ask silent devices, too”"), "--set": message("device settings")}
+"""Controls of the window in place of options of the command line."""
 _OUTCOMES = {
     ProbeOutcome.UNREADABLE: Chip(N_("something speaks that is not known"), Tone.WARN),
     ProbeOutcome.SILENT: Chip(N_("silent"), Tone.PLAIN),
@@ -64,13 +66,13 @@ def probed_port(report: PortReport) -> PortCard:
             card.url,
             card.identity,
             replace(_OUTCOMES[report.outcome], text=gettext(_OUTCOMES[report.outcome].text)),
-            (_in_window(report.message), *hints),
+            (translate(replace_options(report.message, _LABELS)), *hints),
         )
     info = DRIVERS[found.protocol]
     title = gettext(info.title)
     if report.line_settings:
         title = f"{title} at {report.line_settings}"
-    remark = (_in_window(found.remark),) if found.remark else ()
+    remark = (translate(replace_options(found.remark, _LABELS)),) if found.remark else ()
     return PortCard(
         card.url,
         card.identity,
@@ -98,11 +100,3 @@ def _signal(found: Recognition) -> str:
     one = gettext("1 gauge, so choose the port of gauge 2 too")
     gauges = one if found.channels == 1 else f"{found.channels} gauges"
     return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
-
-
-def _in_window(text: Message) -> str:
-    """Replace options of the command line by the controls of the window."""
-    asked = translate(text).replace(
-        "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"
-    )
-    return asked.replace("--set ", "device settings ")

@@ -8,7 +8,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
 from messages.i18n import N_, gettext, ngettext
-from messages.message import Message
+from messages.message import Message, message, replace_options
 
 FORMATS = {
     "csv": N_("CSV, for anything"),
@@ -25,6 +25,7 @@ CONTENTS = {
     "coefficients": N_("Coefficients, one table of all runs"),
 }
 _SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
+_LABELS = {"-o": message("place")}
 _ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
 
 
@@ -122,13 +123,8 @@ class ExportPresenter(Presenter[ExportState]):
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
 
-    def on_failed(self, message: Message) -> None:
-        text = (
-            sentence(message)
-            .replace("--force", gettext("Replace existing files"))
-            .replace("-o", gettext("place"))
-        )
-        self._update(progress=None, message=Chip(text, Tone.BAD))
+    def on_failed(self, fault: Message) -> None:
+        self._update(progress=None, message=Chip(sentence(replace_options(fault, _LABELS)), Tone.BAD))
 
     def _propose(self) -> None:
         """Propose a target, and request a preview."""

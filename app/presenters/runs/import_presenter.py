@@ -1,6 +1,5 @@
 """Presenter of the import dialog: columns and units of a foreign file, with a preview."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from app.presenters.runs.import_form import METADATA_FIELDS, PER_FILE_FIELDS, Im
 from app.presenters.runs.state import Overlay
 from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport, SurveyFile
 from messages.i18n import N_, gettext, ngettext
-from messages.message import Message
+from messages.message import Message, message, options_in, replace_options
 
 if TYPE_CHECKING:
     from app.runs.exchange.importing import FilePreview
@@ -21,23 +20,22 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 """Width of a column of the first rows, in characters."""
 _OPTIONS = {
-    "--delimiter": ("delimiter", N_("Between cells")),
-    "--decimal": ("decimal", N_("Decimal sign")),
-    "--skip": ("skip", N_("Lines skipped")),
-    "--no-header": ("header", N_("Names above")),
-    "--segment": ("segment", N_("Stretch")),
-    "--gain-uncertainty": ("gain_uncertainty", N_("Uncertainty of the gain")),
-    "--gain": ("gain", N_("Gain")),
-    "--offset": ("offset", N_("Offset")),
-    "--unit-name": ("unit_name", N_("Unit of the gain")),
-    "--unit": ("unit", N_("Unit")),
-    "--from": ("from_s", N_("From")),
-    "--until": ("until_s", N_("Until")),
+    "--delimiter": ("delimiter", message("Between cells")),
+    "--decimal": ("decimal", message("Decimal sign")),
+    "--skip": ("skip", message("Lines skipped")),
+    "--no-header": ("header", message("Names above")),
+    "--segment": ("segment", message("Stretch")),
+    "--gain-uncertainty": ("gain_uncertainty", message("Uncertainty of the gain")),
+    "--gain": ("gain", message("Gain")),
+    "--offset": ("offset", message("Offset")),
+    "--unit-name": ("unit_name", message("Unit of the gain")),
+    "--unit": ("unit", message("Unit")),
+    "--from": ("from_s", message("From")),
+    "--until": ("until_s", message("Until")),
 }
-"""Field and label for each option of the command line that a message of the importer may name."""
-_SERIES = re.compile(r"series '")
+"""Field and label of each option that a message of the importer may name."""
+_LABELS = {name: message("“{label}”", label=label) for name, (_, label) in _OPTIONS.items()}
 _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
-_OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +130,9 @@ class ImportPresenter(Presenter[ImportState]):
             else:
                 self._show_preview(answer, task.form)
 
-    def on_failed(self, task: ImportTask, message: Message) -> None:
-        words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
-        faults = dict.fromkeys(_named_field(str(message)), words)
+    def on_failed(self, task: ImportTask, fault: Message) -> None:
+        words = sentence(replace_options(fault, _LABELS))
+        faults = dict.fromkeys(_named_field(fault), words)
         if isinstance(task, ImportFile):
             self._update(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
         elif self._is_current(task):
@@ -242,11 +240,11 @@ def _correction_chip() -> Chip:
     return Chip(gettext("Correct what is marked"), Tone.BAD)
 
 
-def _named_field(message: str) -> tuple[str, ...]:
+def _named_field(fault: Message) -> tuple[str, ...]:
     """Name of the field that a message names, if it names exactly one."""
-    named = {_OPTIONS[option][0] for option in _OPTION.findall(message)}
-    if _SERIES.match(message):
-        named.add("series")
+    named = {_OPTIONS[name][0] for name in options_in(fault) if name in _OPTIONS}
+    if "field" in fault.values:
+        named.add(str(fault.values["field"]))
     return tuple(named) if len(named) == 1 else ()
 
 

@@ -57,7 +57,7 @@ from app.runs.reader import open_run
 from app.runs.summary import RunSummary
 from app.runs.validator import shared_validator
 from config.files import load_stand
-from config.schema import ConfigError
+from config.schema import ConfigError, SeriesError
 from messages.i18n import gettext, ngettext, translate
 
 MAX_OVERLAID_RUNS = 8
@@ -241,7 +241,11 @@ def _imported_trace(path: Path, block: RunBlock, measures: str, scale: float) ->
 def _import_file(task: ImportFile) -> str:
     form, path = task.form, Path(task.path)
     target = _free_path(Path(task.folder), form.name.strip().removesuffix(".h5") or path.stem)
-    return str(import_csv(path, csv_import(form), target, load_stand(), **_run_metadata(form)).path)
+    stand = load_stand()
+    try:
+        return str(import_csv(path, csv_import(form), target, stand, **_run_metadata(form)).path)
+    except SeriesError as error:
+        raise RunError("{reason}", reason=error, field="series") from None
 
 
 def _free_path(folder: Path, stem: str) -> Path:

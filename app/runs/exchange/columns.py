@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
+from messages.message import Message, message
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -30,7 +31,7 @@ class ForeignColumns:
     names: list[str]
     row_label: Callable[[int], str]
 
-    def fault(self, row: int, column: int, fault: str) -> ImportFileError:
+    def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
         """Error that names file, row, and column."""
         return ImportFileError(
             "{path}, {row_label}, column {names}: {fault}",
@@ -45,12 +46,11 @@ class ForeignColumns:
         endless = np.argwhere(np.isinf(self.values))
         if len(endless):
             row, column = endless[0]
-            raise self.fault(
-                row, column, "the number is infinite. Leave the cell empty if there is no reading"
-            )
+            fault = message("the number is infinite. Leave the cell empty if there is no reading")
+            raise self.fault(row, column, fault)
         absent = np.flatnonzero(np.isnan(self.values[:, 0]))
         if len(absent):
-            raise self.fault(absent[0], 0, "the time is missing. Give it or delete the line")
+            raise self.fault(absent[0], 0, message("the time is missing. Give it or delete the line"))
 
 
 _OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns, find_columns
+from messages.message import Message, message, option
 
 _SAMPLE_LINES = 20
 _WORDS = {"tab": "\t", "space": " "}
@@ -178,8 +179,9 @@ def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
             break
     if not found:
         raise ImportFileError(
-            "{path} holds no line of data. Give a file with numbers, and check --skip {skip}",
+            "{path} holds no line of data. Give a file with numbers, and check {option} {skip}",
             path=path,
+            option=option("--skip"),
             skip=skip,
         )
     return comment, found
@@ -190,8 +192,9 @@ def _delimiter(path: Path, layout: CsvOptions, lines: list[Line]) -> str:
         told = _WORDS.get(layout.delimiter, layout.delimiter)
         if len(told) != 1 or told in '\n"' or told == layout.decimal:
             raise ImportFileError(
-                "--delimiter {delimiter!r} cannot be. Give tab, space, or a character other"
+                "{option} {delimiter!r} cannot be. Give tab, space, or a character other"
                 " than the decimal sign {decimal}",
+                option=option("--delimiter"),
                 delimiter=layout.delimiter,
                 decimal=layout.decimal,
             )
@@ -209,8 +212,11 @@ def _no_numbers(path: Path, layout: CsvOptions, lines: list[Line]) -> ImportFile
             "{path} holds a header but no line of data. Give a file with numbers", path=path
         )
     return ImportFileError(
-        "{path}, line {number}: no columns of numbers are found in {text!r}. Check --skip,"
-        " --delimiter and --decimal",
+        "{path}, line {number}: no columns of numbers are found in {text!r}. Check"
+        " {skip_option}, {delimiter_option} and {decimal_option}",
+        skip_option=option("--skip"),
+        delimiter_option=option("--delimiter"),
+        decimal_option=option("--decimal"),
         path=path,
         number=lines[-1].number,
         text=lines[-1].text[:60],
@@ -240,8 +246,8 @@ def _header(
     if len(names) == len(cells):
         return names, lines[0]
     raise ImportFileError(
-        "{path}, line {number}: {text!r} is data, not column names. Add --no-header and give"
-        " columns by number",
+        "{path}, line {number}: {text!r} is data, not column names. Add {option} and give columns by number",
+        option=option("--no-header"),
         path=path,
         number=lines[0].number,
         text=lines[0].text[:60],
@@ -319,9 +325,8 @@ def _row(source: CsvText, line: Line) -> list[float]:
     for position in source.columns:
         name = source.column_name(position)
         if position >= len(cells):
-            raise _fault(
-                source, line.number, name, f"the line has only {len(cells)} cells. Complete it or delete it"
-            )
+            fault = message("the line has only {cells} cells. Complete it or delete it", cells=len(cells))
+            raise _fault(source, line.number, name, fault)
         values.append(_value(source, line, name, cells[position].strip()))
     return values
 
@@ -339,15 +344,21 @@ def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
         return to_number(cell, source.decimal)
     except ValueError:
         pass
-    remedy = "Correct it, or leave the cell empty if there is no reading"
+    remedy = message("Correct it, or leave the cell empty if there is no reading")
     if "," in cell and source.decimal == ".":
-        remedy = "If that is a decimal comma, add --decimal ,"
+        remedy = message("If that is a decimal comma, add {option} ,", option=option("--decimal"))
     elif line.number == source.data.number:
-        remedy = f"If the numbers begin below this line, add --no-header --skip {line.number}"
-    raise _fault(source, line.number, name, f"{cell!r} is not a number. {remedy}")
+        remedy = message(
+            "If the numbers begin below this line, add {header_option} {skip_option} {number}",
+            header_option=option("--no-header"),
+            skip_option=option("--skip"),
+            number=line.number,
+        )
+    fault = message("{cell!r} is not a number. {remedy}", cell=cell, remedy=remedy)
+    raise _fault(source, line.number, name, fault)
 
 
-def _fault(source: CsvText, line: int, column: str, fault: str) -> ImportFileError:
+def _fault(source: CsvText, line: int, column: str, fault: Message) -> ImportFileError:
     return ImportFileError(
         "{path}, line {line}, column {column}: {fault}",
         path=source.path,

@@ -24,6 +24,7 @@ from app.runs.exchange.content import ExportedRun, sample_columns
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
+from messages.message import option
 
 WriteRun = Callable[..., None]
 WriteCoefficients = Callable[..., None]
@@ -199,7 +200,8 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
         return [output]
     if output.exists() and not output.is_dir():
         raise UnsuitableRunError(
-            "{output} is a file, but {count} runs need a folder. Choose another -o",
+            "{output} is a file, but {count} runs need a folder. Choose another {option}",
+            option=option("-o"),
             output=output,
             count=len(paths),
         )

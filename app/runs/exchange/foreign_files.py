@@ -14,6 +14,7 @@ from app.runs.errors import ExtraMissingError, ImportFileError
 from app.runs.exchange.columns import ForeignColumns, column_stack, find_columns
 from app.runs.exchange.csv_reading import CsvOptions, read_columns
 from app.runs.optional import import_optional
+from messages.message import option
 
 Reader = Callable[[Path, CsvOptions], ForeignColumns]
 Result = TypeVar("Result")
@@ -77,9 +78,19 @@ def _reading(path: Path, read: Callable[[], Result]) -> Result:
 def _check_layout(path: Path, layout: CsvOptions) -> None:
     """Refuse what only texts have."""
     if layout.delimiter is not None or layout.decimal != ".":
-        raise ImportFileError("{name} is no text: leave out --delimiter and --decimal", name=path.name)
+        raise ImportFileError(
+            "{name} is no text: leave out {delimiter_option} and {decimal_option}",
+            name=path.name,
+            delimiter_option=option("--delimiter"),
+            decimal_option=option("--decimal"),
+        )
     if path.suffix.lower() != ".xlsx" and (layout.skip or not layout.header):
-        raise ImportFileError("{name} has no lines: leave out --skip and --no-header", name=path.name)
+        raise ImportFileError(
+            "{name} has no lines: leave out {skip_option} and {header_option}",
+            name=path.name,
+            skip_option=option("--skip"),
+            header_option=option("--no-header"),
+        )
 
 
 def _wanted(layout: CsvOptions) -> list[str]:
@@ -207,7 +218,9 @@ def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], l
             return found[-1]
     if not found:
         raise ImportFileError(
-            "{path} holds no rows. Give a workbook with numbers, and check --skip", path=path
+            "{path} holds no rows. Give a workbook with numbers, and check {option}",
+            path=path,
+            option=option("--skip"),
         )
     return found[0]
 

@@ -30,6 +30,7 @@ from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_meta
 from app.runs.writer import write_run
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
+from messages.message import Message, message, option
 
 Floats = NDArray[np.float64]
 _TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -123,7 +124,9 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
     if block.time_s[-1] > _LONGEST_S:
         raise ImportFileError(
             "{path}: its times go from {time_s:g} s to {time_s_2:g} s, too long for a record."
-            " Check --time {time} and --time-unit {time_unit}",
+            " Check {time_option} {time} and {unit_option} {time_unit}",
+            time_option=option("--time"),
+            unit_option=option("--time-unit"),
             path=path,
             time_s=time_s[0],
             time_s_2=time_s[-1],
@@ -132,8 +135,9 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
         )
     if np.isinf(block.readings).any():
         raise ImportFileError(
-            "{path}: with --gain {value:g} its readings are too large. Check both",
+            "{path}: with {option} {value:g} its readings are too large. Check both",
             path=path,
+            option=option("--gain"),
             value=plan.gain or 1.0,
         )
     return gauge, float(time_s[0]), block
@@ -142,10 +146,16 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
 def _gauge(plan: CsvImport) -> Gauge:
     """Calibration that turns cells into readings. Raises ImportFileError."""
     if plan.gain is not None and plan.unit is not None:
-        raise ImportFileError("--unit and --gain exclude each other: a gain says the unit. Give one of them")
+        raise ImportFileError(
+            "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them",
+            unit_option=option("--unit"),
+            gain_option=option("--gain"),
+        )
     if plan.unit_name and plan.gain is None:
         raise ImportFileError(
-            "--unit-name {unit_name!r} needs --gain, the {unit_name} of one cell unit",
+            "{name_option} {unit_name!r} needs {gain_option}, the {unit_name} of one cell unit",
+            name_option=option("--unit-name"),
+            gain_option=option("--gain"),
             unit_name=plan.unit_name,
         )
     gain = _LENGTH_UNITS_M[plan.unit or "m"] if plan.gain is None else plan.gain
@@ -159,14 +169,24 @@ def _gauge(plan: CsvImport) -> Gauge:
         raise ImportFileError(_impossible(gain, plan)) from None
 
 
-def _impossible(gain: float, plan: CsvImport) -> str:
+def _impossible(gain: float, plan: CsvImport) -> Message:
     """Say which number of a calibration cannot be."""
     if not math.isfinite(gain) or gain == 0.0:
-        return f"--gain {gain:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
+        return message(
+            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge",
+            option=option("--gain"),
+            value=gain,
+        )
     if not math.isfinite(plan.offset):
-        return f"--offset {plan.offset:g} cannot be. Give a finite number"
-    return (
-        f"--gain-uncertainty {plan.gain_uncertainty} cannot be. Give a finite share of the gain, 0 or above"
+        return message(
+            "{option} {value:g} cannot be. Give a finite number",
+            option=option("--offset"),
+            value=plan.offset,
+        )
+    return message(
+        "{option} {value} cannot be. Give a finite share of the gain, 0 or above",
+        option=option("--gain-uncertainty"),
+        value=plan.gain_uncertainty,
     )
 
 
@@ -183,7 +203,9 @@ def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
         low, high = time[segment][0] * scale, time[segment][-1] * scale
         raise ImportFileError(
             "{path}: no row lies between {first:g} s and {last:g} s. Its times go from {low:g}"
-            " s to {high:g} s: change --from and --until",
+            " s to {high:g} s: change {from_option} and {until_option}",
+            from_option=option("--from"),
+            until_option=option("--until"),
             path=columns.path,
             first=first,
             last=last,
@@ -218,9 +240,16 @@ def _check_rising(columns: ForeignColumns, rows: slice) -> None:
     row = rows.start + int(wrong[0]) + 1
     before, now = columns.values[row - 1 : row + 1, 0]
     if now < before:
-        fault = f"time goes back from {before!s} to {now!s}. Pick one stretch with --segment N, from 0"
+        fault = message(
+            "time goes back from {before} to {now}. Pick one stretch with {option} N, from 0",
+            before=str(before),
+            now=str(now),
+            option=option("--segment"),
+        )
     else:
-        fault = f"time {now!s} comes twice. Export the times with more digits, or delete the line"
+        fault = message(
+            "time {now} comes twice. Export the times with more digits, or delete the line", now=str(now)
+        )
     raise columns.fault(row, 0, fault)
 
 
@@ -341,7 +370,11 @@ def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
     share, source = max(found, key=lambda pair: pair[0])
     if not share:
         raise ImportFileError(
-            "{path}: no columns of numbers. Check --skip, --delimiter and --decimal", path=path
+            "{path}: no columns of numbers. Check {skip_option}, {delimiter_option} and {decimal_option}",
+            path=path,
+            skip_option=option("--skip"),
+            delimiter_option=option("--delimiter"),
+            decimal_option=option("--decimal"),
         )
     rows = _first_rows(source)
     width = max(len(source.names), *(len(row) for row in rows))

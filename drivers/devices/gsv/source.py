@@ -13,7 +13,7 @@ from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import StreamSource, check_gauge_channels, parse_settings
-from messages.message import EMPTY, Message, message
+from messages.message import EMPTY, Message, message, option
 
 _TRIES = 2
 _INPUTS = {
@@ -165,7 +165,8 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     if not is_recognised(frames, share, has_checksum=False):
         return None
     remark = message(
-        "of its {channels} channels say which the gauges are: --set table=N --set relative=N",
+        "of its {channels} channels say which the gauges are: {option} table=N {option} relative=N",
+        option=option("--set"),
         channels=channels,
     )
     return Recognition(

@@ -12,7 +12,7 @@ from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import StreamSource, check_gauge_channels, parse_settings
-from messages.message import EMPTY, Message, message
+from messages.message import EMPTY, Message, message, option
 
 RATE_HZ = 1000.0
 _TRIES = 2
@@ -140,7 +140,9 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     if not is_recognised(events, share, has_checksum=True):
         return None
     rate_hz = codec.rate_from_events(data) or rate_from_count(events, duration_s)
-    remark = message("say which channels the gauges are: --set table=N --set relative=N")
+    remark = message(
+        "say which channels the gauges are: {option} table=N {option} relative=N", option=option("--set")
+    )
     return Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
 
 

@@ -26,7 +26,7 @@ from drivers.recognition import IdentityQuery, describe_unreadable
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import StreamSource, parse_settings
-from messages.message import Message, joined, message
+from messages.message import Message, joined, message, option
 
 MAX_RATE_HZ = 1000.0
 QUASI_STATIC_HZ = 500.0
@@ -341,7 +341,11 @@ def explain(received: bytes) -> Message | None:
 def _parse_response(received: bytes) -> Message | None:
     if isinstance(frames.parse_response(_QUERY, received), InvalidResponse):
         return None
-    return message("unit {unit} answers: choose its register map with --set map=NAME", unit=_QUERY.unit)
+    return message(
+        "unit {unit} answers: choose its register map with {option} map=NAME",
+        unit=_QUERY.unit,
+        option=option("--set"),
+    )
 
 
 IDENTITY_QUERY = IdentityQuery(

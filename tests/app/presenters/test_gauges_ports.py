@@ -15,6 +15,7 @@ from drivers.host_checks import PortHint
 from drivers.port import PortInfo, PortUser
 from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
 from drivers.recognition import Recognition
+from messages.message import message, option
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
@@ -70,8 +71,11 @@ def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() 
 )
 def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: ProbeOutcome, tone: Tone) -> None:
     hint = PortHint("it is held back", "Ask for less")
-    message = "nothing sends by itself: try --write, which asks the device who it is"
-    card = probed_port(PortReport(ARDUINO, "", outcome, message, (PortUser(7, "x"),), hints=(hint,)))
+    reason = message(
+        "nothing sends by itself: try {option}, which asks the device who it is", option=option("--write")
+    )
+    assert "--write" in str(reason)
+    card = probed_port(PortReport(ARDUINO, "", outcome, reason, (PortUser(7, "x"),), hints=(hint,)))
     assert card.status.tone is tone
     assert "--write" not in card.description[0], "that is an option of the command line"
     assert card.description[1] == "it is held back. Ask for less"

@@ -24,6 +24,7 @@ from app.presenters.runs.work import execute as execute_task
 from app.runs.errors import ImportFileError, RunError
 from app.runs.exchange.importing import FilePreview, ParseOptions
 from app.runs.reader import open_run
+from messages.message import message, option
 
 FOUND = FilePreview(
     ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1",
@@ -118,10 +119,12 @@ def test_files_come_one_after_another_with_the_same_columns() -> None:
 
 def test_faults_name_the_fields_of_the_dialog() -> None:
     desk = Desk()
-    desk.presenter.on_failed(desk.asked[-1], "no columns. Check --skip, --delimiter and --decimal")
-    message = desk.presenter.state.message
-    assert message.text == "No columns. Check “Lines skipped”, “Between cells” and “Decimal sign”"
-    assert message.tone is Tone.BAD
+    names = {name: option(f"--{name}") for name in ("skip", "delimiter", "decimal")}
+    template = "no columns. Check {skip}, {delimiter} and {decimal}"
+    desk.presenter.on_failed(desk.asked[-1], message(template, **names))
+    shown = desk.presenter.state.message
+    assert shown.text == "No columns. Check “Lines skipped”, “Between cells” and “Decimal sign”"
+    assert shown.tone is Tone.BAD
     assert not desk.presenter.state.can_import
     desk.presenter.set_form(replace(desk.form, text_format=TextFormat(skip="3")))
     assert desk.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="3"))
@@ -131,7 +134,7 @@ def test_a_run_that_cannot_be_stored_can_be_tried_again() -> None:
     desk = Desk()
     desk.make_ready()
     desk.presenter.import_file()
-    desk.presenter.on_failed(desk.asked[-1], "series '9X' is not one of this stand")
+    desk.presenter.on_failed(desk.asked[-1], message("series '9X' is not one of this stand", field="series"))
     assert desk.presenter.state.can_import
     assert desk.presenter.state.message.tone is Tone.BAD
 
@@ -297,16 +300,15 @@ def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
     desk = Desk()
     desk.make_ready()
     desk.presenter.set_form(replace(desk.form, segment="9"))
-    desk.presenter.on_failed(
-        desk.asked[-1], "a.csv: time goes back from 2 to 1. Pick one stretch with --segment N"
-    )
+    fault = message("time goes back. Pick one stretch with {option} N", option=option("--segment"))
+    desk.presenter.on_failed(desk.asked[-1], message("a.csv: {fault}", fault=fault))
     assert set(desk.presenter.state.faults) == {"segment"}
     assert "“Stretch”" in desk.presenter.state.faults["segment"]
     desk.presenter.set_form(replace(desk.form, segment=""))
     assert desk.presenter.state.faults == {}
     desk.answer(PREVIEW)
     desk.presenter.import_file()
-    desk.presenter.on_failed(desk.asked[-1], "series '9X' is not one of this stand")
+    desk.presenter.on_failed(desk.asked[-1], message("series '9X' is not one of this stand", field="series"))
     assert set(desk.presenter.state.faults) == {"series"}
     assert desk.presenter.state.overlay is not None
 
