@@ -27,6 +27,7 @@ from config.files import (
     settings_path,
 )
 from config.schema import ConfigError, Settings
+from drivers.registry import DRIVERS
 from messages.i18n import N_
 
 
@@ -87,8 +88,6 @@ def _list_ports() -> tuple[PortChoice, ...]:
 
 
 def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> StartState:
-    from drivers.registry import DRIVERS
-
     device = context.gauges.device
     form = ConnectForm(
         protocol=device.protocol,

@@ -1,13 +1,10 @@
 """Conditions of a test as typed on Record and in an import."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from app.presenters import number_text
+from app.runs.metadata import Conditions
 from messages.i18n import N_
-
-if TYPE_CHECKING:
-    from app.runs.metadata import Conditions
 
 CONDITION_TITLES = {
     "temperature_c": N_("Temperature, °C"),
@@ -24,10 +21,8 @@ _NUMBERS = ("temperature_c", "humidity_percent")
 
 def parse_conditions(
     form: object, other: Mapping[str, str], names: Sequence[str] = CONDITION_FIELDS
-) -> "Conditions":
+) -> Conditions:
     """Parse fields of `form` by these names, and add `other` conditions. Raises MetadataError."""
-    from app.runs.metadata import Conditions
-
     texts = {name: getattr(form, name).strip() for name in names}
     texts |= {name: number_text.normalize_number(texts[name]) for name in _NUMBERS if name in texts}
     known = Conditions.parse({name: text for name, text in texts.items() if text})

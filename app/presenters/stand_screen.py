@@ -35,8 +35,6 @@ class StandForm:
 
 @dataclass(frozen=True, slots=True)
 class StandState:
-    """State of the screen."""
-
     all_series: tuple[str, ...]
     form: StandForm
     defaults: StandForm

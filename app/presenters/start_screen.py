@@ -13,8 +13,6 @@ from messages.i18n import gettext, translate
 
 @dataclass(frozen=True, slots=True)
 class PortChoice:
-    """A serial port of this computer."""
-
     url: str
     description: str = ""
 
@@ -88,11 +86,9 @@ class StartPresenter(Presenter[StartState]):
             self.navigator.open_run(path)
 
     def set_busy(self, what: str) -> None:
-        """Show the work in progress; empty for none."""
         self._update(busy=what)
 
     def set_connected(self, device: str) -> None:
-        """Show the connected device; empty for none."""
         self._update(connected=device, busy="")
 
 

@@ -57,8 +57,6 @@ class WindowState:
 
 @dataclass(frozen=True, slots=True)
 class WindowContext:
-    """What the window starts with."""
-
     stand: StandContext
     start: StartState
     personal: PersonalSettings = field(default_factory=PersonalSettings)
@@ -139,8 +137,6 @@ class WindowPresenter(Presenter[WindowState]):
             text = gettext("{fault}. The usual settings are used until then", fault=context.personal.fault)
             self._update(notice=Notice(sentence(text), Tone.WARN))
 
-    # --- screens and notices ---
-
     def show_screen(self, screen: Screen) -> None:
         before, entered = self.presenters[self.state.screen], self.presenters[screen]
         if entered is not before:
@@ -219,8 +215,6 @@ class WindowPresenter(Presenter[WindowState]):
         """Load the analysis, so that the first one is as fast as the others."""
         self._workers.analysis.submit(WARM_UP, None)
 
-    # --- events ---
-
     def tick(self) -> None:
         """Process events of engine and workers, and new samples; called some 60 times a second."""
         if (report := self._errors.next_report()) is not None:  # first: the rest may fail
@@ -237,8 +231,6 @@ class WindowPresenter(Presenter[WindowState]):
         for presenter in self.presenters.values():
             presenter.close()
         self._workers.pool.close()
-
-    # --- inside ---
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.dispatch(settings)

@@ -98,7 +98,6 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
 
 
 def _print_late_errors(errors: ErrorReporter) -> None:
-    """Print errors that came after the window had closed; the log has them too."""
     while (report := errors.next_report()) is not None:
         sys.stderr.write(f"error: {translate(report.message)}\n")
 

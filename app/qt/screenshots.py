@@ -170,7 +170,6 @@ def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camer
 
 
 def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
-    """The fit, the simulation by hand, cursors, and the motion that no gauge sees."""
     identify = presenter.identify
     presenter.show_screen(Screen.IDENTIFY)
     wait(lambda: bool(identify.state.classical), "the classical figures are worked out")
@@ -205,7 +204,6 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
 
 
 def _shoot_runs(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
-    """Some runs of the campaign over one another."""
     runs = presenter.runs
     presenter.show_screen(Screen.RUNS)
     wait(lambda: len(runs.state.rows) > _LAID_OVER, "the runs are listed")
@@ -253,7 +251,6 @@ class _Patience:
 
 
 def main() -> int:
-    """Run as a program."""
     if len(sys.argv) != 2:
         sys.stderr.write("usage: python -m app.qt.screenshots FOLDER\n")
         return 2

@@ -43,8 +43,6 @@ _WIDTH = 760
 
 
 class SettingsScreen(QWidget):
-    """Shows `SettingsState`."""
-
     def __init__(self, presenter: SettingsPresenter) -> None:
         super().__init__()
         self._presenter = presenter

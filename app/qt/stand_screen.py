@@ -33,8 +33,6 @@ _NOT_RUNNING = N_("Faults can be asked for while the simulated stand is connecte
 
 
 class StandScreen(QWidget):
-    """Shows `StandState`."""
-
     def __init__(self, presenter: StandPresenter) -> None:
         super().__init__()
         self._presenter = presenter

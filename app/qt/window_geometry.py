@@ -59,7 +59,6 @@ class WindowGeometry:
                 _sort(part, column, descending=descending)
 
     def capture(self, window: QMainWindow, screen: str) -> WindowLayout:
-        """Current layout; parts that were not shown keep their stored widths."""
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
         parts = dict(_parts(window))
         widths = {name: found for name, part in parts.items() if any(found := _widths(part))}

@@ -80,7 +80,7 @@ class LiveTraces:
     release_s: float | None = None
     slip_s: Span | None = None
     end_s: float | None = None
-    """release_s/slip_s/end_s: On the time axis of the samples; None as long as they have not happened."""
+    """On the time axis of the samples; None as long as they have not happened."""
     is_pulled: bool = False
     """The table is being pulled or held."""
     is_held: bool = False
@@ -103,8 +103,6 @@ class LiveTraces:
         """Mean of both gauges (2,) over the last `_MEAN_S`, as the gauges read; NaN without samples."""
         end_s = self.samples.end_s
         return self.samples.mean(end_s - _MEAN_S, end_s + 1e-9)
-
-    # --- changes ---
 
     def reconnected(self, gauges: Gauges) -> "LiveTraces":
         """Begin with another device; the drawn traces stay until samples come or `cleared`."""
@@ -137,7 +135,6 @@ class LiveTraces:
         return self._counted_from(parts_m.mean(axis=0))
 
     def untared(self) -> "LiveTraces":
-        """Count readings from the zero of the calibration."""
         return self._counted_from(np.zeros(2))
 
     def on_state(self, state: PullbackState, since_s: float, position: StandPosition) -> "LiveTraces":
@@ -189,8 +186,6 @@ class LiveTraces:
         elif slip_s is not None and slip_s[1] == np.inf:
             slip_s = (slip_s[0], since_s)
         return replace(changed, slip_s=slip_s, is_pulled=state in _TABLE_PULLED)
-
-    # --- drawing ---
 
     def _draw(self, pullback_m: float, room: AllowedPlateRange | None) -> Traces:
         origin_s, span = self._time_axis()
@@ -298,12 +293,10 @@ def _stop_note(result: LiveResult) -> str:
 
 
 def rate_text(rate_hz: float) -> str:
-    """Write `1000.02 Hz`."""
     return with_unit(number_text.format_fixed(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
 
 
 def lost_samples_chip(health: Health) -> Chip:
-    """Number of samples that are missing or damaged."""
     lost = health.missing + health.missing_estimated + health.damaged
     hint = gettext(
         "{missing} missing, {estimated} missing by the clock, {damaged} damaged, of {samples} samples",

@@ -135,7 +135,6 @@ class NextRuns:
         return self.with_choices(series=next_series(self.plan.progress, self.series))
 
     def run_text(self, series: str) -> str:
-        """Number of the next run in its series: `1FFM0 run 2 of 3`."""
         return run_text(self.plan.progress, series, self._counts()[series])
 
     def to_save(self, folder: str) -> tuple["NextRuns", SavePlan | None]:
@@ -163,7 +162,6 @@ class NextRuns:
 
     @property
     def run_count(self) -> int:
-        """Runs to record one after another. Raises MetadataError where the form says no number."""
         return _parse_count(self.choices.form)
 
     def why_not_armed(self, series: str) -> Chip:
@@ -218,12 +216,10 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
 
 
 def format_plan(plan: Plan) -> str:
-    """Write a plan as `parse_plan` reads it."""
     return ", ".join(f"{one.series} x{one.repeats}" for one in plan)
 
 
 def plan_progress(plan: Plan, completed: Mapping[str, int]) -> tuple[SeriesProgress, ...]:
-    """Compare a plan with the number of completed runs of each series."""
     return tuple(SeriesProgress(one.series, completed.get(one.series, 0), one.repeats) for one in plan)
 
 
@@ -236,7 +232,6 @@ def next_series(progress: Sequence[SeriesProgress], current: str) -> str:
 
 
 def run_text(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
-    """Number of the next run in its series: `1FFM0 run 2 of 3`."""
     planned = next((one.planned for one in progress if one.series == series), None)
     if planned is None:
         return gettext("{series} run {number}", series=series, number=done + 1)

@@ -61,8 +61,6 @@ class StatusBar:
 
 
 class StepStatus(StrEnum):
-    """Position of a step relative to the current one."""
-
     DONE = "done"
     NOW = "now"
     AHEAD = "ahead"
@@ -70,8 +68,6 @@ class StepStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of a pullback test in the stepper."""
-
     name: str
     status: StepStatus = StepStatus.AHEAD
 
@@ -96,8 +92,6 @@ class PullbackTarget:
 
 @dataclass(frozen=True, slots=True)
 class GuidanceState:
-    """Next action of the operator."""
-
     instruction: str
     detail: str = ""
     tone: Tone = Tone.PLAIN
@@ -312,8 +306,6 @@ class CountCompletedRuns:
 
 @dataclass(frozen=True, slots=True)
 class SavePlan:
-    """Store plan and choices."""
-
     folder: str
     tests: NextTests
 
@@ -354,22 +346,16 @@ class ScreenEntered:
 
 @dataclass(frozen=True, slots=True)
 class SeriesChosen:
-    """The operator chose the series of the next run."""
-
     series: str
 
 
 @dataclass(frozen=True, slots=True)
 class PlanEdited:
-    """The operator entered a series plan."""
-
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class NoteEdited:
-    """The operator edited the note of the run that waits for a decision."""
-
     note: str
 
 

@@ -113,8 +113,6 @@ def _value_labels(count: int) -> list[ValueLabel]:
 
 
 class _Reading(QWidget):
-    """Name of a channel and its current reading."""
-
     def __init__(self, name: str, channel: str) -> None:
         super().__init__()
         self.value = label(role=TextRole.NUMBER)

@@ -33,8 +33,6 @@ class CheckBox(QCheckBox):
 
 
 class ComboBox(QComboBox):
-    """A `QComboBox` with a drawn arrow."""
-
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         super().paintEvent(event)
         group = QPalette.ColorGroup.Active if self.isEnabled() else QPalette.ColorGroup.Disabled

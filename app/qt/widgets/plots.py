@@ -130,7 +130,6 @@ class PlotStack(QWidget):
         self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
 
     def time_range(self) -> tuple[float, float]:
-        """Shown span of time (s)."""
         (start_s, end_s), _ = self.plots[0].view.viewRange()
         return float(start_s), float(end_s)
 
@@ -163,8 +162,6 @@ class PlotStack(QWidget):
 
 
 class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """Axis whose numbers have a true minus sign."""
-
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
 
@@ -175,7 +172,6 @@ def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) 
 
 
 def shade(token_colour: str, alpha: float) -> Any:
-    """Brush of a shaded span."""
     return pg.mkBrush(colour(token_colour, alpha))
 
 
@@ -208,7 +204,6 @@ def draggable_line(plot: Plot) -> Any:
 
 
 def place_region(item: Any, span: tuple[float, float] | None) -> None:
-    """Show a span; None hides it."""
     item.setVisible(span is not None)
     if span is not None:
         item.setRegion(span)
@@ -221,8 +216,6 @@ def _write(item: Any, text: str, text_colour: str) -> None:
 
 
 class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
-    """Shaded spans as high as the plot."""
-
     def __init__(self, plot: Plot) -> None:
         super().__init__()
         self._spans: tuple[tuple[float, float], ...] = ()

@@ -48,7 +48,6 @@ def show_chip(target: QLabel, chip: Chip) -> None:
 
 
 def set_text_or_hide(target: QLabel, text: str) -> None:
-    """Set the text of a label; an empty one is hidden."""
     target.setText(text)
     target.setVisible(bool(text))
 
