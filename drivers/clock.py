@@ -130,11 +130,11 @@ class RobustLine:
     """A straight line through points, outliers left out."""
 
     centre: float
-    """A point of the line."""
     level: float
+    """Value of the line at `centre`."""
     slope: float
-    """The uncertainty is a standard uncertainty and allows for correlated residuals."""
     slope_uncertainty: float
+    """Standard uncertainty; it allows for correlated residuals."""
     scatter: float
     """Root mean square of the residuals."""
     span: float

@@ -17,7 +17,7 @@ from drivers.recognition import (
     recognise,
 )
 from drivers.registry import AVAILABLE
-from drivers.source import ConfigurableLink, LineSettings, Link
+from drivers.source import LineSettings, Link
 from messages.message import EMPTY, Message, message, option
 
 FIRST_WAIT_S = 3.5
@@ -129,7 +129,7 @@ def _probe_link(
 
 
 def listen(
-    link: ConfigurableLink,
+    link: Port,
     on_progress: Callable[[Message], None],
     candidates: Sequence[LineSettings] = COMMON_LINE_SETTINGS,
     clock: Callable[[], float] = time.monotonic,
@@ -162,7 +162,7 @@ def listen(
 
 
 def query_identity(
-    link: ConfigurableLink,
+    link: Port,
     on_progress: Callable[[Message], None],
     queries: Iterable[tuple[str, IdentityQuery]] | None = None,
     clock: Callable[[], float] = time.monotonic,
@@ -223,7 +223,7 @@ def _informativeness(result: ListenResult) -> tuple[float, bool, float]:
 
 
 def _query_once(
-    link: ConfigurableLink, query: IdentityQuery, settings: LineSettings, clock: Callable[[], float]
+    link: Port, query: IdentityQuery, settings: LineSettings, clock: Callable[[], float]
 ) -> Message | None:
     if link.has_baud:
         try:

@@ -34,17 +34,6 @@ class LineSettings:
         return f"{self.baud} baud 8{self.parity}1"
 
 
-class ConfigurableLink(Link, Protocol):
-    """A link whose line settings can be changed while it is open."""
-
-    @property
-    def has_baud(self) -> bool:
-        """Whether baud rate and parity have an effect."""
-
-    def configure(self, line_settings: LineSettings) -> None:
-        """Change the settings and discard unread bytes. Raises SettingsError where the port cannot."""
-
-
 class CancellableLink:
     """A link that raises DeviceLostError from the moment `cancelled` is set, so that a start can be ended."""
 
@@ -80,6 +69,9 @@ class SampleSource(ABC):
     stop_command = b""
     """What asks the device to stop sending."""
 
+    is_polled = False
+    """Whether the device is polled on a grid of the host's clock, see `set_poll_rate`."""
+
     @property
     def channels(self) -> int:
         """Gauges that the device reads, 1 or 2; the column of a missing one is 0."""
@@ -112,6 +104,10 @@ class SampleSource(ABC):
     def skew(self, first_index: int, end_index: int) -> Skew | None:  # noqa: ARG002
         """Skew of samples first_index <= index < end_index; None where one converter reads both gauges."""
         return None
+
+    def set_poll_rate(self, rate_hz: float) -> None:
+        """Lower the rate of polls of a polled device, after the start and before anything is decoded."""
+        raise NotImplementedError
 
     @abstractmethod
     def prepare(self) -> None:

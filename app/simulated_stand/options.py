@@ -23,11 +23,11 @@ class Timetable:
     """Lengths (s) of the parts of one test, in their order, and how tests follow each other."""
 
     rest_s: float
-    """In the last one the table is stilled, and the plate put back if it is its turn."""
     pull_s: float
     hold_s: float
     decay_s: float
     recentre_s: float
+    """The table is stilled, and the plate put back if it is its turn."""
     every_s: float | None = None
     """From the beginning of a test to the next; what the parts leave of it is rest. None: at once."""
     count: int | None = None

@@ -1,4 +1,4 @@
-"""Which tests a synthetic campaign has, and what is true of each."""
+"""Synthetic campaigns: their tests, the truth of each, and the comparison of results with it."""
 
 import datetime
 import math
@@ -43,8 +43,8 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     seed: int = 1
     """Of everything that is drawn."""
     rate_hz: float = 1000.0
-    """Of each run; it ends `duration_s` after the release."""
     duration_s: float = 10.0
+    """Of each run after its release."""
     noise_m: float = 20e-6
     friction_scatter: float = 0.0
     """Standard deviation of f_d from run to run, as a share of it."""
@@ -67,7 +67,7 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SystematicErrors(msgspec.Struct, frozen=True):
-    """What the campaign does not know of its stand: drawn once, from the stated uncertainties."""
+    """Errors of the stand that the campaign does not know; drawn once from the stated uncertainties."""
 
     gains: tuple[float, float]
     """By which share displacements are read too large."""
@@ -78,13 +78,13 @@ class SystematicErrors(msgspec.Struct, frozen=True):
     clock: float
     """By which share true time runs faster than the device's."""
     table_mass_kg: float
-    """Of the true values from the stated ones."""
+    """Error of the true value against the stated one, as of the next two."""
     plate_mass_kg: float
     gravity_m_per_s2: float
 
 
 class SyntheticTest(msgspec.Struct, frozen=True):
-    """One test: where it is stored, and what is true of it."""
+    """One test: its file and its true parameters."""
 
     path: str
     series: str
@@ -120,13 +120,8 @@ def plan_tests(
 ) -> list[SyntheticTest]:
     """The tests of a campaign, series after series in the order of Table 1. Raises ConfigError."""
     errors = draw_errors(stand, gauges, options.seed)
-    drawn = {
-        "gain_error_table": errors.gains[0],
-        "gain_error_relative": errors.gains[1],
-        "lag_s": errors.lag_s,
-        "clock_error": errors.clock,
-        "campaign_seed": options.seed,
-    }
+    drawn = dict(zip(("gain_error_table", "gain_error_relative"), errors.gains, strict=True))
+    drawn |= {"lag_s": errors.lag_s, "clock_error": errors.clock, "campaign_seed": options.seed}
     codes = [stand.series(code).code for code in options.series or published_table()]
     tests = []
     for number, (code, repeat) in enumerate(product(codes, range(1, options.repeats + 1))):
@@ -144,7 +139,11 @@ def series_parameters(
     """What is true of a series: its mean, where runs differ. Raises ConfigError."""
     series, row = stand.series(code), published_row(code)
     added_kg = series.plate_mass_kg - stand.plate_mass_kg
-    friction = _friction(options, stand, series.contact, row.friction_dynamic)
+    friction = row.friction_dynamic
+    if options.friction_by_contact:
+        rows = published_table().items()
+        same = (one for other, one in rows if stand.series(other).contact == series.contact)
+        friction = next(same).friction_dynamic
     friction *= 1.0 + options.friction_per_kg * added_kg
     gravity = stand.gravity_m_per_s2 + errors.gravity_m_per_s2
     release = (2.0 * math.pi / row.period_s) ** 2 * series.pullback_m
@@ -161,6 +160,12 @@ def series_parameters(
     )
 
 
+_OF_MOTION = (
+    "residual_displacement_m", "table_velocity_max_m_per_s", "plate_velocity_max_m_per_s",
+    "table_acceleration_max_m_per_s2", "plate_acceleration_max_m_per_s2",
+)  # fmt: skip
+
+
 def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
     """What a perfect analysis would find, by the names of its results."""
     row = published_row(code)
@@ -171,19 +176,8 @@ def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]
         "period_s": row.period_s,
         "damping_n1_per_s": row.damping_n1_per_s,
         "damping_n2_per_s": parameters.damping_coefficient_kg_per_s / (2.0 * parameters.table_mass_kg),
-        "residual_displacement_m": motion.residual_displacement_m,
-        "table_velocity_max_m_per_s": motion.table_velocity_max_m_per_s,
-        "plate_velocity_max_m_per_s": motion.plate_velocity_max_m_per_s,
-        "table_acceleration_max_m_per_s2": motion.table_acceleration_max_m_per_s2,
-        "plate_acceleration_max_m_per_s2": motion.plate_acceleration_max_m_per_s2,
+        **{name: getattr(motion, name) for name in _OF_MOTION},
     }
-
-
-def _friction(options: CampaignOptions, stand: Stand, contact: str, printed: float) -> float:
-    if not options.friction_by_contact:
-        return printed
-    rows = published_table().items()
-    return next(row.friction_dynamic for code, row in rows if stand.series(code).contact == contact)
 
 
 def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]) -> TwoMassParameters:
@@ -249,7 +243,14 @@ _PLACES_M = (2e-4, 2e-3)
 def write_test(test: SyntheticTest) -> StoredRun:
     """Record a synthetic test, faster than it would happen. Raises RunError."""
     block, release_s = sample_test(test, load_gauges())
-    return write_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
+    ending = EndMetadata(
+        ended="simulated",
+        end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
+        events=Events(pulled_back_s=0.0, release_s=release_s),
+        losses=count_flags(block.status),
+        time_base=TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY),
+    )
+    return write_run(Path(test.path), test_metadata(test), block, ending)
 
 
 def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
@@ -328,14 +329,4 @@ def _converted(
     true = gauge.replace(gain_m_per_count=gauge.gain_m_per_count / (1.0 + gain))
     return SimulatedGauge(true, GaugeFaults(noise_m, nonlinearity_m=bend_m), rng).read(
         displacement_m, np.zeros(len(displacement_m))
-    )
-
-
-def _ending(test: SyntheticTest, block: RunBlock, release_s: float) -> EndMetadata:
-    return EndMetadata(
-        ended="simulated",
-        end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
-        events=Events(pulled_back_s=0.0, release_s=release_s),
-        losses=count_flags(block.status),
-        time_base=TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY),
     )

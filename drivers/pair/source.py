@@ -1,7 +1,6 @@
 """Two devices of one gauge on two ports, as one `SampleSource`."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Protocol, runtime_checkable
 
 from drivers.clock import Skew
 from drivers.driver import GAUGES, DeviceDriver
@@ -21,18 +20,6 @@ _STALL_S = 0.5
 """A read waits for 50 ms: after more, this computer stood still."""
 _BATCH_DELAY_S = 0.004
 """How long bytes collect in each port: rows wait for the other device anyway."""
-
-
-@runtime_checkable
-class PolledSource(Protocol):
-    """A source whose device is polled on a grid of the host's clock."""
-
-    @property
-    def rate_hz(self) -> float:
-        """Polls a second."""
-
-    def set_poll_rate(self, rate_hz: float) -> None:
-        """Change the rate of polls."""
 
 
 class PairSource(SampleSource):
@@ -132,10 +119,10 @@ class PairSource(SampleSource):
 
     def _synchronise_polling(self) -> None:
         """Poll both devices at the same times, so that their readings belong together."""
-        polled = [one.source for one in self.channel_sources if isinstance(one.source, PolledSource)]
-        if len(polled) == len(self.channel_sources):
-            rate_hz = min(source.rate_hz for source in polled)
-            for source in polled:
+        sources = [channel.source for channel in self.channel_sources]
+        if all(source.is_polled for source in sources):
+            rate_hz = min(source.rate_hz for source in sources)
+            for source in sources:
                 source.set_poll_rate(rate_hz)
 
     @property

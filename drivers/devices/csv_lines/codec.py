@@ -178,7 +178,7 @@ class LineDecoder(PacketDecoder):
 def rate_from_lines(layout: LineFormat, data: bytes) -> float | None:
     """Samples a second by the device's own times; None while there are too few lines."""
     time = layout.time_column
-    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    lines = LineParser(layout).read(whole_lines(data))
     if time is None:
         return None
     times = lines["time"][lines["good"] != 0]
@@ -196,7 +196,7 @@ def clock_step_from_lines(layout: LineFormat, data: bytes) -> float:
         return TIME_UNIT_S[layout.time_column]
     place = layout.columns.index(Column.TIME_S)
     separator, decimal = layout.separator.encode("ascii"), layout.decimal.encode("ascii")
-    lines = data[first_line_start(data) : whole_lines_end(data)].splitlines()[:_LINES_EXAMINED]
+    lines = whole_lines(data).splitlines()[:_LINES_EXAMINED]
     fields = [line.split(separator) for line in lines if line.count(separator) == len(layout.columns) - 1]
     decimals = [row[place].strip().partition(decimal)[2] for row in fields]
     return 10.0 ** -max((len(digits) for digits in decimals if digits.isdigit()), default=0)
@@ -212,7 +212,12 @@ def whole_lines_end(data: bytes) -> int:
     return max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
 
 
+def whole_lines(data: bytes) -> bytes:
+    """Lines of `data` without the first, which may be cut, and the unfinished last one."""
+    return data[first_line_start(data) : whole_lines_end(data)]
+
+
 def has_good_line(layout: LineFormat, data: bytes) -> bool:
     """Whether one line of `data` after the first is good."""
-    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    lines = LineParser(layout).read(whole_lines(data))
     return bool(lines["good"].any())

@@ -222,7 +222,7 @@ def _recognise_lines(
     settings: dict[str, str],
     remark: Message = EMPTY,
 ) -> Recognition | None:
-    whole = data[codec.first_line_start(data) : codec.whole_lines_end(data)]
+    whole = codec.whole_lines(data)
     lines = LineParser(layout).read(whole)
     good = lines[lines["good"] != 0]
     share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)

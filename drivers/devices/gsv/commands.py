@@ -14,7 +14,6 @@ from messages.message import Message, message
 
 SYNC = 0xAA
 END = 0x85
-ALL_CHANNELS = 0
 OK = 0x00
 OK_CHANGED = 0x01
 """Done, with the nearest value that the device can do."""
@@ -102,11 +101,6 @@ def write_rate(rate_hz: float) -> bytes:
 def set_float() -> bytes:
     """Request to send values as 32-bit floats."""
     return encode_request(Code.SET_FORMAT, bytes([1, 0x00, 0x10]))
-
-
-def set_zero(channel: int = ALL_CHANNELS) -> bytes:
-    """Request that sets the zero of a channel (from 1) to its present reading."""
-    return encode_request(Code.SET_ZERO, bytes([channel]))
 
 
 def set_input(channel: int, kind: InputType) -> bytes:

@@ -39,8 +39,9 @@ class Transaction:
     data: bytes
     """All that came; b"" after a time-out."""
     sent_ns: int
-    """Host's time before the request was written and after the last byte was read."""
+    """Host's time before the request was written."""
     received_ns: int
+    """Host's time after the last byte was read."""
 
     @property
     def measured_ns(self) -> int:

@@ -161,8 +161,9 @@ class Poll:
     first is that of the sample."""
     channels: tuple[Channel, ...]
     values: tuple[RegisterLocation, ...]
-    """Of each channel's value and status register (None where it has none)."""
+    """Where the value of each channel is."""
     states: tuple[RegisterLocation | None, ...]
+    """Where the status register of each channel is, if it has one."""
 
     def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
         """Values of all channels, from the responses to all requests."""

@@ -66,6 +66,8 @@ class ModbusSource(StreamSource):
     of its cell, or not at all. `rate_hz` are polls a second; None polls as often as the device answers.
     """
 
+    is_polled = True
+
     def __init__(
         self, settings: ModbusSettings, register_map: RegisterMap, rate_hz: float | None = None
     ) -> None:
@@ -142,7 +144,6 @@ class ModbusSource(StreamSource):
         return b""
 
     def set_poll_rate(self, rate_hz: float) -> None:
-        """Lower the rate of polls, after the start and before anything is decoded."""
         self._rate_hz, self._schedule = rate_hz, PollSchedule(rate_hz)
 
     def read(self, link: Link) -> bytes:

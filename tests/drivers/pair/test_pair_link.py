@@ -61,6 +61,7 @@ class FakeChoice:
 class FakeSource:
     """Takes whatever comes."""
 
+    is_polled = False
     rate_hz = 100.0
 
     def __init__(self, fault: Exception | None = None) -> None:
@@ -169,9 +170,10 @@ def test_both_devices_go_on_where_they_were(ports, sources):
     assert [source.said for source in sources] == [["resume", "stop"]] * 2
 
 
-class AskedSource(FakeSource):
-    """Is asked, at a rate that can be set."""
+class PolledSource(FakeSource):
+    """Is polled, at a rate that can be set."""
 
+    is_polled = True
     batch_delay_s = 0.0
 
     def __init__(self, rate_hz: float) -> None:
@@ -183,8 +185,8 @@ class AskedSource(FakeSource):
 
 
 @pytest.mark.parametrize("rates_hz", [(100.0, 80.0), (80.0, 100.0)])
-def test_devices_that_are_asked_are_asked_together(ports, rates_hz):
-    sources = tuple(map(AskedSource, rates_hz))
+def test_polled_devices_are_polled_together(ports, rates_hz):
+    sources = tuple(map(PolledSource, rates_hz))
     source = PairSource(find_driver("modbus"), tuple(PairedChannel(one, 0) for one in sources))
     link = open_pair(tuple(map(FakeChoice, ports)), sources)
     source.start(link)

@@ -90,7 +90,6 @@ def test_the_peer_builds_the_same_requests():
         encode_request,
         set_float,
         set_input,
-        set_zero,
         write_rate,
     )
 
@@ -101,7 +100,7 @@ def test_the_peer_builds_the_same_requests():
     assert bytes(library.buildGetValue()) == encode_request(Code.GET_VALUE)
     assert bytes(library.buildWriteDataRate(library.convertFloatToBytes(1234.5))) == write_rate(1234.5)
     assert bytes(library.buildSetTXModeToFloat()) == set_float()
-    assert bytes(library.buildWriteSetZero(2)) == set_zero(2)
+    assert bytes(library.buildWriteSetZero(2)) == encode_request(Code.SET_ZERO, bytes([2]))
     assert bytes(library.buildSetInputTypeGSV8(2, 1)) == set_input(2, InputType.BRIDGE_5_V)
 
 

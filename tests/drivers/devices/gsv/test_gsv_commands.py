@@ -10,7 +10,6 @@ from drivers.devices.gsv.commands import (
     rate_from_response,
     set_float,
     set_input,
-    set_zero,
     text_from_response,
     write_rate,
 )
@@ -28,8 +27,8 @@ from drivers.errors import SettingsError
         (encode_request(Code.FIRMWARE), "aa 90 2b 85"),
         (write_rate(1000.0), "aa 94 8b 44 7a 00 00 85"),
         (set_float(), "aa 93 81 01 00 10 85"),
-        (set_zero(), "aa 91 0c 00 85"),
-        (set_zero(3), "aa 91 0c 03 85"),
+        (encode_request(Code.SET_ZERO, bytes([0])), "aa 91 0c 00 85"),
+        (encode_request(Code.SET_ZERO, bytes([3])), "aa 91 0c 03 85"),
         (set_input(2, InputType.BRIDGE_5_V), "aa 92 a3 02 01 85"),
     ],
 )

@@ -13,7 +13,6 @@ from drivers.devices.gsv.commands import (
     encode_response,
     find_response,
     set_float,
-    set_zero,
     write_rate,
 )
 from drivers.devices.gsv.simulated import SimulatedGsv, find_commands
@@ -87,8 +86,8 @@ def test_answers_in_any_cut_and_after_rubbish(silent, wire):
         (write_rate(0.5), 0x52),
         (encode_request(Code.SET_INPUT, bytes([1, 2])), 0),
         (encode_request(Code.SET_INPUT, bytes([1, 9])), 0x52),
-        (set_zero(2), 0),
-        (set_zero(3), 0x52),
+        (encode_request(Code.SET_ZERO, bytes([2])), 0),
+        (encode_request(Code.SET_ZERO, bytes([3])), 0x52),
         (bytes.fromhex("aa907f85"), 0x40),
     ],
 )
@@ -101,7 +100,7 @@ def test_answers_say_what_was_done(silent, wire, said, error):
 def test_set_zero_takes_the_last_reading_off(silent, wire):
     ask(silent, wire, encode_request(Code.START))
     run_for(silent, 0.02)
-    ask(silent, wire, encode_request(Code.STOP), set_zero(1), now_ns=20_000_000)
+    ask(silent, wire, encode_request(Code.STOP), encode_request(Code.SET_ZERO, bytes([1])), now_ns=20_000_000)
     one = ask(silent, wire, encode_request(Code.GET_VALUE), now_ns=20_000_000)
     (block,) = FrameDecoder(FrameLayout(2), 1000.0).feed(one + one, 0)
     assert block.counts[0, 0] == 0
