@@ -174,17 +174,8 @@ def audit(
         u_s lies outside the range that f_s = f_d from 0.03 to 0.3 gives without tilt. u_s is a continuous
         function of f_d, scanned in steps of 0.0005.
 
-    Parameters
-    ----------
-    table_mass_kg, gravity_m_per_s2 : float
-        m1 and g.
-    pullbacks_m : mapping of str to float
-        u0 of each series code.
-
-    Raises
-    ------
-    AuditError
-        A row describes no motion, or its pullback is not given.
+    `table_mass_kg` is m1, `gravity_m_per_s2` is g, `pullbacks_m` is u0 of each series code. Raises
+    AuditError if a row describes no motion, or its pullback is not given.
     """
     return AuditReport(
         tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows),

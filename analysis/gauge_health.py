@@ -110,10 +110,7 @@ class GaugeHealth:
 def measure_health(gauge: GaugeSamples) -> GaugeHealth:
     """Figures of a gauge from samples taken while the stand rests.
 
-    Raises
-    ------
-    HealthError
-        Under a second, or hardly any sample with a reading.
+    Raises GaugeHealthError for under a second, or hardly any sample with a reading.
     """
     there = np.isfinite(gauge.displacement_m)
     _check(gauge, int(there.sum()))

@@ -51,10 +51,7 @@ _TESTS_MAX = 1000
 class PlannedTest:
     """A planned test, with the stated uncertainties of stand and gauges.
 
-    Raises
-    ------
-    AnalysisError
-        A value is impossible.
+    Raises AnalysisError for impossible values.
     """
 
     parameters: TwoMassParameters

@@ -92,10 +92,7 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
 def reduction_options(test: PlannedTest) -> list[ReductionOption]:
     """Every measure with the value that it takes, or why it does not help; empty where f_d is undetermined.
 
-    Raises
-    ------
-    AnalysisError
-        The test is impossible.
+    Raises AnalysisError for an impossible test.
     """
     now = uncertainty_parts(test)
     if now is None:

@@ -12,6 +12,7 @@ from analysis.arrays import Floats
 from analysis.calibration.points import POLYNOMIAL_DEGREES, CalibrationError, CalibrationPoints
 from analysis.formatting import format_number
 from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
+from messages.i18n import N_
 from messages.message import message
 
 _REACH = 0.5
@@ -87,10 +88,7 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Calibratio
 
     For a straight line this is the method of JCGM 100, H.3.
 
-    Raises
-    ------
-    CalibrationError
-        Too few points, or their counts are alike.
+    Raises CalibrationError for too few points, or counts that are alike.
     """
     if len(counts) < degree + 2:
         raise CalibrationError(
@@ -147,11 +145,12 @@ def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> Ga
     loops = [
         abs(mean - means[step, -1]) for (step, way), mean in means.items() if way == 1 and (step, -1) in means
     ]
+    lowest = residual_m[steps == 0]
     return GaugeCharacteristics(
         max(abs(mean) for mean in means.values()),
         max(loops, default=None),
         _repeatability([cell for _, _, cell in cells]),
-        _zero_drift(residual_m[steps == 0]),
+        float(lowest[0] - lowest[-1]) if len(lowest) > 1 else None,
     )
 
 
@@ -174,11 +173,6 @@ def _repeatability(cells: list[Floats]) -> float | None:
         return None
     squares = sum(float(np.sum((cell - cell.mean()) ** 2)) for cell in repeated)
     return float(np.sqrt(squares / freedom))
-
-
-def _zero_drift(residual_m: Floats) -> float | None:
-    """Of the residuals at the lowest step, in the order in which they were taken."""
-    return float(residual_m[0] - residual_m[-1]) if len(residual_m) > 1 else None
 
 
 _DOUBTFUL: Final = 8.0
@@ -276,30 +270,26 @@ def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: 
     curve = fit_curve(*step_means(points), degree)
     zero = curve.zero_count()
     residual = points.dial_m - curve.polynomial(points.counts)
-    merits = gauge_characteristics(points, residual)
+    characteristics = gauge_characteristics(points, residual)
     gain, bends = _about(curve, zero)
-    ledger = _budget(curve, zero, dial, merits)
+    budget = _budget(curve, zero, dial, characteristics)
     relative, zero_m, whole = (
-        _combined(ledger, name) for name in ("gain_m_per_count", "zero", "displacement")
+        _combined(budget, name) for name in ("gain_m_per_count", "zero", "displacement")
     )
+    freedom = curve.degrees_of_freedom
+    gain_share, zero_share = _share(budget, "gain_m_per_count"), _share(budget, "zero")
     return Calibration(
-        _quantity(
-            gain,
-            abs(gain) * relative,
-            _share(ledger, "gain_m_per_count"),
-            curve.degrees_of_freedom,
-            "m/count",
-        ),
-        _quantity(zero, zero_m / abs(gain), _share(ledger, "zero"), curve.degrees_of_freedom, "count"),
+        _quantity(gain, abs(gain) * relative, gain_share, freedom, "m/count"),
+        _quantity(zero, zero_m / abs(gain), zero_share, freedom, "count"),
         bends,
         zero_m,
         whole,
-        merits,
+        characteristics,
         curve.scatter_m,
         points,
         residual,
-        ledger,
-        tuple(_warnings(points, residual, dial, merits)),
+        budget,
+        tuple(_warnings(points, residual, dial, characteristics)),
     )
 
 
@@ -315,44 +305,50 @@ def _about(curve: CalibrationCurve, zero: float) -> tuple[float, tuple[float, ..
 
 
 def _budget(
-    curve: CalibrationCurve, zero: float, dial: DialGauge, merits: GaugeCharacteristics
+    curve: CalibrationCurve, zero: float, dial: DialGauge, characteristics: GaugeCharacteristics
 ) -> tuple[BudgetLine, ...]:
     """Each source's standard uncertainty of gain (relative), zero and displacement (m)."""
     # Few steps may lie on a line by chance; the resolution of the dial is the lower limit.
     scatter_m = max(curve.scatter_m, dial.reading_uncertainty_m)
     span_m = float(abs(np.diff(curve.polynomial(curve.ends))[0]))
     certificate_m = math.nan if dial.standard_uncertainty_m is None else dial.standard_uncertainty_m
-    drift_m = abs(merits.zero_drift_m or 0.0) / _SQRT12
+    drift_m = abs(characteristics.zero_drift_m or 0.0) / _SQRT12
     at = np.linspace(curve.ends[0], curve.ends[1], 21)
-    return (
-        BudgetLine(
-            BudgetSource.READINGS, "gain_m_per_count", scatter_m * curve.chord_standard_uncertainty() / span_m
-        ),
-        BudgetLine(BudgetSource.DIAL_GAUGE, "gain_m_per_count", math.sqrt(2.0) * certificate_m / span_m),
-        BudgetLine(
-            BudgetSource.READINGS, "zero", scatter_m * float(curve.standard_uncertainty(np.array([zero]))[0])
-        ),
-        BudgetLine(BudgetSource.DIAL_GAUGE, "zero", certificate_m),
-        BudgetLine(BudgetSource.ZERO_DRIFT, "zero", drift_m),
-        BudgetLine(
-            BudgetSource.READINGS, "displacement", scatter_m * float(curve.standard_uncertainty(at).max())
-        ),
-        BudgetLine(BudgetSource.DIAL_GAUGE, "displacement", certificate_m),
-        BudgetLine(BudgetSource.ZERO_DRIFT, "displacement", drift_m),
-        BudgetLine(BudgetSource.NONLINEARITY, "displacement", merits.nonlinearity_m / math.sqrt(3.0)),
-        BudgetLine(BudgetSource.REPEATABILITY, "displacement", merits.repeatability_m or 0.0),
+    at_zero = float(curve.standard_uncertainty(np.array([zero]))[0])
+    contributions = {
+        "gain_m_per_count": {
+            BudgetSource.READINGS: scatter_m * curve.chord_standard_uncertainty() / span_m,
+            BudgetSource.DIAL_GAUGE: math.sqrt(2.0) * certificate_m / span_m,
+        },
+        "zero": {
+            BudgetSource.READINGS: scatter_m * at_zero,
+            BudgetSource.DIAL_GAUGE: certificate_m,
+            BudgetSource.ZERO_DRIFT: drift_m,
+        },
+        "displacement": {
+            BudgetSource.READINGS: scatter_m * float(curve.standard_uncertainty(at).max()),
+            BudgetSource.DIAL_GAUGE: certificate_m,
+            BudgetSource.ZERO_DRIFT: drift_m,
+            BudgetSource.NONLINEARITY: characteristics.nonlinearity_m / math.sqrt(3.0),
+            BudgetSource.REPEATABILITY: characteristics.repeatability_m or 0.0,
+        },
+    }
+    return tuple(
+        BudgetLine(source, name, uncertainty)
+        for name, shares in contributions.items()
+        for source, uncertainty in shares.items()
     )
 
 
-def _combined(ledger: tuple[BudgetLine, ...], name: str) -> float:
-    lines = [line.standard_uncertainty for line in ledger if line.contribution_to == name]
+def _combined(budget: tuple[BudgetLine, ...], name: str) -> float:
+    lines = [line.standard_uncertainty for line in budget if line.contribution_to == name]
     return math.sqrt(sum(value * value for value in lines if not math.isnan(value)))
 
 
-def _share(ledger: tuple[BudgetLine, ...], name: str) -> float:
+def _share(budget: tuple[BudgetLine, ...], name: str) -> float:
     """Share of the readings, which have few degrees of freedom, in a standard uncertainty."""
-    whole = _combined(ledger, name)
-    readings = _combined(tuple(line for line in ledger if line.source is BudgetSource.READINGS), name)
+    whole = _combined(budget, name)
+    readings = _combined(tuple(line for line in budget if line.source is BudgetSource.READINGS), name)
     return readings / whole if whole else 0.0
 
 
@@ -364,10 +360,10 @@ def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit
 
 
 def _warnings(
-    readings: CalibrationPoints, residual_m: Floats, dial: DialGauge, merits: GaugeCharacteristics
+    readings: CalibrationPoints, residual_m: Floats, dial: DialGauge, characteristics: GaugeCharacteristics
 ) -> list[ResultWarning]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
-    cautions = [
+    warnings = [
         ResultWarning(
             "reading-doubtful",
             message(
@@ -380,19 +376,14 @@ def _warnings(
         )
         for place in np.flatnonzero(np.abs(residual_m) > _DOUBTFUL * usual_m)
     ]
-    if dial.standard_uncertainty_m is None:
-        cautions.append(
-            ResultWarning(
-                "dial-uncertainty-not-stated",
-                message("the dial gauge's own uncertainty is not stated and not counted."),
-            )
-        )
-    if merits.hysteresis_m is None:
-        cautions.append(
-            ResultWarning("one-way-only", message("hysteresis cannot be told without readings up and down."))
-        )
-    if merits.repeatability_m is None:
-        cautions.append(
-            ResultWarning("one-round-only", message("repeatability cannot be told from one round."))
-        )
-    return cautions
+    missing = (
+        (dial.standard_uncertainty_m, "dial-uncertainty-not-stated", _DIAL_NOT_STATED),
+        (characteristics.hysteresis_m, "one-way-only", _ONE_WAY_ONLY),
+        (characteristics.repeatability_m, "one-round-only", _ONE_ROUND_ONLY),
+    )
+    return warnings + [ResultWarning(code, message(text)) for value, code, text in missing if value is None]
+
+
+_DIAL_NOT_STATED = N_("the dial gauge's own uncertainty is not stated and not counted.")
+_ONE_WAY_ONLY = N_("hysteresis cannot be determined without readings up and down.")
+_ONE_ROUND_ONLY = N_("repeatability cannot be determined from one round.")

@@ -6,6 +6,7 @@ from typing import Final
 
 from analysis.calibration.points import CalibrationError
 from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
+from messages.i18n import N_
 from messages.message import message
 
 COVERAGE: Final = 2.0
@@ -105,12 +106,8 @@ def check_displacement(
 ) -> DisplacementCheck:
     """Compare the difference of two readings with a known displacement.
 
-    Zero and rest position cancel: only the gain is checked.
-
-    Raises
-    ------
-    CalibrationError
-        Readings that are not finite, or of too few samples.
+    Zero and rest position cancel: only the gain is checked. Raises CalibrationError for readings that are not
+    finite, or of too few samples.
     """
     for reading in (rest, moved):
         if not math.isfinite(reading.displacement_m) or reading.samples < 2:
@@ -155,35 +152,23 @@ def _budget(
 def _warnings(
     reference: ReferenceDisplacement, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
 ) -> list[ResultWarning]:
-    cautions = [
-        ResultWarning(
-            "not-stated",
-            message(
-                "the uncertainty of the {source} is not stated and not counted.", source=line.source.label
-            ),
-        )
+    template = N_("the uncertainty of the {source} is not stated and not counted.")
+    warnings = [
+        ResultWarning("not-stated", message(template, source=line.source.label))
         for line in budget
         if math.isnan(line.standard_uncertainty)
     ]
     share = COVERAGE * combined_m / abs(reference.displacement_m)
     if share > _BLUNT:
-        cautions.append(
-            ResultWarning(
-                "check-blunt",
-                message(
-                    "an error of {share:.0%} would pass. Take a larger displacement, or a surer one.",
-                    share=share,
-                ),
-            )
+        text = message(
+            "an error of {share:.0%} would pass. Take a larger displacement, or a more certain one.",
+            share=share,
         )
+        warnings.append(ResultWarning("check-blunt", text))
     if measured_m * reference.displacement_m < 0.0:
-        cautions.append(
-            ResultWarning(
-                "other-way",
-                message(
-                    "the gauge shows a displacement to the other side. Check its direction, its plugs"
-                    " and the sign that was given."
-                ),
-            )
+        text = message(
+            "the gauge shows a displacement to the other side. Check its direction, its plugs"
+            " and the sign that was given."
         )
-    return cautions
+        warnings.append(ResultWarning("other-way", text))
+    return warnings

@@ -49,11 +49,8 @@ class CalibrationPoints:
     ) -> Self:
         """Build checked points from readings (n,); direction and round follow from the dial if not given.
 
-        Raises
-        ------
-        CalibrationError
-            Unequal lengths, values that are not finite, dial readings against their direction, or counts
-            that do not follow the dial.
+        Raises CalibrationError for unequal lengths, values that are not finite, dial readings against their
+        direction, and counts that do not follow the dial.
         """
         counts_seen = np.asarray(counts, dtype=np.float64)
         dial = np.asarray(dial_m, dtype=np.float64)

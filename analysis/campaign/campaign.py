@@ -110,21 +110,15 @@ class PublishedComparison:
 
 def compare_with_published(row: SeriesRow, printed: PublishedRow) -> tuple[PublishedComparison, ...]:
     """Compare a row with the published one, in the order of the columns."""
-    return tuple(
-        _compare(
-            row, quantity.name, getattr(printed, column.published) * _UNITS_PRINTED.get(quantity.name, 1.0)
-        )
-        for quantity, column in table_columns()
-        if column.published and quantity.name in row.quantities
-    )
-
-
-def _compare(row: SeriesRow, name: str, printed: float) -> PublishedComparison:
-    quantity = row.quantities[name].quantity
-    difference, deviation = quantity.value - printed, quantity.standard_uncertainty
-    return PublishedComparison(
-        name, quantity.value, printed, difference, difference / deviation if deviation else None
-    )
+    compared = []
+    for name, attribute in ((each.name, column.published) for each, column in table_columns()):
+        if attribute and name in row.quantities:
+            quantity = row.quantities[name].quantity
+            published = getattr(printed, attribute) * _UNITS_PRINTED.get(name, 1.0)
+            difference, deviation = quantity.value - published, quantity.standard_uncertainty
+            normalised = difference / deviation if deviation else None
+            compared.append(PublishedComparison(name, quantity.value, published, difference, normalised))
+    return tuple(compared)
 
 
 def compare_all_with_published(

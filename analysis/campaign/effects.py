@@ -29,7 +29,7 @@ from messages.message import Message, joined, message
 
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
-_TOLD: Final = 3
+_NAMED: Final = 3
 """Sizes of an effect that its sentence names."""
 _LARGEST: Final = 700.0
 """Difference of logarithms above which a ratio overflows."""
@@ -106,13 +106,8 @@ def find_effects(rows: Sequence[SeriesRow]) -> Effects:
     """
     taken = [row for row in rows if is_usable(row)]
     if not taken:
-        return Effects(
-            tuple(
-                _undetermined(cause, message("no series has f_d, v_max and a pullback")) for cause in Cause
-            ),
-            None,
-            0,
-        )
+        reason = message("no series has f_d, v_max and a pullback")
+        return Effects(tuple(_undetermined(cause, reason) for cause in Cause), None, 0)
     laid = build_design(taken)
     fitted = fit_linear_model(laid.matrix, observations(taken))
     effects = tuple(_effect(cause, laid, fitted) for cause in Cause)
@@ -128,17 +123,13 @@ def _effect(cause: Cause, laid: DesignMatrix, fitted: LinearFit | None) -> Effec
     tested = f_test(fitted, question.combinations, question.patterns)
     sizes = tuple(EffectSize(step, _change_quantity(fitted, weights)) for step, weights in question.steps)
     found, seen = tested.p_value < LEVEL, _relative_change(tested.detectable_size)
+    named: Sequence[EffectSize] = sizes[:1]
+    if found:
+        significance = [abs(size.change.value) / size.change.standard_uncertainty for size in sizes]
+        named = [sizes[place] for place in np.argsort(-np.array(significance), kind="stable")[:_NAMED]]
+    sentence = _sentence(cause, found, tested.p_value, named, sizes[0], seen)
     return Effect(
-        cause,
-        found,
-        _sentence(
-            cause, found, tested.p_value, _most_significant(sizes) if found else sizes[:1], sizes[0], seen
-        ),
-        tested.statistic,
-        tested.p_value,
-        tested.degrees_of_freedom,
-        sizes,
-        seen,
+        cause, found, sentence, tested.statistic, tested.p_value, tested.degrees_of_freedom, sizes, seen
     )
 
 
@@ -163,19 +154,13 @@ def _relative_change(difference: float) -> float:
     return math.expm1(difference) if difference < _LARGEST else math.inf
 
 
-def _most_significant(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
-    """The most significant sizes, in descending order."""
-    far = sorted(sizes, key=lambda size: -abs(size.change.value) / size.change.standard_uncertainty)
-    return far[:_TOLD]
-
-
 def _sentence(
-    cause: Cause, found: bool, p_value: float, told: Sequence[EffectSize], first: EffectSize, seen: float
+    cause: Cause, found: bool, p_value: float, named: Sequence[EffectSize], first: EffectSize, seen: float
 ) -> Message:
     chance = "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
-    numbers = joined([*map(_size, told), chance], "; ")
+    numbers = joined([*map(_size, named), chance], "; ")
     power = message("{change:.2g} %", change=100.0 * seen)
-    if len(told) > 1:
+    if len(named) > 1:
         power = joined([power, first.step])
     would = (
         message("A change of {power} would be found with a chance of 80 %", power=power)
@@ -194,30 +179,21 @@ def _sentence(
 
 
 def _size(size: EffectSize) -> Message:
-    value, low, high = _percents(size.change)
-    return message(
-        "{value} % {step} (95 %: {low} % to {high} %)", value=value, step=size.step, low=low, high=high
-    )
-
-
-def _percents(change: Quantity) -> tuple[str, str, str]:
-    """Value and ends of the interval in percent, to two digits of its half width."""
-    low, high = change.interval_95
+    """Value and interval in percent, to two digits of its half width."""
+    low, high = size.change.interval_95
     half = 50.0 * (high - low)
     decimals = max(0, uncertainty_decimals(half)) if 0.0 < half < math.inf else 0
-    value, least, most = (format_signed(100.0 * share, decimals) for share in (change.value, low, high))
-    return value, least, most
+    shares = {"value": size.change.value, "low": low, "high": high}
+    percents = {name: format_signed(100.0 * share, decimals) for name, share in shares.items()}
+    return message("{value} % {step} (95 %: {low} % to {high} %)", step=size.step, **percents)
 
 
 def _mass(laid: DesignMatrix) -> _Hypothesis | Message:
     if laid.mass is None:
         return message("it is the same in all series of a contact and pullback. Add tests with other masses")
     weights = laid.form(mass=_MASS_STEP_KG)
-    return _Hypothesis(
-        weights[None],
-        np.ones((1, 1)),
-        ((message("per {step_kg:g} kg more", step_kg=_MASS_STEP_KG), weights),),
-    )
+    step = message("per {step_kg:g} kg more", step_kg=_MASS_STEP_KG)
+    return _Hypothesis(weights[None], np.ones((1, 1)), ((step, weights),))
 
 
 def _velocity(laid: DesignMatrix) -> _Hypothesis | Message:

@@ -63,16 +63,8 @@ def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | 
     The values scatter about the model beyond their uncertainties, with the variance, 0 or above, at which
     chi-square equals its degrees of freedom (Mandel and Paule). Tests have the degrees of freedom of that
     scatter, or those of the repeats where there are none.
-
-    Parameters
-    ----------
-    design : (n, p) float64
-        Of full rank.
-
-    Returns
-    -------
-    Fitted or None
-        None without residual degrees of freedom: no repeats, and as many coefficients as values.
+    `design` (n, p) has full rank. None without residual degrees of freedom: no repeats, and as many
+    coefficients as values.
     """
     left = len(observations.values) - design.shape[1]
     if left + observations.degrees_of_freedom == 0:
@@ -105,16 +97,15 @@ def f_test(fitted: LinearFit, combinations: Floats, patterns: Floats) -> FTest:
 def estimate_linear_form(fitted: LinearFit, weights: Floats) -> tuple[float, float, float]:
     """Linear form of the coefficients: value, standard uncertainty, and half of the 95 % interval."""
     deviation = float(np.sqrt(weights @ fitted.covariance @ weights))
-    return (
-        float(weights @ fitted.coefficients),
-        deviation,
-        float(stdtrit(fitted.degrees_of_freedom, 0.975)) * deviation,
-    )
+    half = float(stdtrit(fitted.degrees_of_freedom, 0.975)) * deviation
+    return float(weights @ fitted.coefficients), deviation, half
 
 
 def _beyond(design: Floats, measured: Observations, left: int) -> float:
     def excess(beyond: float) -> float:
-        return _chi_square(design, measured, beyond) - left
+        weighted, values = _whitened(design, measured, beyond)
+        coefficients = np.linalg.lstsq(weighted, values, rcond=None)[0]
+        return float(np.sum((values - weighted @ coefficients) ** 2)) - left
 
     if excess(0.0) <= 0.0:
         return 0.0
@@ -122,13 +113,6 @@ def _beyond(design: Floats, measured: Observations, left: int) -> float:
     while excess(far) > 0.0:
         far *= 2.0
     return float(brentq(excess, 0.0, far, xtol=1e-12 * far))
-
-
-def _chi_square(design: Floats, measured: Observations, beyond: float) -> float:
-    """Of the residuals of the best fit."""
-    weighted, values = _whitened(design, measured, beyond)
-    coefficients = np.linalg.lstsq(weighted, values, rcond=None)[0]
-    return float(np.sum((values - weighted @ coefficients) ** 2))
 
 
 def _whitened(design: Floats, measured: Observations, beyond: float) -> tuple[Floats, Floats]:
@@ -240,12 +224,8 @@ def observations(rows: Sequence[SeriesRow]) -> Observations:
     own = np.array([one.repeatable for one in pooled]) / values
     keys = sorted({key for one in pooled for key in one.common}, key=str)
     shared = np.array([[one.common.get(key, 0.0) for key in keys] for one in pooled]) / values[:, None]
-    return Observations(np.log(values), own**2, shared @ shared.T, _degrees(rows))
-
-
-def _degrees(rows: Sequence[SeriesRow]) -> int:
-    """Of the repeats of all rows, each scatter counted once."""
-    return sum(row.quantities[FRICTION].runs - 1 for row in rows)
+    repeats = sum(one.runs - 1 for one in pooled)
+    return Observations(np.log(values), own**2, shared @ shared.T, repeats)
 
 
 def _column(columns: list[Floats], values: Floats) -> int | None:

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from scipy.special import chdtrc
 
-from analysis.campaign.pooling import PooledQuantity, RunValue, is_fully_stated, pool, run_value
+from analysis.campaign.pooling import PooledQuantity, is_fully_stated, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
 from analysis.catalogue import QuantityDefinition, TableColumn, definition, table_columns
 from analysis.quantities import Quantity, ResultWarning
@@ -60,14 +60,14 @@ def _pooled_columns() -> Iterator[tuple[QuantityDefinition, TableColumn]]:
 def _pooled(
     series: Sequence[Series], row: QuantityDefinition, column: TableColumn
 ) -> dict[str, PooledQuantity]:
-    found = [(each, some) for each in series if (some := _run_values(each, row.name))]
+    found = []
+    for each in series:
+        some = [one for run in each.runs if (one := run_value(run, row.name)) is not None]
+        if some:
+            found.append((each, some))
     kinds = ["" if column.is_of_stand else each.key.contact for each, _ in found]
     pooled = pool([some for _, some in found], proportional=column.is_proportional, kinds=kinds)
     return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
-
-
-def _run_values(series: Series, name: str) -> list[RunValue]:
-    return [one for one in (run_value(run, name) for run in series.runs) if one is not None]
 
 
 def _row(series: Series, quantities: dict[str, PooledQuantity]) -> SeriesRow:
@@ -101,19 +101,13 @@ def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> list[Res
     friction = quantities.get(_FRICTION)
     found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
     if friction is None:
-        found.append(
-            ResultWarning("no-friction", message("{label}: no run determined f_d.", label=series.label))
-        )
+        text = message("{label}: no run determined f_d.", label=series.label)
+        found.append(ResultWarning("no-friction", text))
     elif friction.runs == 1:
-        found.append(
-            ResultWarning(
-                "single-run",
-                message(
-                    "{label}: one run alone determined f_d. Repeat the test twice at least",
-                    label=series.label,
-                ),
-            )
+        text = message(
+            "{label}: one run alone determined f_d. Repeat the test twice at least", label=series.label
         )
+        found.append(ResultWarning("single-run", text))
     if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
         text = message(
             "{label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate",
@@ -131,15 +125,13 @@ def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWa
     if not by_run:
         return None
     said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
-    return ResultWarning(
-        "outlying-run",
-        message(
-            "{label}: far from the other runs: {said}. All runs count; look at these, and leave"
-            " out with --exclude what there is a reason for",
-            label=series.label,
-            said=said,
-        ),
+    text = message(
+        "{label}: far from the other runs: {said}. All runs count; look at these, and leave"
+        " out with --exclude what there is a reason for",
+        label=series.label,
+        said=said,
     )
+    return ResultWarning("outlying-run", text)
 
 
 def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
@@ -152,15 +144,13 @@ def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> Resul
     ]
     if not found:
         return None
-    return ResultWarning(
-        "runs-differ",
-        message(
-            "{series}: runs differ by more than their noise explains in {quantities}. The uncertainties"
-            " include these differences",
-            series=series.label,
-            quantities=found,
-        ),
+    text = message(
+        "{series}: runs differ by more than their noise explains in {quantities}. The uncertainties"
+        " include these differences",
+        series=series.label,
+        quantities=found,
     )
+    return ResultWarning("runs-differ", text)
 
 
 def _inadequate(series: Series) -> ResultWarning | None:

@@ -108,11 +108,12 @@ def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter
         for repeats, between, counts in zip(kinds, betweens, degrees, strict=True)
     ]
     logs = [_logs(some, counts) for some, counts in zip(squares, degrees, strict=True)]
+    means = [float(some.mean()) if len(some) else 0.0 for some in logs]
     lent = _lent(logs, [counts[counts > 0.0] for counts in degrees])
     known = sum(max(0, len(some) - 1) for some in logs)
     return [
         _moderated(between, some, counts, mean, lent, known)
-        for between, some, counts, mean in zip(betweens, squares, degrees, map(_mean, logs), strict=True)
+        for between, some, counts, mean in zip(betweens, squares, degrees, means, strict=True)
     ]
 
 
@@ -123,10 +124,6 @@ def _logs(squares: Floats, degrees: Floats) -> Floats:
         return np.zeros(0)
     least = max(_LEAST * float(np.median(some)), 1e-300)
     return np.asarray(np.log(np.maximum(some, least)) - digamma(halves) + np.log(halves), dtype=np.float64)
-
-
-def _mean(logs: Floats) -> float:
-    return float(logs.mean()) if len(logs) else 0.0
 
 
 def _lent(logs: Sequence[Floats], degrees: Sequence[Floats]) -> float:
@@ -214,15 +211,13 @@ def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], pla
         return 1.0
     weights = repeats.weights(scatter.between)
     mean = float(np.average(repeats.values[mates], weights=weights[mates]))
-    spread = max(scatter.factor, _stated_fraction(repeats, weights, place))
+    stated = float(
+        repeats.variances[place] * weights[place]
+    )  # the runs scatter by their own variances at least
+    spread = max(scatter.factor, stated)
     deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
     distance = abs(float(repeats.values[place]) - mean) / deviation
     return 2.0 * float(stdtr(scatter.degrees_of_freedom, -distance))
-
-
-def _stated_fraction(repeats: RepeatedValues, weights: Floats, place: int) -> float:
-    """Stated variance of a run over that of its weight: a lower bound of the scatter factor."""
-    return float(repeats.variances[place] * weights[place])
 
 
 def _distances(repeats: RepeatedValues) -> Floats:

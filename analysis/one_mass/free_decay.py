@@ -168,10 +168,8 @@ class FreeDecayFit:
 def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     """Find and fit the free decay in `readings`, which are derivative `order` of the displacement, in `unit`.
 
-    Raises
-    ------
-    RecordError
-        Nothing swings, the swing does not die away, lasts under two periods, or is no single free decay.
+    Raises RecordError if nothing swings, or the swing does not die away, lasts under two periods, or is no
+    single free decay.
     """
     warnings: list[ResultWarning] = []
     readings = _without_single_spikes(readings, warnings)
@@ -286,7 +284,11 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> 
             " Pull further, or choose a finer range."
         )
     if not verdict.adequate and explained < _EXPLAINED_MIN:
-        raise _no_single_decay(explained)
+        raise RecordError(
+            "no single free decay fits the readings, the best explains {explained:.0f} % of the"
+            " motion. Take one swing from release to rest, of one mode.",
+            explained=100.0 * explained,
+        )
     loss, uncertainty = _loss(found)
     if not loss > max(_SIGMAS * uncertainty, _LOSS_MIN):
         raise RecordError(
@@ -296,14 +298,6 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> 
             change=-100.0 * loss,
             uncertainty=100.0 * uncertainty,
         )
-
-
-def _no_single_decay(explained: float) -> RecordError:
-    return RecordError(
-        "no single free decay fits the readings, the best explains {explained:.0f} % of the"
-        " motion. Take one swing from release to rest, of one mode.",
-        explained=100.0 * explained,
-    )
 
 
 def _loss(found: OneMassFit) -> tuple[float, float]:

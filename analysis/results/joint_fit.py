@@ -13,7 +13,7 @@ from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.plausibility import check_friction
-from analysis.quantities import BudgetSource, Source
+from analysis.quantities import BudgetSource
 from analysis.record import Record
 from analysis.results.verdict import assess_model, identifiable_fits
 from analysis.uncertainty import ParameterUncertainty, levelling_shift, propagate_with_model_choice
@@ -27,6 +27,10 @@ _TIME_POWERS = {
 }
 """How a parameter scales when all times are stretched."""
 _GRAVITY_POWERS = {Parameter.FRICTION_DYNAMIC: -1.0, Parameter.FRICTION_STATIC: -1.0, Parameter.TILT: -1.0}
+_SLOPE_SOURCES = (
+    (BudgetSource.GAUGE_1_GAIN, BudgetSource.GAUGE_1_NONLINEARITY),
+    (BudgetSource.GAUGE_2_GAIN, BudgetSource.GAUGE_2_NONLINEARITY),
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,10 +61,7 @@ class JointFit:
 def choose_law(record: Record, decay: FreeDecay, problem: FitProblem, fits: list[Fit]) -> JointFit:
     """Choose the likeliest of the fitted laws and propagate its uncertainty.
 
-    Raises
-    ------
-    RecordError
-        The record identifies no law, or f_d exceeds that of any dry plates.
+    Raises RecordError if the record identifies no law, or f_d exceeds that of any dry plates.
     """
     candidates = identifiable_fits(fits)
     chosen = min(candidates, key=lambda fit: fit.bic)
@@ -84,21 +85,17 @@ def add_systematic_uncertainty(
 ) -> ParameterUncertainty:
     """The fit's `own` distribution with what the fit does not know of: time base, gravity, levelling."""
     columns = dict(own.shifts)
-    _split(
-        columns,
-        BudgetSource.GAUGE_1_GAIN,
-        BudgetSource.GAUGE_1_NONLINEARITY,
-        nonlinearity_slope_error(record.table_gauge, range_m(problem.table.value_m)),
-        record.table_gauge.gain_relative or 0.0,
-    )
-    if problem.relative is not None:
-        _split(
-            columns,
-            BudgetSource.GAUGE_2_GAIN,
-            BudgetSource.GAUGE_2_NONLINEARITY,
-            nonlinearity_slope_error(record.relative_gauge, range_m(problem.relative.value_m)),
-            record.relative_gauge.gain_relative or 0.0,
-        )
+    gauges = ((record.table_gauge, problem.table), (record.relative_gauge, problem.relative))
+    for (gain_source, nonlinearity_source), (gauge, channel) in zip(_SLOPE_SOURCES, gauges, strict=True):
+        column = columns.pop(gain_source, None)  # of the slope: divided between gain and non-linearity
+        if column is None or channel is None:
+            continue
+        gain = gauge.gain_relative or 0.0
+        nonlinearity = nonlinearity_slope_error(gauge, range_m(channel.value_m))
+        total = float(np.hypot(nonlinearity, gain))
+        if total > 0.0:
+            columns[gain_source] = column * gain / total
+            columns[nonlinearity_source] = column * nonlinearity / total
     columns[BudgetSource.TIME_BASE] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
     gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
     columns[BudgetSource.GRAVITY] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
@@ -106,21 +103,6 @@ def add_systematic_uncertainty(
     if tilt is not None:
         columns[BudgetSource.LEVELLING] = tilt
     return ParameterUncertainty(columns, own.noise_covariance)
-
-
-def _split(
-    columns: dict[Source, Floats],
-    gain_source: BudgetSource,
-    nonlinearity_source: BudgetSource,
-    nonlinearity: float,
-    gain: float,
-) -> None:
-    """Divide the column of a gauge's slope between its gain and its non-linearity."""
-    column = columns.pop(gain_source, None)
-    total = float(np.hypot(nonlinearity, gain))
-    if column is not None and total > 0.0:
-        columns[gain_source] = column * gain / total
-        columns[nonlinearity_source] = column * nonlinearity / total
 
 
 def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:

@@ -19,7 +19,7 @@ from analysis.laws.catalogue import COMPARED_LAWS, WIDEST_LAW
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import ResultWarning
-from analysis.record import Record, RecordError, StandMasses
+from analysis.record import Record, RecordError
 from analysis.results.joint_fit import JointFit
 from messages.message import message
 
@@ -33,7 +33,7 @@ _TOLERANCE = 1e-2
 _LOOSE = 0.5
 """Relative standard deviation with which the table mass is free."""
 _SHARE = 0.01
-"""A table mass that differs by less is not worth a word."""
+"""A relative difference of the table mass below this gets no warning."""
 _SIGMAS = 5.0
 """A table mass is contradicted by a difference of so many standard uncertainties."""
 _BETTER = 0.1
@@ -57,11 +57,7 @@ def mass_warnings(joint: JointFit) -> list[ResultWarning]:
     found = best.value(Parameter.TABLE_MASS)
     if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
         return []
-    return [_contradiction(given, record.masses.plate_mass_kg, found)]
-
-
-def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
-    """Warning with the table mass that explains the motion, and whether both masses look swapped."""
+    plate = record.masses.plate_mass_kg
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     text = message(
         "a table of {found} kg under the plate of {plate} kg would explain this motion, one of {given} kg"
@@ -71,7 +67,7 @@ def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
         given=format_number(given, 4),
         swapped=message(", they look swapped") if swapped else "",
     )
-    return ResultWarning("masses-contradict-motion", text)
+    return [ResultWarning("masses-contradict-motion", text)]
 
 
 def _loosened(problem: FitProblem, fit: Fit) -> Fit:
@@ -100,17 +96,14 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
         window = search.window(end_s)
         return fit_at_minimum(window, WIDEST_LAW, window.minimise(point, WIDEST_LAW)).chi_square
 
-    logarithms = np.log(_factors(record.masses))
+    # As far as the table mass at which both masses would be swapped.
+    most = max(_MOST, _STEP * (record.masses.plate_mass_kg / record.masses.table_mass_kg) ** 2)
+    count = 1 + round(np.log(most / _LEAST) / np.log(_STEP))
+    logarithms = np.log(np.geomspace(_LEAST, most, count))
     at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
     bounds = float(logarithms[at - 1]), float(logarithms[at + 1])
     found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": _TOLERANCE})
     return float(np.exp(found.x))
-
-
-def _factors(masses: StandMasses) -> Floats:
-    """Table masses to try over the one given, as far as that at which both would be swapped."""
-    most = max(_MOST, _STEP * (masses.plate_mass_kg / masses.table_mass_kg) ** 2)
-    return np.geomspace(_LEAST, most, 1 + round(np.log(most / _LEAST) / np.log(_STEP)))
 
 
 def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[Floats]]:

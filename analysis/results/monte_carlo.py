@@ -101,41 +101,26 @@ def run_monte_carlo(
 ) -> MonteCarlo:
     """Draw, refit, and compare with the `results` of the budget.
 
-    Parameters
-    ----------
-    refits : int
-        Full fits; 0 for none.
-    progress : callable, optional
-        Called with the number of refits done.
+    `refits` is the number of full fits; `progress` is called with the number done.
     """
-    units = {name: results[name].unit for name in (*_PARAMETERS, *_CONSTANTS) if name in results}
-    columns = {name: _column(name) for name in units}
+    constants = {name: PARAMETER_COUNT + place for place, name in enumerate(_CONSTANTS)}
+    columns = {name: int(place) for name, place in (_PARAMETERS | constants).items() if name in results}
     linear = drawing.linear(np.random.default_rng(seed), LINEAR_DRAWS)
     full = _refits(drawing, refits, seed, progress)
 
     def summarise(draws: Floats) -> dict[str, Quantity]:
-        return {
-            name: _quantity(_sign(results[name], drawing.values[at]) * draws[:, at], units[name])
-            for name, at in columns.items()
-        }
+        summary = {}
+        for name, at in columns.items():
+            # Results have the sign of the gauge; the fit has a positive pullback.
+            side = 1.0 if results[name].value * drawing.values[at] >= 0.0 else -1.0
+            summary[name] = _quantity(side * draws[:, at], results[name].unit)
+        return summary
 
     drawn, refitted = summarise(linear), summarise(full) if len(full) > 1 else {}
     compared, count = (refitted, len(full)) if refitted else (drawn, LINEAR_DRAWS)
     tolerances = {name: _tolerance(results[name], quantity, count) for name, quantity in compared.items()}
     agrees = {name: _distance(results[name], compared[name]) <= tolerances[name] for name in compared}
     return MonteCarlo(LINEAR_DRAWS, len(full), drawn, refitted, agrees, tolerances)
-
-
-def _column(name: str) -> int:
-    """Where a quantity stands among the drawn values."""
-    if name in _PARAMETERS:
-        return int(_PARAMETERS[name])
-    return PARAMETER_COUNT + _CONSTANTS.index(name)
-
-
-def _sign(result: Quantity, fitted: float) -> float:
-    """Pullback and tilt are candidates with the sign of the gauge, and fitted with a positive pullback."""
-    return 1.0 if result.value * fitted >= 0.0 else -1.0
 
 
 def _drawn(point: Floats, known: ParameterUncertainty, rng: np.random.Generator, draws: int) -> Floats:

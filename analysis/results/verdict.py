@@ -26,10 +26,7 @@ _NEGLIGIBLE = 0.25
 def identifiable_fits(fits: list[Fit]) -> list[Fit]:
     """Fits of those laws whose tilt, if they have one, the record tells from f_d.
 
-    Raises
-    ------
-    RecordError
-        There is none.
+    Raises RecordError if there is none.
     """
     candidates = [fit for fit in fits if not fit.law.has_tilt or fit.determines(Parameter.TILT)]
     if not candidates:
@@ -46,10 +43,7 @@ def assess_model(
 ) -> ModelSelection:
     """Judge the chosen law by size and colour of its residuals.
 
-    Parameters
-    ----------
-    noise_readings : (int, int)
-        Number of readings from which the noise of each gauge was measured.
+    `noise_readings` is the number of readings from which the noise of each gauge was measured.
     """
     adequate = True
     residuals = (chosen.table_residual_m, chosen.relative_residual_m)
@@ -142,10 +136,7 @@ def _white(residual: Floats, time_s: Floats, period_s: float) -> bool:
     used = counts > 0
     square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
     scatter = float(np.sum(sums[used] ** 2 / counts[used])) / square
-    return scatter <= _chi_square_limit(int(used.sum()))
-
-
-def _chi_square_limit(freedom: int) -> float:
-    """Value that chi-square of so many degrees of freedom stays below in 99.95 % (Wilson and Hilferty)."""
+    # Chi-square stays below this limit in 99.95 % (Wilson and Hilferty).
+    freedom = int(used.sum())
     small = 2.0 / (9.0 * freedom)
-    return float(freedom * (1.0 - small + _BAND * np.sqrt(small)) ** 3)
+    return scatter <= float(freedom * (1.0 - small + _BAND * np.sqrt(small)) ** 3)
