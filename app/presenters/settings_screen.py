@@ -11,11 +11,7 @@ from config.schema import ConfigError, Settings
 from messages.i18n import N_, gettext
 from messages.message import message_of
 
-THEMES = {
-    "system": N_("As the system"),
-    "light": N_("Light"),
-    "dark": N_("Dark"),
-}
+THEMES = {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")}
 LANGUAGES = {"system": N_("As the system"), "en": "English", "ru": "Русский"}
 LOG_LEVELS = {
     "error": N_("Errors only"),

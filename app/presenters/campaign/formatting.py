@@ -38,11 +38,7 @@ _MARKS = (
     ("single-run", Tone.PLAIN, N_("one run")),
 )
 """Warnings of a series in order of importance, and their labels in the table."""
-_VERDICTS = {
-    True: N_("found"),
-    False: N_("none found"),
-    None: N_("cannot be told"),
-}
+_VERDICTS = {True: N_("found"), False: N_("none found"), None: N_("cannot be told")}
 
 
 def column_titles() -> tuple[tuple[str, str], ...]:

@@ -161,11 +161,7 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> Classi
     decimals = len(row.value.partition(".")[2])
     classical = number_text.format_fixed(value * shown.unit_at(Place.WINDOW).scale, decimals)
     return ClassicalRow(
-        row.symbol,
-        row.name,
-        with_unit(classical, row.unit),
-        with_unit(row.value, row.unit),
-        hint,
+        row.symbol, row.name, with_unit(classical, row.unit), with_unit(row.value, row.unit), hint
     )
 
 

@@ -38,11 +38,7 @@ from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
-_DEGREES = (
-    N_("line"),
-    N_("polynomial of degree 2"),
-    N_("polynomial of degree 3"),
-)
+_DEGREES = (N_("line"), N_("polynomial of degree 2"), N_("polynomial of degree 3"))
 _HOW = N_(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
 )

@@ -21,11 +21,7 @@ _SYMPTOMS_SHOWN = 3
 _TITLE = N_("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
 _FREQUENCY = N_("frequency, Hz")
 _DASHES = (6.0, 3.0)
-_VERDICTS = {
-    HealthGrade.GOOD: N_("Good"),
-    HealthGrade.DOUBTFUL: N_("Doubtful"),
-    HealthGrade.BAD: N_("Bad"),
-}
+_VERDICTS = {HealthGrade.GOOD: N_("Good"), HealthGrade.DOUBTFUL: N_("Doubtful"), HealthGrade.BAD: N_("Bad")}
 
 
 class HealthPanel(QStackedWidget):

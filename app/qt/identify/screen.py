@@ -32,10 +32,7 @@ from messages.i18n import N_, gettext
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
 _NO_MOTION = N_("The other tabs need the fitted motion of both masses; this run has none.")
-_OTHER_KINDS = {
-    "one-mass": N_("Analyse as one mass"),
-    "two-mass": N_("Analyse as two masses"),
-}
+_OTHER_KINDS = {"one-mass": N_("Analyse as one mass"), "two-mass": N_("Analyse as two masses")}
 
 
 class IdentifyScreen(QWidget):

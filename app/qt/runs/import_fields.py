@@ -32,10 +32,7 @@ _OF_READING = {
 }
 _CHOICES = {
     "time_unit": {"s": "s", "ms": "ms", "us": "µs"},
-    "measures": {
-        "relative": N_("plate against table"),
-        "plate": N_("plate against base"),
-    },
+    "measures": {"relative": N_("plate against table"), "plate": N_("plate against base")},
     "quantity": {
         "displacement": N_("displacement"),
         "velocity": N_("velocity"),

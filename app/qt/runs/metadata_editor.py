@@ -8,14 +8,8 @@ from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
 
 _FIELDS = {
-    "series": (
-        N_("Series"),
-        N_("Series code, for example 1FFM0: it brings its pullback and plate mass"),
-    ),
-    "plate_mass_kg": (
-        N_("Plate mass, kg"),
-        N_("Mass of the upper plate with its weights"),
-    ),
+    "series": (N_("Series"), N_("Series code, for example 1FFM0: it brings its pullback and plate mass")),
+    "plate_mass_kg": (N_("Plate mass, kg"), N_("Mass of the upper plate with its weights")),
     "operator": (N_("Operator"), N_("Who recorded")),
     "note": (N_("Note"), N_("A remark kept with the run")),
 }
