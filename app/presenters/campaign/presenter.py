@@ -33,19 +33,7 @@ class _Undo:
 
 
 class CampaignPresenter(Presenter[CampaignState]):
-    """Campaign of a folder.
-
-    Parameters
-    ----------
-    worker : Worker
-        Used by this screen only. Closed by `close`.
-    folder : str
-        Folder at first.
-    all_series : tuple of str
-        Series codes of the stand, in the paper's order.
-    author : str
-        Recorded with each exclusion.
-    """
+    """Campaign of a folder: `author` is recorded with each exclusion, `close` ends the worker."""
 
     def __init__(
         self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator

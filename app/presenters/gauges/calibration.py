@@ -32,17 +32,7 @@ _FITTED_FROM: Final = 2
 
 
 class CalibrationPresenter(Presenter[CalibrationState]):
-    """Takes one reading at a time.
-
-    Parameters
-    ----------
-    recent : RecentSamples
-        Live samples.
-    submit : callable
-        Submits a task; its result comes to `on_fitted`, `on_saved` or `on_failed`.
-    now : callable
-        Time of day.
-    """
+    """Takes one reading at a time; results of `submit` come to `on_fitted`, `on_saved` or `on_failed`."""
 
     def __init__(
         self,

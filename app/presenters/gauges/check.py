@@ -18,15 +18,7 @@ from messages.message import Message
 
 
 class CheckPresenter(Presenter[CheckState]):
-    """Takes two readings: at rest, and with the known step.
-
-    Parameters
-    ----------
-    recent : RecentSamples
-        Live samples.
-    submit : callable
-        Submits a check; its result comes to `on_checked` or `on_failed`.
-    """
+    """Takes two readings: at rest, and with the known step; `submit` submits the check."""
 
     def __init__(self, recent: RecentSamples, submit: Callable[[CheckGauge], None]) -> None:
         super().__init__(CheckState())

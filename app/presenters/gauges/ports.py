@@ -30,13 +30,7 @@ class ProbePorts:
 
 
 class PortsPresenter(Presenter[PortsState]):
-    """Runs one probe at a time.
-
-    Parameters
-    ----------
-    worker : Worker
-        Used for nothing else, because cancelling a probe ends its process. Closed by `close`.
-    """
+    """Runs one probe at a time, in a worker of its own: cancelling a probe ends its process."""
 
     def __init__(self, worker: Worker, navigator: Navigator) -> None:
         super().__init__(PortsState())

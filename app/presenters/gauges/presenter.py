@@ -45,17 +45,7 @@ _WAITING: Final = N_("Looking at the gauges: let the stand rest for a few second
 
 
 class GaugesPresenter(Presenter[GaugesState]):
-    """Calibrations, health, ports.
-
-    Parameters
-    ----------
-    worker, port_worker : Worker
-        The second one probes ports. Both are closed by `close`.
-    gauges : Gauges
-        Calibrations in use at first.
-    now : callable
-        Time of day.
-    """
+    """Calibrations, health, and presenters of the tabs; `close` ends both workers."""
 
     def __init__(
         self,

@@ -31,13 +31,7 @@ class InvalidWindow:
 
 
 class RecentSamples:
-    """The newest rows of the live ring.
-
-    Parameters
-    ----------
-    seconds : float
-        Length that is kept.
-    """
+    """The newest rows of the live ring, `seconds` long."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -103,13 +97,7 @@ class StillMoving:
 
 
 class ReadingAverager:
-    """Averages one reading once the gauge is at rest.
-
-    Parameters
-    ----------
-    recent : RecentSamples
-        Live samples.
-    """
+    """Averages one reading of live samples once the gauge is at rest."""
 
     def __init__(self, recent: RecentSamples) -> None:
         self._recent = recent

@@ -70,15 +70,7 @@ def step_cursor(cursors: Cursors, time_s: Floats, samples: int) -> Cursors:
 def read_cursors(
     cursors: Cursors, time_s: Floats, drawn: Sequence[PlottedQuantity], period_s: float | None
 ) -> Cursors:
-    """Snap the cursors to the nearest samples, and read the values there.
-
-    Parameters
-    ----------
-    time_s : (n,) float64
-        Rising.
-    period_s : float, optional
-        Identified period.
-    """
+    """Snap the cursors to the nearest samples of `time_s` (n,), which rises, and read the values there."""
     a_s, b_s = (float(time_s[nearest_index(time_s, cursors.at(cursor))]) for cursor in Cursor)
     first, second = ([quantity.interpolate(at_s) for quantity in drawn] for at_s in (a_s, b_s))
     difference = [later - earlier for earlier, later in zip(first, second, strict=True)]

@@ -55,15 +55,7 @@ class _Shown:
 
 
 class IdentifyPresenter(Presenter[IdentifyState]):
-    """Shows one run.
-
-    Parameters
-    ----------
-    worker : Worker
-        Shared with the window, which closes it and passes its events to `on_event`.
-    poll_worker : callable
-        Lets the window pass the events that are there.
-    """
+    """Shows one run; `poll_worker` passes waiting events of the worker, which the window shares and closes."""
 
     def __init__(self, worker: Worker, poll_worker: Callable[[], None]) -> None:
         super().__init__(IdentifyState())

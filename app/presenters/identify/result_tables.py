@@ -21,15 +21,7 @@ _PAPER_DECIMALS = 3
 
 
 def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
-    """Every fitted law, the likeliest first.
-
-    Parameters
-    ----------
-    model : ModelVerdict or None
-        Of the analysis that tried them.
-    shown : ModelVerdict or None
-        Of the one whose curves are drawn: laws that were ruled out early are fitted to the end only there.
-    """
+    """Every fitted law, the likeliest first; laws that were ruled out early are fitted to the end in `shown` only."""
     if model is None or shown is None:
         return ()
     anew = {tried.name: tried for tried in shown.tried}

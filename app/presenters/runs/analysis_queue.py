@@ -47,13 +47,7 @@ class AnalysisSummary:
 
 
 class AnalysisQueue:
-    """Submits analyses, and collects their outcome until all are done.
-
-    Parameters
-    ----------
-    worker : Worker
-        Used for analyses only: table, previews and edits do not wait for them. Closed by `close`.
-    """
+    """Submits analyses to a worker of their own, and collects their outcome until all are done."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker = worker

@@ -47,13 +47,7 @@ class ExportState:
 
 
 class ExportPresenter(Presenter[ExportState]):
-    """Exports runs.
-
-    Parameters
-    ----------
-    submit : callable
-        Submits a task; its result comes to `on_preview`, `on_done` or `on_failed`.
-    """
+    """Exports runs; results of `submit` come to `on_preview`, `on_done` or `on_failed`."""
 
     def __init__(self, submit: Callable[[PreviewExport | ExportRuns], None]) -> None:
         super().__init__(ExportState())

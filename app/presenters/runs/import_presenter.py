@@ -66,13 +66,7 @@ class ImportState:
 
 
 class ImportPresenter(Presenter[ImportState]):
-    """Imports one file after another.
-
-    Parameters
-    ----------
-    submit : callable
-        Submits a task; its result comes to `on_done` or `on_failed`.
-    """
+    """Imports one file after another; results of `submit` come to `on_done` or `on_failed`."""
 
     def __init__(self, submit: Callable[[ImportTask], None]) -> None:
         super().__init__(ImportState())

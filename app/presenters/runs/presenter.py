@@ -41,23 +41,7 @@ RUN_SUFFIX = ".h5"
 
 
 class RunsPresenter(Presenter[RunsState]):
-    """Runs of a folder.
-
-    Parameters
-    ----------
-    worker : Worker
-        Used by this screen only. Closed by `close`.
-    analysis_worker : Worker
-        Used for analyses only. Closed by `close`.
-    folder : str
-        Folder at first.
-    all_series : tuple of str
-        Series codes of the stand.
-    author : str
-        Recorded with each edit.
-    open_run : callable
-        Shows a run on Identify.
-    """
+    """Runs of a folder: `author` is recorded with each edit, `close` ends both workers."""
 
     def __init__(
         self,

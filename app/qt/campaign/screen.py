@@ -23,7 +23,7 @@ from app.qt.campaign.sections import Sections
 from app.qt.campaign.selected_runs import SelectedRuns
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import N_, gettext, ngettext
@@ -151,12 +151,7 @@ class CampaignScreen(QWidget):
             top.addWidget(button)
         self._stack.addWidget(self._filled())
         self._stack.addWidget(self._empty)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addLayout(top)
-        layout.addWidget(self._message)
-        layout.addWidget(self._stack, 1)
+        make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
 
     def _filled(self) -> QWidget:
         page, left = QWidget(), QVBoxLayout()
@@ -164,18 +159,10 @@ class CampaignScreen(QWidget):
         left.addWidget(_card(self._table), _TABLE_SHARE)
         left.addWidget(_card(self._plot), _FIGURE_SHARE)
         content = QWidget()
-        column = QVBoxLayout(content)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self._chosen)
-        column.addLayout(self._sections, 1)
+        make_column(self._chosen, (self._sections, 1), of=content)
         side = _card(make_scroll_area(content))
         side.setFixedWidth(_COLUMN_WIDTH)
-        layout = QHBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        layout.addLayout(left, 1)
-        layout.addWidget(side)
+        make_row((left, 1), side, spacing=8, of=page)
         return page
 
 
@@ -191,12 +178,7 @@ class _Working(QWidget):
         self._cancel = QPushButton(gettext("Cancel"))
         self._cancel.clicked.connect(presenter.cancel)
         self._parts = (self._words, self._bar, self._cancel)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 0, 12, 0)
-        layout.setSpacing(12)
-        layout.addWidget(self._words)
-        layout.addWidget(self._bar, 1)
-        layout.addWidget(self._cancel)
+        layout = make_row(self._words, (self._bar, 1), self._cancel, spacing=12, margins=(12, 0), of=self)
         layout.addStretch(0)
 
     def show_progress(self, progress: Progress | None) -> None:
@@ -230,12 +212,7 @@ class _Empty(QFrame):
         folder.clicked.connect(choose_folder)
         self._folder = ""
         self._buttons = (record, folder, synthetic)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(24, 24, 24, 24)
-        layout.setSpacing(16)
-        layout.addStretch(1)
-        layout.addWidget(self._words)
-        layout.addWidget(self._where)
+        layout = make_column(STRETCH, self._words, self._where, spacing=16, margins=(24, 24), of=self)
         for button in self._buttons:
             layout.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
@@ -264,11 +241,7 @@ def _where(state: CampaignState) -> str:
 def _card(*parts: QWidget) -> QFrame:
     card = QFrame()
     card.setProperty("role", "card")
-    inside = QVBoxLayout(card)
-    inside.setContentsMargins(1, 1, 1, 1)
-    inside.setSpacing(0)
-    for part in parts:
-        inside.addWidget(part)
+    make_column(*parts, margins=(1, 1), of=card)
     return card
 
 

@@ -7,6 +7,7 @@ from app.presenters.base import Chip, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, NextTest, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
+from app.qt.widgets.layouts import STRETCH, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -49,10 +50,12 @@ class Sections(QWidget):
             return
         _section(layout, gettext("What f<sub>d</sub> depends on"))
         for effect in state.effects:
-            line = QHBoxLayout()
-            line.addWidget(label(effect.cause, TextRole.STRONG))
-            line.addStretch(1)
-            line.addWidget(label(effect.conclusion, TextRole.STRONG if effect.is_found else TextRole.TEXT))
+            line = make_row(
+                label(effect.cause, TextRole.STRONG),
+                STRETCH,
+                label(effect.conclusion, TextRole.STRONG if effect.is_found else TextRole.TEXT),
+                spacing=6,
+            )
             layout.addLayout(line)
             layout.addWidget(label(effect.sentence, muted=True, wrap=True))
 

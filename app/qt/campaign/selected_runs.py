@@ -1,11 +1,12 @@
 """The runs of the chosen series: look at one, or leave it out with a reason."""
 
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from analysis.formatting import THIN_SPACE
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import RunRow
 from app.qt.theme import TextRole
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -54,14 +55,12 @@ class SelectedRuns(QWidget):
         out.clicked.connect(lambda: self._presenter.exclude_run(run.path, self._reason.text()))
         chip = label()
         show_chip(chip, run.status)
-        below = QHBoxLayout()
-        below.addWidget(label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}"))
-        below.addWidget(chip)
-        below.addStretch(1)
-        below.addWidget(out)
-        layout = QVBoxLayout(made)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2)
-        layout.addWidget(name)
-        layout.addLayout(below)
+        below = make_row(
+            label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}"),
+            chip,
+            STRETCH,
+            out,
+            spacing=6,
+        )
+        make_column(name, below, spacing=2, of=made)
         return made

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 from app.presenters.gauges.state import GaugeCard, GaugesState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
 
@@ -49,11 +50,9 @@ class _Card(QFrame):
         self._standing = label(role=TextRole.STRONG, wrap=True)
         self._facts = ValueGrid()
         self._check = label(wrap=True)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 12, 16, 12)
-        layout.setSpacing(8)
-        for part in (self._name, self._standing, self._facts, self._check):
-            layout.addWidget(part)
+        make_column(
+            self._name, self._standing, self._facts, self._check, spacing=8, margins=(16, 12), of=self
+        )
 
     def show_card(self, card: GaugeCard) -> None:
         self._name.setText(card.name)

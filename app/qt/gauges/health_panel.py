@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QWidget
 
 from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -13,6 +13,7 @@ from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, set_property
+from app.qt.widgets.layouts import STRETCH, make_column
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -25,13 +26,7 @@ _VERDICTS = {HealthGrade.GOOD: N_("Good"), HealthGrade.DOUBTFUL: N_("Doubtful"),
 
 
 class HealthPanel(QStackedWidget):
-    """Draws the health of both gauges, or how to get it.
-
-    Parameters
-    ----------
-    connect_device : callable
-        Leads to where a device is connected.
-    """
+    """Draws the health of both gauges, or how to get it."""
 
     def __init__(self, theme: Theme, connect_device: Callable[[], None]) -> None:
         super().__init__()
@@ -62,11 +57,7 @@ class HealthPanel(QStackedWidget):
 
     def _empty(self) -> QWidget:
         page = QWidget()
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(24, 24, 24, 24)
-        layout.setSpacing(16)
-        layout.addStretch(1)
-        layout.addWidget(self._words)
+        layout = make_column(STRETCH, self._words, spacing=16, margins=(24, 24), of=page)
         layout.addWidget(self._go, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addStretch(2)
         return page
@@ -95,11 +86,7 @@ class _Verdict(QWidget):
         set_property(self._name, "channel", str(channel))
         self._verdict = label(role=TextRole.STRONG)
         self._symptoms = [(label(wrap=True), label(muted=True, wrap=True)) for _ in range(_SYMPTOMS_SHOWN)]
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addWidget(self._name)
-        layout.addWidget(self._verdict)
+        layout = make_column(self._name, self._verdict, spacing=4, of=self)
         for said, remedy in self._symptoms:
             layout.addWidget(said)
             layout.addWidget(remedy)

@@ -1,10 +1,11 @@
 """What two cursors read, in a small table at the top right of the curves."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
 
 from app.presenters.identify.state import Cursors
 from app.qt.theme import TextRole
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.text import label
 from messages.i18n import gettext
 
@@ -25,11 +26,7 @@ class CursorBar(QWidget):
         below = QHBoxLayout()
         below.addWidget(self._hint, 1)
         below.addWidget(self._period)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 4, 16, 4)
-        layout.setSpacing(0)
-        layout.addLayout(self._grid)
-        layout.addLayout(below)
+        make_column(self._grid, below, margins=(16, 4), of=self)
         self._labels: dict[tuple[int, int], QLabel] = {}
         self.hide()
 

@@ -16,13 +16,7 @@ _MARKS = {Cursor.A: "o", Cursor.B: "s"}
 
 
 class CursorPoints:
-    """Shows `Cursors` in plots that each draw one of their values against the one before.
-
-    Parameters
-    ----------
-    plots : sequence of Plot
-        The first draws value 1 against value 0, the second value 3 against value 2.
-    """
+    """Shows `Cursors` in plots: the first draws value 1 against value 0, the second value 3 against value 2."""
 
     def __init__(self, plots: Sequence[Plot]) -> None:
         self._points = {cursor: [_Point(plot, cursor) for plot in plots] for cursor in Cursor}

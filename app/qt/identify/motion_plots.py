@@ -20,15 +20,7 @@ _COLOURS = (("channel_1", "channel_2"), ("text",))
 
 
 class TimePlots(QWidget):
-    """Plots on one time axis, slip shaded.
-
-    Parameters
-    ----------
-    titles : sequence of (str, str)
-        Rich text and unit of each plot.
-    colours : sequence of sequence of str
-        Tokens of the lines of each plot.
-    """
+    """Plots on one time axis, slip shaded; `titles` are text and unit, `colours` tokens of the lines of each plot."""
 
     def __init__(
         self, theme: Theme, titles: Sequence[tuple[str, str]], colours: Sequence[Sequence[str]] = _COLOURS

@@ -14,13 +14,7 @@ from messages.i18n import gettext
 
 
 class ResultsPanel(QWidget):
-    """Built anew for each run and law; the classical figures come later.
-
-    Parameters
-    ----------
-    show_model : callable
-        Told which law's curves are wanted.
-    """
+    """Built anew for each run and law; the classical figures come later."""
 
     def __init__(self, state: IdentifyState, show_model: Callable[[str], None]) -> None:
         super().__init__()

@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy
 
 from app.presenters.identify.state import ManualFit, Scan
 from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
 from app.qt.widgets.shortcuts import describe_shortcut
 from app.qt.widgets.text import label
@@ -23,13 +24,7 @@ _LOOK_MS = 1
 
 
 class ScanPlot(QFrame):
-    """Draws a `Scan`; its handle stands at the fitted f_d, or where the hand has put it.
-
-    Parameters
-    ----------
-    look : callable
-        Takes in what has been simulated; tells whether more is awaited.
-    """
+    """Draws a `Scan` with a handle for f_d; `poll` processes results and says whether more are awaited."""
 
     friction_set = Signal(float)
     reset_requested = Signal()
@@ -130,8 +125,4 @@ class ScanPlot(QFrame):
         below.setContentsMargins(16, 0, 16, 4)
         below.addWidget(self._words, 1)
         below.addWidget(self._back)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addWidget(self._stack)
-        layout.addLayout(below)
+        make_column(self._stack, below, spacing=4, of=self)

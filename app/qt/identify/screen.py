@@ -23,7 +23,7 @@ from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from app.qt.window_geometry import persist_layout
@@ -36,13 +36,7 @@ _OTHER_KINDS = {"one-mass": N_("Analyse as one mass"), "two-mass": N_("Analyse a
 
 
 class IdentifyScreen(QWidget):
-    """Draws `IdentifyState`.
-
-    Parameters
-    ----------
-    ask_for_run : callable
-        Lets the operator choose a recording.
-    """
+    """Draws `IdentifyState`; `ask_for_run` lets the operator choose a recording."""
 
     def __init__(self, theme: Theme, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
@@ -182,11 +176,7 @@ class IdentifyScreen(QWidget):
         top.addWidget(self._cursors)
         top.addWidget(self._kind)
         top.addWidget(self._open)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addLayout(top)
-        layout.addWidget(self._stack, 1)
+        make_column(top, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
 
 
 class _Waiting(QFrame):
@@ -206,11 +196,7 @@ class _Waiting(QFrame):
         self._kind.clicked.connect(presenter.analyse_as_alternative)
         self._open = QPushButton(gettext("Open a recording"))
         self._open.clicked.connect(ask_for_run)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(24, 24, 24, 24)
-        layout.setSpacing(16)
-        layout.addStretch(1)
-        layout.addWidget(self._words)
+        layout = make_column(STRETCH, self._words, spacing=16, margins=(24, 24), of=self)
         for widget in (self._bar, self._cancel, self._kind, self._open):
             layout.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)

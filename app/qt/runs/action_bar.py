@@ -15,13 +15,7 @@ from messages.i18n import gettext
 
 
 class ActionBar(QFrame):
-    """Buttons, the progress of work, and its outcome with details to unfold.
-
-    Parameters
-    ----------
-    ask_for_export : callable
-        Opens the dialog.
-    """
+    """Buttons, the progress of work, and its outcome with details to unfold."""
 
     def __init__(self, presenter: RunsPresenter, ask_for_export: Callable[[], None]) -> None:
         super().__init__()

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
     QProgressBar,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -21,6 +20,7 @@ from app.presenters.base import Chip
 from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportPresenter, ExportState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox, ComboBox
+from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext, ngettext
 
@@ -107,16 +107,18 @@ class ExportDialog(QDialog):
         buttons.addStretch(0)
         buttons.addWidget(self._export)
         buttons.addWidget(self._close)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(12)
-        layout.addWidget(self._title)
-        layout.addLayout(self._form())
-        layout.addWidget(label(gettext("Preview of the first run"), TextRole.LABEL, muted=True))
-        layout.addWidget(self._preview, 1)
-        layout.addWidget(self._message)
-        layout.addWidget(self._details)
-        layout.addLayout(buttons)
+        make_column(
+            self._title,
+            self._form(),
+            label(gettext("Preview of the first run"), TextRole.LABEL, muted=True),
+            (self._preview, 1),
+            self._message,
+            self._details,
+            buttons,
+            spacing=12,
+            margins=(16, 16),
+            of=self,
+        )
 
     def _set_up_fields(self) -> None:
         for name, title in FORMATS.items():
@@ -131,10 +133,7 @@ class ExportDialog(QDialog):
         self._preview.setAccessibleName(gettext("Preview"))
 
     def _form(self) -> QGridLayout:
-        place = QHBoxLayout()
-        place.setSpacing(8)
-        place.addWidget(self._output, 1)
-        place.addWidget(self._browse)
+        place = make_row((self._output, 1), self._browse, spacing=8)
         form = QGridLayout()
         form.setHorizontalSpacing(12)
         form.setVerticalSpacing(8)

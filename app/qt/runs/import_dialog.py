@@ -11,7 +11,7 @@ from app.presenters.runs.import_presenter import ImportPresenter, ImportState, p
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.layouts import make_column, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -95,12 +95,7 @@ class ImportDialog(QDialog):
             button.setAutoDefault(False)  # Enter in a field takes the field
             buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignBottom)
         self._import.setProperty("primary", "true")
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(12)
-        layout.addLayout(top)
-        layout.addLayout(middle, 1)
-        layout.addLayout(buttons)
+        make_column(top, (middle, 1), buttons, spacing=12, margins=(16, 16), of=self)
 
     def _right(self) -> QVBoxLayout:
         self._head.setReadOnly(True)
@@ -109,10 +104,10 @@ class ImportDialog(QDialog):
         self._head.setTabChangesFocus(True)
         self._head.setFixedHeight(_HEAD_HEIGHT)
         self._head.setAccessibleName(gettext("First lines of the file"))
-        right = QVBoxLayout()
-        right.setSpacing(8)
-        right.addWidget(self._preview, 1)
-        right.addWidget(self._words)
-        right.addWidget(label(gettext("First lines of the file"), TextRole.LABEL, muted=True))
-        right.addWidget(self._head)
-        return right
+        return make_column(
+            (self._preview, 1),
+            self._words,
+            label(gettext("First lines of the file"), TextRole.LABEL, muted=True),
+            self._head,
+            spacing=8,
+        )

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack, pen, value_at
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
@@ -38,12 +39,7 @@ class RunsPreview(QWidget):
         self._names = label(role=TextRole.LABEL, wrap=True)
         self._words = label(muted=True, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addWidget(self._stack, 1)
-        layout.addWidget(self._names)
-        layout.addWidget(self._words)
+        make_column((self._stack, 1), self._names, self._words, spacing=4, of=self)
         self._names.setContentsMargins(12, 0, 12, 4)
         self._words.setContentsMargins(12, 8, 12, 8)
         self.setAccessibleName(gettext("Preview of the selected runs"))

@@ -30,15 +30,7 @@ _ALL_SERIES = N_("All series")
 
 
 class RunsScreen(QWidget):
-    """Draws `RunsState`.
-
-    Parameters
-    ----------
-    presenter : RunsPresenter
-        Told what the operator does.
-    dialogs : Dialogs
-        Opens those for export and import.
-    """
+    """Draws `RunsState`; `dialogs` opens those for export and import."""
 
     def __init__(self, theme: Theme, presenter: RunsPresenter, dialogs: "MainWindow") -> None:
         super().__init__()
