@@ -19,8 +19,7 @@ from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, Product
 from app.qt.campaign.friction_plot import FrictionPlot
-from app.qt.campaign.sections import Sections
-from app.qt.campaign.selected_runs import SelectedRuns
+from app.qt.campaign.sections import Sections, SelectedRuns
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area

@@ -2,18 +2,21 @@
 
 from functools import partial
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.state import GaugesState, GaugesTab
+from app.presenters.gauges.state import GaugeCard, GaugesState, GaugesTab
 from app.qt.gauges.calibrate_panel import CalibratePanel
-from app.qt.gauges.cards import FOCUS_RING, CardsColumn
 from app.qt.gauges.check_panel import CheckPanel
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
-from app.qt.theme import Theme
+from app.qt.gauges.value_grid import ValueGrid
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.shortcuts import add_shortcut
+from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.27
@@ -92,3 +95,55 @@ class GaugesScreen(QWidget):
         layout.setSpacing(4)
         layout.addWidget(self._cards)
         layout.addLayout(beside, 1)
+
+
+FOCUS_RING = 2
+"""What is left free around the cards for it (px)."""
+
+
+class CardsColumn(QScrollArea):
+    """Both cards under one another, and where the calibrations are kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._cards = (_Card(), _Card())
+        self._fault = label(wrap=True)
+        self._file = label(role=TextRole.LABEL, muted=True, wrap=True)
+        inside = QWidget()
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(FOCUS_RING, FOCUS_RING, 4, FOCUS_RING)
+        layout.setSpacing(8)
+        for part in (*self._cards, self._fault, self._file):
+            layout.addWidget(part)
+        layout.addStretch(1)
+        self.setWidget(inside)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setAccessibleName(gettext("Calibrations in use"))
+
+    def show_state(self, state: GaugesState) -> None:
+        for shown, card in zip(self._cards, state.cards, strict=True):
+            shown.show_card(card)
+        show_chip(self._fault, state.checks_fault)
+        self._file.setText(gettext("In use: {file}", file=break_path(state.file)) if state.file else "")
+
+
+class _Card(QFrame):
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._name = label(role=TextRole.HEADING)
+        self._standing = label(role=TextRole.STRONG, wrap=True)
+        self._facts = ValueGrid()
+        self._check = label(wrap=True)
+        make_column(
+            self._name, self._standing, self._facts, self._check, spacing=8, margins=(16, 12), of=self
+        )
+
+    def show_card(self, card: GaugeCard) -> None:
+        self._name.setText(card.name)
+        show_chip(self._standing, card.validity)
+        self._facts.show_values(card.values)
+        show_chip(self._check, card.check)
+        self.setAccessibleName(f"{card.name}: {card.validity.text}; {card.check.text}")

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine
-from app.qt.identify.cursor_lines import CursorLines
+from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.plots import (
     Plot,

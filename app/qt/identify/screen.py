@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from app.presenters.base import Chip, Tone
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Cursors, IdentifyState, PlotTab
-from app.qt.identify.cursor_bar import CursorBar
+from app.qt.identify.cursors import CursorBar
 from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
