@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from analysis.formatting import with_unit
 from app.presenters import number_text
 from app.presenters.identify.state import Floats, Motion
-from app.qt.identify.cursor_points import CursorPoints
-from app.qt.identify.cursors import CursorLines
+from app.qt.identify.cursors import CursorLines, CursorPoints
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack, ShadedSpans, pen, shade, value_at
 from messages.i18n import gettext

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QFileDialog, QFrame, QLabel, QLineEdit, QPushButto
 from app.presenters.runs.import_presenter import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
 from app.presenters.runs.state import RunFilter, RunsState, StatusFilter
-from app.qt.runs.action_bar import ActionBar, MetadataEditor
 from app.qt.runs.preview import RunsPreview
+from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ComboBox
