@@ -55,7 +55,7 @@ class _Shown:
 
 
 class IdentifyPresenter(Presenter[IdentifyState]):
-    """Shows one run; `poll_worker` passes waiting events of the worker, which the window shares and closes."""
+    """Shows one run; `poll_worker` passes the events of the worker, which the window shares and closes."""
 
     def __init__(self, worker: Worker, poll_worker: Callable[[], None]) -> None:
         super().__init__(IdentifyState())

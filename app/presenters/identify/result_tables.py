@@ -21,7 +21,7 @@ _PAPER_DECIMALS = 3
 
 
 def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
-    """Every fitted law, the likeliest first; laws that were ruled out early are fitted to the end in `shown` only."""
+    """Every fitted law, the likeliest first; laws ruled out early are fitted to the end only in `shown`."""
     if model is None or shown is None:
         return ()
     anew = {tried.name: tried for tried in shown.tried}

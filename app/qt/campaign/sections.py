@@ -1,4 +1,4 @@
-"""The right column of Campaign: next test, effects, repeatability, what is left out and what to know."""
+"""The right column of Campaign: runs of a series, next test, effects, repeatability, exclusions, warnings."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget

@@ -1,4 +1,4 @@
-"""Two upright lines through all plots of a stack, drawn along together."""
+"""Cursors of Identify: lines through plots over time, points on the phase plane, and a table of the values."""
 
 from collections.abc import Sequence
 from functools import partial

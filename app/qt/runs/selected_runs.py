@@ -1,4 +1,4 @@
-"""Actions on the selected runs, their progress and outcome."""
+"""The selected runs: actions, their progress and outcome, and the editor of the metadata."""
 
 from collections.abc import Callable
 from functools import partial
