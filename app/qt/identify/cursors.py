@@ -1,4 +1,4 @@
-"""Cursors of Identify: lines through plots over time, points on the phase plane, and a table of the values."""
+"""Cursors of Identify: lines in plots over time, points on the phase plane, and a table of values."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -111,7 +111,7 @@ _MARKS = {Cursor.A: "o", Cursor.B: "s"}
 
 
 class CursorPoints:
-    """Shows `Cursors` in plots: the first draws value 1 against value 0, the second value 3 against value 2."""
+    """Shows `Cursors` in two plots: value 1 against value 0, and value 3 against value 2."""
 
     def __init__(self, plots: Sequence[Plot]) -> None:
         self._points = {cursor: [_Point(plot, cursor) for plot in plots] for cursor in Cursor}

@@ -19,7 +19,7 @@ _COLOURS = (("channel_1", "channel_2"), ("text",))
 
 
 class TimePlots(QWidget):
-    """Plots on one time axis, slip shaded; `titles` are text and unit, `colours` tokens of the lines of each plot."""
+    """Plots on one time axis, slip shaded; `titles` have text and unit, `colours` the tokens of the lines."""
 
     def __init__(
         self, theme: Theme, titles: Sequence[tuple[str, str]], colours: Sequence[Sequence[str]] = _COLOURS
