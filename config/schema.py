@@ -295,7 +295,6 @@ class Settings(_Checked, frozen=True):
     sounds: bool = False
     """Whether each state of a pullback has a sound."""
     log_level: Literal["error", "warning", "info", "debug"] = "info"
-    """What the log holds."""
 
     def __post_init__(self) -> None:
         if not SCALE_MIN <= self.scale <= SCALE_MAX:

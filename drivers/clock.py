@@ -65,7 +65,6 @@ class ClockEstimate:
     """Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The error of the host's own clock, some
     1e-5 where nothing disciplines it, is not included."""
     span_s: float
-    """Time covered by the fit."""
 
 
 class ClockFit:

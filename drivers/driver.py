@@ -40,7 +40,6 @@ class DeviceDriver:
     name: str
     """As given to `--protocol`."""
     title: str
-    """For people."""
     rank: int
     """Place in lists of devices; by how often the device is used."""
     default_baud: int = 0

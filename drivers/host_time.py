@@ -3,6 +3,7 @@
 import sys
 import time
 
+from messages.i18n import N_
 from messages.message import Message, message
 
 if sys.platform == "win32":
@@ -99,14 +100,13 @@ class HostMonitor:
 
 
 def _clock_step(step_s: float) -> Message:
-    if step_s > 0:
-        return message(
-            "the clock of this computer was set forward by {step_s:.1f} s:"
-            " times of day before and after do not fit together, those within a run do",
-            step_s=step_s,
-        )
-    return message(
-        "the clock of this computer was set back by {step_s:.1f} s:"
-        " times of day before and after do not fit together, those within a run do",
-        step_s=-step_s,
+    template = N_(
+        "the clock of this computer was set forward by {step_s:.1f} s:"
+        " times of day before and after do not fit together, those within a run do"
     )
+    if step_s < 0:
+        template = N_(
+            "the clock of this computer was set back by {step_s:.1f} s:"
+            " times of day before and after do not fit together, those within a run do"
+        )
+    return message(template, step_s=abs(step_s))

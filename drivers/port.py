@@ -380,16 +380,14 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
     if number in _BUSY or "PermissionError" in fault:
         return port_busy_error(url, port_users(url))
     if number in _ABSENT or "FileNotFoundError" in fault:
-        if present:
-            return PortUnavailableError(
-                "there is no port {port}: plug the device in or give its name; ports here: {present}",
-                port=url,
-                present=present,
-            )
-        return PortUnavailableError(
-            "there is no port {port}: plug the device in or give its name; there is no serial port here",
-            port=url,
+        template = N_(
+            "there is no port {port}: plug the device in or give its name; there is no serial port here"
         )
+        if present:
+            template = N_(
+                "there is no port {port}: plug the device in or give its name; ports here: {present}"
+            )
+        return PortUnavailableError(template, port=url, present=present)
     if isinstance(error, (ValueError, OverflowError)):
         return SettingsError(
             "port {port} cannot be set to {baud} baud ({fault}): give another --baud",

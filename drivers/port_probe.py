@@ -18,6 +18,7 @@ from drivers.recognition import (
 )
 from drivers.registry import AVAILABLE
 from drivers.source import LineSettings, Link
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
 FIRST_WAIT_S = 3.5
@@ -65,12 +66,10 @@ class PortReport:
     message: Message = EMPTY
     """What is wrong and what to do, where nothing was recognised."""
     users: tuple[PortUser, ...] = ()
-    """Other programs that have it open."""
     recognition: Recognition | None = None
     line_settings: LineSettings | None = None
     """At which it was recognised; None where they have no effect."""
     hints: tuple[PortHint, ...] = ()
-    """What hinders reading this port."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +79,6 @@ class ListenResult:
     recognition: Recognition | None
     """What the bytes are, if a device folder knows them."""
     line_settings: LineSettings | None
-    """None where they have no effect."""
     received: bytes = b""
     """What came at the settings that were recognised, else at those that looked most like text."""
 
@@ -142,10 +140,8 @@ def listen(
     """
     best = ListenResult(None, None)
     for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
-        if link.has_baud:
-            on_progress(message("listening at {line_settings}", line_settings=settings))
-        else:
-            on_progress(message("listening"))
+        template = N_("listening at {line_settings}") if link.has_baud else N_("listening")
+        on_progress(message(template, line_settings=settings))
         try:
             if number:
                 link.configure(settings)
@@ -170,14 +166,10 @@ def query_identity(
     """Ask one question after the other, by default of all devices. Raises DeviceLostError."""
     for protocol, query in queries or identity_queries():
         for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
+            template = N_("asking for {protocol}")
             if link.has_baud:
-                on_progress(
-                    message(
-                        "asking for {protocol} at {line_settings}", protocol=protocol, line_settings=settings
-                    )
-                )
-            else:
-                on_progress(message("asking for {protocol}", protocol=protocol))
+                template = N_("asking for {protocol} at {line_settings}")
+            on_progress(message(template, protocol=protocol, line_settings=settings))
             remark = _query_once(link, query, settings, clock)
             if remark is not None:
                 found = Recognition(protocol, 1.0, 1, remark=remark)

@@ -31,9 +31,7 @@ class Recognition:
     share: float
     """Share of the bytes that is in good frames or lines, 0 to 1."""
     packets: int
-    """Good frames or lines."""
     channels: int = 2
-    """Gauges that the device has."""
     settings: dict[str, str] = field(default_factory=dict)
     """The device's own, as `--set` takes them."""
     rate_hz: float | None = None

@@ -54,7 +54,6 @@ class StreamSource(SampleSource):
     timeout_s = 3.0
     """How long `start` waits for the first good data."""
     answer_timeout_s = 0.4
-    """How long an answer to one request is waited for."""
 
     def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:
         self._identity = identity

@@ -21,12 +21,10 @@ class RepeatedPullback:
     """
 
     pullback_m: float
-    """Table displacement while held (m)."""
     released: Motion
     """Motion after a release, simulated for decay and re-centring at least."""
     timetable: Timetable
     plate_offset_m: float = 0.0
-    """Position of the plate on the table before the first test (m)."""
 
     def displacements(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Table against base and plate against table (m), each (n,), at times since the first test began."""

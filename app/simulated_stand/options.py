@@ -20,7 +20,7 @@ class SimulatedStandError(DriverError):
 
 @dataclass(frozen=True, slots=True)
 class Timetable:
-    """Lengths (s) of the parts of one test, in their order, and how tests follow each other."""
+    """Parts of one test in their order (s), and how tests follow each other (see `SimulatedStandOptions`)."""
 
     rest_s: float
     pull_s: float
@@ -29,11 +29,8 @@ class Timetable:
     recentre_s: float
     """The table is stilled, and the plate put back if it is its turn."""
     every_s: float | None = None
-    """From the beginning of a test to the next; what the parts leave of it is rest. None: at once."""
     count: int | None = None
-    """Tests before the stand rests for good; None goes on for ever."""
     recentre_every: int = 1
-    """The plate is put back to the middle after each so many tests; 0 is never."""
 
     @property
     def release_s(self) -> float:
@@ -124,24 +121,18 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     recentre_every: int = 1
     """The plate is put back after each so many tests; 0 leaves it where it slid to."""
     plate_offset_m: float = 0.0
-    """Where the plate stands on the table at first."""
 
     start_at_unix_s: float | None = None
     """Time of day (Unix, s) at which the stand's own time is 0, so that several with the same one show one
     motion; before it the stand rests. None: its time begins when its device is started afresh."""
 
     drop: float = 0.0
-    """Fraction of the frames that lose a byte."""
     flip: float = 0.0
-    """Fraction of the frames that have a bit flipped."""
     truncate: float = 0.0
-    """Fraction of the frames that are cut short."""
     disturbances: tuple[str, ...] = ()
     """Disturbances with their times after the first start: `stall 2 at 5`; see `faults.parse_disturbance`."""
     seed: int | None = None
-    """Makes noise and faults repeatable."""
     truth_file: str | None = None
-    """Where the truth is written as JSON."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in _LIMITS.items():

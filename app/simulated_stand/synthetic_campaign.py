@@ -41,7 +41,6 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     """Codes; empty is the 36 of Table 1."""
     repeats: int = 3
     seed: int = 1
-    """Of everything that is drawn."""
     rate_hz: float = 1000.0
     duration_s: float = 10.0
     """Of each run after its release."""
@@ -74,7 +73,6 @@ class SystematicErrors(msgspec.Struct, frozen=True):
     bends_m: tuple[float, float]
     """Largest deviations from the calibration line."""
     lag_s: float
-    """By how much gauge 2 is late."""
     clock: float
     """By which share true time runs faster than the device's."""
     table_mass_kg: float

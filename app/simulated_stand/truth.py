@@ -46,7 +46,6 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     residual_displacement_m: float
     """How far each release moves it on (m)."""
     streams: int
-    """Streams started until now, of all sessions."""
     wire: TransmissionLog
     """The running stream, or the last one."""
     earlier: list[TransmissionLog] = []

@@ -29,7 +29,6 @@ class PairSource(SampleSource):
     """
 
     timeout_s = 8.0
-    """How long `start` waits for both devices."""
 
     def __init__(self, driver: DeviceDriver, channel_sources: tuple[PairedChannel, PairedChannel]) -> None:
         self.channel_sources = channel_sources

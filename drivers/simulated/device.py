@@ -47,13 +47,9 @@ class DeviceSetup:
     first_sequence: int = 0
     """Number of sample 0; it wraps at 2**32."""
     first_time_s: float = 0.0
-    """Device's clock at sample 0 (s)."""
     faults: FaultRates = field(default_factory=FaultRates)
-    """Damage to its frames."""
     disturbances: tuple[Disturbance, ...] = ()
-    """Planned for each session."""
     seed: int | None = None
-    """Makes the damage repeatable."""
     began_ns: int | None = None
     """Host's monotonic time at which the stand's own time is 0, which makes several devices show one motion;
     None: the stand's time begins with each session."""

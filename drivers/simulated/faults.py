@@ -29,9 +29,7 @@ class FrameFault(StrEnum):
     CUT = "cut"
     """The port did not take all of it."""
     NO_READER = "unheard"
-    """No reader had the port open."""
     STALL = "stall"
-    """The device sent nothing."""
 
 
 LOSING_FAULTS = (FrameFault.CUT, FrameFault.NO_READER, FrameFault.STALL)

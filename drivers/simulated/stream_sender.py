@@ -111,9 +111,7 @@ class DeviceClock:
 
     rate_hz: float
     first_sequence: int = 0
-    """Counter at sample 0."""
     first_time_s: float = 0.0
-    """Clock at sample 0."""
 
 
 class StreamSender:

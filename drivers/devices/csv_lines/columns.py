@@ -48,7 +48,6 @@ class LineFormat:
     separator: str = ","
     """One character; a blank means any number of blanks."""
     decimal: str = "."
-    """Point or comma."""
     comment: str = "#%;/"
     """First characters of lines that are skipped."""
     time_bits: int = 32

@@ -28,7 +28,6 @@ class RegisterMap:
     name: str
     """As given to `--set map=`."""
     title: str
-    """For people."""
     caution: str
     """Note for every run that is read by this map; "" for none."""
     channels: dict[str, Channel]

@@ -48,7 +48,6 @@ class Channel(Struct, frozen=True):
     """Registers of one gauge; the names on the wire are the keys of a register map."""
 
     unit: Annotated[int, Meta(ge=1, le=MAX_UNIT)]
-    """Address of the transmitter."""
     function: Function
     """Function that reads it, 3 or 4."""
     register: _Register
@@ -161,9 +160,7 @@ class Poll:
     first is that of the sample."""
     channels: tuple[Channel, ...]
     values: tuple[RegisterLocation, ...]
-    """Where the value of each channel is."""
     states: tuple[RegisterLocation | None, ...]
-    """Where the status register of each channel is, if it has one."""
 
     def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
         """Values of all channels, from the responses to all requests."""

@@ -46,7 +46,6 @@ class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     zero: bool = False
     """Whether to send the zero command of the map at the start."""
     timeout_s: float = 0.2
-    """How long a response is waited for."""
 
     def __post_init__(self) -> None:
         if not 0.005 <= self.timeout_s <= 1.0:
