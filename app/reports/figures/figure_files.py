@@ -98,23 +98,9 @@ def write_figures(
 ) -> tuple[list[FigureFile], list[str]]:
     """Write Fig. 2 of a campaign on these stands and the others of the runs `chosen`, as far as wanted.
 
-    Parameters
-    ----------
-    numbers : sequence of str
-        Of the figures wanted.
-    progress : callable (float, str)
-        Called with the share done and the name of the run that is drawn.
-
-    Returns
-    -------
-    list of FigureFile
-    list of str
-        What there was nothing for, each a sentence.
-
-    Raises
-    ------
-    RunError
-        A name is taken, a run cannot be read, or the folder takes no files.
+    `progress` is called with the share done and the name of the run that is drawn. Returns the figures, and
+    a sentence for each figure that could not be drawn. Raises RunError if a name is taken, a run cannot be
+    read, or the folder takes no files.
     """
     stems = unique_names(path.stem for path in chosen)
     folder.check_not_existing(stems, numbers)
@@ -122,7 +108,7 @@ def write_figures(
     if FRICTION_FIGURE in numbers:
         of_all = write_friction_figure(folder, campaign, stands)
         written += [of_all] if of_all else []
-        notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
+        notes += [] if of_all else ["no run determined f_s or f_d: Fig. 2 is left out"]
     with Validator() as validator:
         for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
             progress(done / len(chosen), path.name)
@@ -137,7 +123,7 @@ def write_figures(
 def write_friction_figure(
     folder: FigureFolder, campaign: Campaign, stands: Iterable[Stand]
 ) -> FigureFile | None:
-    """Write Fig. 2 of a campaign on these stands; None where nothing tells friction. Raises RunError."""
+    """Write Fig. 2 of a campaign on these stands; None without a friction coefficient. Raises RunError."""
     with print_style():
         figure = friction_figure(friction_by_contact(campaign.rows), contact_names(stands))
         return None if figure is None else folder.write(FRICTION_FIGURE, figure, CAPTION)
@@ -146,14 +132,7 @@ def write_friction_figure(
 def write_run_figures(
     folder: FigureFolder, analysis: Analysis, stem: str, numbers: Iterable[str]
 ) -> tuple[list[FigureFile], list[str]]:
-    """Write those of Figs. 3a to 5b that are wanted and that the run has something to show in.
-
-    Returns
-    -------
-    list of FigureFile
-    list of str
-        Numbers of those that it has nothing for: no law of motion was fitted.
-    """
+    """Write Figs. 3a to 5b as far as wanted; returns the figures, and the numbers that need a fitted law."""
     drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     run = analysis.run.metadata.series or analysis.run.path.stem
     written, left_out = [], []
@@ -178,15 +157,15 @@ _FRICTION = "friction_dynamic"
 def representative_runs(
     campaign: Campaign, runs: Sequence[RunResult], wanted: Sequence[str] = ()
 ) -> list[Path]:
-    """One run of each wanted series; by default of the paper's, or else of the first that tells f_d.
+    """One run of each wanted series; by default of the paper's, or else of the first with f_d.
 
     It is the run whose f_d lies nearest to that of its series, among those that a friction law explains.
     Raises RunNotFoundError for a series without a run.
     """
     rows = {row.label: row for row in campaign.rows}
     if not wanted:
-        told = [label for label, row in rows.items() if _FRICTION in row.quantities] or list(rows)
-        wanted = [PAPER_SERIES] if PAPER_SERIES in told else told[:1]
+        known = [label for label, row in rows.items() if _FRICTION in row.quantities] or list(rows)
+        wanted = [PAPER_SERIES] if PAPER_SERIES in known else known[:1]
     by_name = {run.name: run for run in runs}
     return [Path(_nearest(_row(rows, label), by_name)) for label in dict.fromkeys(wanted)]
 

@@ -11,13 +11,13 @@ from matplotlib.patches import Patch
 
 from analysis.campaign.contacts import ContactFriction
 from analysis.quantities import Quantity
-from app.reports.figures.style import PLATE, SIMULATION, TABLE, new_figure
+from app.reports.figures.style import PLATE, SIMULATION, TABLE, new_figure, place_legend_above
 from config.schema import Stand
 
 CAPTION: Final = (
     "Static and dynamic friction by contact. Bars: mean over the series, with its 95 % interval; points:"
-    " series, with theirs (f_s from its bounds where no law told it); triangles: series that bound f_s from"
-    " below alone."
+    " series, with theirs (f_s from its bounds where no law determined it); triangles: series that bound f_s"
+    " from below only."
 )
 _WIDTH = 0.36
 _SPREAD = 0.22
@@ -31,13 +31,7 @@ def contact_names(stands: Iterable[Stand]) -> dict[str, str]:
 
 
 def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str]) -> Figure | None:
-    """Draw Fig. 2 within `look.print_style`; None where no contact has a friction to show.
-
-    Parameters
-    ----------
-    names
-        What each contact's code stands for.
-    """
+    """Draw Fig. 2 within `print_style`; None without any. `names` are those of the contacts."""
     shown = [one for one in contacts if one.dynamic or one.static or one.static_at_least]
     if not shown:
         return None
@@ -120,4 +114,4 @@ def _legend(axes: Axes, *, least: bool) -> None:
     ]
     if least:
         handles.append(Line2D([], [], color=TABLE, linestyle="", marker="^", label="$f_s$ at least"))
-    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, ncols=3)
+    place_legend_above(axes, handles=handles, ncols=3)

@@ -15,7 +15,15 @@ from analysis.laws.catalogue import law_with_own_parameters
 from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.reports.figures.style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure
+from app.reports.figures.style import (
+    DASHED,
+    PLATE,
+    SIMULATION,
+    TABLE,
+    decimate_for_print,
+    new_figure,
+    place_legend_above,
+)
 
 Floats = NDArray[np.float64]
 _BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0
@@ -156,7 +164,6 @@ class RunFigure:
     """In the paper: "3a"."""
     caption: str
     draw: Draw
-    """Draws it."""
     simulated: bool = True
     """It shows the fitted motion, and needs one."""
 
@@ -168,8 +175,9 @@ class RunFigure:
         self.draw(axes, run)
         axes.set_xlabel("time since release $t$ (s)")
         axes.margins(x=0.01)
-        _shade_slip(axes, run)
-        _legend(axes, 1 if self.number in _LONG_LABELS else 2)
+        if run.slip_end_s is not None:
+            axes.axvspan(0.0, run.slip_end_s, color=PLATE, alpha=0.1, linewidth=0)
+        place_legend_above(axes, ncols=1 if self.number in _LONG_LABELS else 2, handlelength=2.6)
         if title:
             figure.suptitle(title, fontsize=9, x=0.01, ha="left")
         return figure
@@ -273,16 +281,4 @@ def _largest(run: RunFigureData, name: str) -> str:
     return "unknown" if found is None else definition(name).format(found, Place.REPORT).in_print
 
 
-def _legend(axes: Axes, columns: int) -> None:
-    """Above the axes, where it covers no curve."""
-    axes.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, ncols=columns, handlelength=2.6
-    )
-
-
 _LONG_LABELS = ("4b", "5a")
-
-
-def _shade_slip(axes: Axes, run: RunFigureData) -> None:
-    if run.slip_end_s is not None:
-        axes.axvspan(0.0, run.slip_end_s, color=PLATE, alpha=0.1, linewidth=0)

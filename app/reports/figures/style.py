@@ -81,6 +81,11 @@ def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Fig
     return figure, figure.subplots()
 
 
+def place_legend_above(axes: Axes, **options: Any) -> None:
+    """Add a legend above the axes, where it covers no curve."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, **options)
+
+
 def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
     """Decimate a curve of very many readings (n,) to the minimum and maximum of each stretch."""
     if len(value) <= 2 * _STRETCHES:

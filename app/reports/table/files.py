@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import msgspec
 
+from analysis.campaign.effects import Effect
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place
@@ -57,12 +58,12 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
 
     Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError.
     """
-    said = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
+    notes = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {
         "Table 1": (table_headers(), [row_cells(row) for row in content.campaign.rows]),
         "Numbers": flat_table(content),
         "Repeats": repeats_grid(content),
-        "Said": (("about", "sentence"), said),
+        "Notes": (("about", "sentence"), notes),
     }
     if content.published is not None:
         sheets["Published"] = published_grid(content)
@@ -82,7 +83,7 @@ def _markdown(content: TableContent, with_repeats: bool) -> str:
     if with_repeats:
         lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
     if content.published is not None:
-        lines += ["", "## Found less printed", "", *_markdown_table(*published_grid(content))]
+        lines += ["", "## Measured minus published", "", *_markdown_table(*published_grid(content))]
     for title, sentences in note_sections(content):
         lines += ["", f"## {title}", "", *(f"- {_marked(sentence)}" for sentence in sentences)]
     return "\n".join(lines) + "\n"
@@ -113,7 +114,11 @@ def _latex(content: TableContent) -> str:
         r"\bottomrule",
         r"\end{tabular}",
         r"\endgroup",
-        *(f"% {title}: {_one_line(one)}" for title, sentences in note_sections(content) for one in sentences),
+        *(
+            f"% {title}: {' '.join(sentence.split())}"
+            for title, sentences in note_sections(content)
+            for sentence in sentences
+        ),
     ]
     return "\n".join(lines) + "\n"
 
@@ -126,21 +131,10 @@ def _latex_cell(text: str) -> str:
     return f"${shown[0]}$" + shown[1:] if shown.startswith("-") else shown or "--"
 
 
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
-
-
 _SUFFIXES: Final = (
-    "",
-    "_standard_uncertainty",
-    "_low_95",
-    "_high_95",
-    "_runs",
-    "_between_runs",
-    "_scatter",
-    "_birge_ratio",
-    "_outliers",
-)
+    "", "_standard_uncertainty", "_low_95", "_high_95", "_runs", "_between_runs", "_scatter",
+    "_birge_ratio", "_outliers",
+)  # fmt: skip
 _PUBLISHED: Final = ("_printed", "_difference")
 _LEADING: Final = ("series", "contact", "pullback_m", "table_mass_kg", "runs")
 
@@ -195,17 +189,7 @@ def table_document(content: TableContent) -> dict[str, Any]:
         {
             "schema": SCHEMA,
             "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
-            "effects": [
-                msgspec.to_builtins(effect)
-                | {
-                    "sentence": str(effect.sentence),
-                    "sizes": [
-                        {"step": str(size.step), "change": _quantity_document(size.change)}
-                        for size in effect.sizes
-                    ],
-                }
-                for effect in campaign.effects.effects
-            ],
+            "effects": [_effect_document(effect) for effect in campaign.effects.effects],
             "scatter_beyond_effects": campaign.effects.scatter,
             "ratios": msgspec.to_builtins(campaign.ratios),
             "msk64_degrees": list(campaign.msk64_degrees),
@@ -215,6 +199,12 @@ def table_document(content: TableContent) -> dict[str, Any]:
         }
     )
     return document
+
+
+def _effect_document(effect: Effect) -> dict[str, Any]:
+    sizes = [{"step": str(size.step), "change": _quantity_document(size.change)} for size in effect.sizes]
+    document: dict[str, Any] = msgspec.to_builtins(effect)
+    return document | {"sentence": str(effect.sentence), "sizes": sizes}
 
 
 def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dict[str, Any]:

@@ -28,10 +28,10 @@ LEGEND: Final = (
     " law explains a run."
 )
 REPEATS_LEGEND: Final = (
-    "Standard deviation of the runs in percent of the mean, and Birge ratio (1: they differ as their noise"
-    " lets expect):"
+    "Standard deviation of the runs in percent of the mean, and Birge ratio (1: the runs scatter as their"
+    " noise predicts):"
 )
-_PUBLISHED_LEGEND: Final = "Found less printed, the printed c read as kgf/m:"
+_PUBLISHED_LEGEND: Final = "Measured minus published, with the published c read as kgf/m:"
 
 
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
@@ -53,15 +53,16 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
 
 def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
     """Notes below the table: titles with sentences; empty ones are left out."""
-    campaign = content.campaign
+    campaign, published = content.campaign, content.published or {}
+    flags = [f"{label}: {', '.join(row.flags)}" for label, row in published.items() if row.flags]
     every = (
         ("What f_d depends on", effect_sentences(campaign.effects)),
         ("f_s / f_d by contact", [ratio_sentence(ratio) for ratio in campaign.ratios]),
         ("MSK-64 degrees that the table reached", _degrees(campaign)),
-        ("Flags of the audit of the published table", _flags(content)),
+        ("Flags of the audit of the published table", flags),
         ("Runs that do not count", [f"{one.run}: {one.reason}" for one in campaign.excluded]),
         ("Runs without a result", [f"{run}: {reason}" for run, reason in content.failures]),
-        ("To be known", list(_warnings(content))),
+        ("Warnings", list(_warnings(content))),
     )
     return [(title, kept) for title, some in every if (kept := [sentence for sentence in some if sentence])]
 
@@ -93,55 +94,46 @@ def _warnings(content: TableContent) -> Iterator[str]:
         else:
             first, others = said[0][1].rstrip("."), [label for label, _ in said[1:]]
             more = "" if len(others) <= _NAMED else f" and {len(others) - _NAMED} more"
-            yield f"{first}. The like is said of {len(others)} others: {', '.join(others[:_NAMED])}{more}"
-
-
-def _flags(content: TableContent) -> list[str]:
-    published = content.published or {}
-    return [f"{label}: {', '.join(printed.flags)}" for label, printed in published.items() if printed.flags]
+            names = ", ".join(others[:_NAMED]) + more
+            yield f"{first}. The same applies to {len(others)} other series: {names}"
 
 
 def effect_sentences(effects: Effects) -> list[str]:
     """One sentence for each cause, and the scatter of the series about the model."""
-    said = [str(effect.sentence) for effect in effects.effects]
+    sentences = [str(effect.sentence) for effect in effects.effects]
     if effects.scatter:
-        said.append(
+        sentences.append(
             f"The {effects.series} series scatter about this by {100.0 * effects.scatter:.2g} % beyond their"
-            " uncertainties, which the tests reckon with."
+            " uncertainties; the tests include this scatter."
         )
-    return said
+    return sentences
 
 
 def ratio_sentence(ratio: ContactRatio) -> str:
     """Ratio of f_s to f_d of one contact."""
     contact = ratio.contact or "contact not named"
     low, high = ratio.bounds
-    said = []
+    parts = []
     if ratio.ratio is not None:
         number = format_concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
         ends = " to ".join(f"{end:.3g}" for end in ratio.ratio.interval_95)
-        said.append(f"{number} (95 %: {ends}) over {ratio.series} series{_spread(ratio.between_series)}")
+        between = ratio.between_series
+        spread = "" if between is None else f" with a standard deviation of {between:.2g}"
+        parts.append(f"{number} (95 %: {ends}) over {ratio.series} series{spread}")
     if low is not None and high is not None:
-        said.append(f"between {low:.3f} and {high:.3f} where the runs only bound f_s")
+        parts.append(f"between {low:.3f} and {high:.3f} where the runs only bound f_s")
     elif low is not None:
-        said.append(f"at least {low:.3f} where the runs only bound f_s from below")
-    return f"{contact}: {', '.join(said) or 'not determined'}"
-
-
-def _spread(between_series: float | None) -> str:
-    return "" if between_series is None else f" with a standard deviation of {between_series:.2g}"
+        parts.append(f"at least {low:.3f} where the runs only bound f_s from below")
+    return f"{contact}: {', '.join(parts) or 'not determined'}"
 
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Scatter of the runs of each series: header and rows."""
     columns = table_quantities()[1:]
-    rows = [
-        (
-            row.label,
-            *(repeats(row.quantities[one.name]) if one.name in row.quantities else "" for one in columns),
-        )
-        for row in content.campaign.rows
-    ]
+    rows = []
+    for row in content.campaign.rows:
+        cells = (repeats(row.quantities[one.name]) if one.name in row.quantities else "" for one in columns)
+        rows.append((row.label, *cells))
     return ("series", *(column.symbol.text for column in columns)), rows
 
 

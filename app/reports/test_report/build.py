@@ -50,8 +50,7 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
             [repeat_saved_analysis(path, validator) for path in chosen],
             _folder([run.name for run in gathered.runs]),
         )
-    rows = content.campaign.rows
-    subtitle = f"Campaign of {len(gathered.runs)} runs in {len(rows)} series"
+    subtitle = f"Campaign of {len(gathered.runs)} runs in {len(content.campaign.rows)} series"
     return _report(head, subtitle, campaign_sections(material))
 
 

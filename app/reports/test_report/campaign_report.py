@@ -1,4 +1,4 @@
-"""What the report of a campaign says."""
+"""Sections of the report of a campaign."""
 
 import math
 import os
@@ -10,8 +10,7 @@ import msgspec
 
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import PooledQuantity
-from analysis.campaign.series import RunResult
-from analysis.catalogue import Place, QuantityDefinition
+from analysis.catalogue import Place
 from analysis.formatting import format_uncertainty, format_value, typeset, typeset_sentence
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
@@ -41,18 +40,17 @@ from app.reports.test_report.shared import (
 )
 from app.runs.analyze import Analysis
 from app.runs.campaign.collect import CollectedRuns
-from app.runs.campaign.run_result import RunDetails
 from app.runs.reader import Fingerprint
 
 _FRICTION = "friction_dynamic"
 _DRAWN: Final = ("3a", "3b", "4a", "4b", "5a")
 _VERDICTS: Final = {True: "fits", False: "does NOT fit", None: "no law fitted"}
-_ALWAYS_SAID: Final = ("Runs that do not count", "Runs without a result")
+_ALWAYS_SHOWN: Final = ("Runs that do not count", "Runs without a result")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CampaignReportInput:
-    """What a report of a campaign is made of."""
+    """Content of the report of a campaign."""
 
     content: TableContent
     gathered: CollectedRuns
@@ -61,50 +59,37 @@ class CampaignReportInput:
     shown: Sequence[Analysis]
     """Runs whose motion is drawn."""
     folder: str
-    """That all runs lie in; paths are told from there."""
+    """Common folder of all runs; paths are relative to it."""
 
 
 def campaign_sections(material: CampaignReportInput) -> list[Section]:
     """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
+    prints = [
+        msgspec.structs.replace(one, name=_local(run.name, material))
+        for run, one in zip(gathered.runs, material.prints, strict=True)
+    ]
     table: list[list[Cell]] = [[typeset_sentence(text) for text in row_cells(row)] for row in rows]
-    header, scatter = repeats_grid(material.content)
-    heads: list[Cell] = ["series", "n", *_heads(table_quantities())]
+    columns = table_quantities()
+    symbols = [Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol) for row in columns]
+    heads: list[Cell] = ["series", "n", *symbols]
+    results = Grid(heads, table, len(heads) - 1, small=True, note=LEGEND)
+    no_units: list[Cell] = ["series", *(Symbol(row.symbol.markup) for row in columns[1:])]
+    scatter: list[list[Cell]] = [list(row) for row in repeats_grid(material.content)[1]]
+    repeats = Grid(no_units, scatter, len(no_units) - 1, small=True, note=REPEATS_LEGEND)
     return [
         Section("Campaign", [_summary(material)]),
-        *_said(material),
-        Section(
-            "Table of results",
-            [Grid(heads, table, numbers=len(heads) - 1, small=True, note=LEGEND)],
-            wide=True,
-        ),
+        *_notes(material),
+        Section("Table of results", [results], wide=True),
         Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
-        Section(
-            "Repeatability",
-            [
-                Grid(
-                    ["series", *_heads(table_quantities()[1:], with_units=False)],
-                    [list(row) for row in scatter],
-                    len(header) - 1,
-                    small=True,
-                    note=REPEATS_LEGEND,
-                )
-            ],
-            wide=True,
-        ),
+        Section("Repeatability", [repeats], wide=True),
         Section("Figures", list(_figures(material))),
         stand_section(list(gathered.stands.values())),
         gauges_section(list(gathered.gauges.values())),
         procedure(),
         Section("Runs", [_runs(material)], wide=True),
-        Section("Data", fingerprint_columns(_named(material))),
+        Section("Data", fingerprint_columns(prints)),
         signatures(),
-    ]
-
-
-def _heads(quantities: Sequence[QuantityDefinition], *, with_units: bool = True) -> list[Cell]:
-    return [
-        Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol if with_units else "") for row in quantities
     ]
 
 
@@ -115,18 +100,12 @@ def _summary(material: CampaignReportInput) -> Facts:
     contacts = contact_names(gathered.stands.values())
     codes = dict.fromkeys(row.series.contact for row in campaign.rows)
     counted = sum(len(row.runs) for row in campaign.rows)
+    excluded, failed = len(campaign.excluded), len(material.content.failures)
+    named = [f"{code or 'not named'}: {contacts.get(code, 'not one of the stand')}" for code in codes]
     rows = [
-        (
-            "runs",
-            f"{counted} counted, {len(campaign.excluded)} left out, {len(material.content.failures)} failed",
-        ),
+        ("runs", f"{counted} counted, {excluded} left out, {failed} failed"),
         ("series", str(len(campaign.rows))),
-        (
-            "contacts",
-            "\n".join(
-                f"{code or 'not named'}: {contacts.get(code, 'not one of the stand')}" for code in codes
-            ),
-        ),
+        ("contacts", "\n".join(named)),
         ("recorded", "" if not days else days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"),
         ("operators", ", ".join(sorted({one.operator for one in facts if one.operator}))),
         ("stand", ", ".join(stand.name for stand in gathered.stands.values())),
@@ -135,21 +114,21 @@ def _summary(material: CampaignReportInput) -> Facts:
     return without_empty(rows)
 
 
-def _said(material: CampaignReportInput) -> Iterator[Section]:
-    """What the campaign says in sentences; that nothing was left out is said too."""
-    said = dict(note_sections(material.content))
-    for title in dict.fromkeys((*said, *_ALWAYS_SAID)):
-        texts = [typeset_sentence(_local(text, material)) for text in said.get(title, ())]
+def _notes(material: CampaignReportInput) -> Iterator[Section]:
+    """The notes of the table; two of them appear even if they are empty."""
+    notes = dict(note_sections(material.content))
+    for title in dict.fromkeys((*notes, *_ALWAYS_SHOWN)):
+        texts = [typeset_sentence(_local(text, material)) for text in notes.get(title, ())]
         yield Section(title, [Points(texts) if texts else Text("None.")])
 
 
 def _local(text: str, material: CampaignReportInput) -> str:
-    """Text with the paths of runs from the folder on that all lie in."""
+    """Replace paths of runs by those relative to their common folder."""
     return text.replace(material.folder + os.sep, "") if material.folder else text
 
 
 def _budget(material: CampaignReportInput) -> Iterator[Block]:
-    """A row a series, a column a source of uncertainty of its f_d."""
+    """One row for each series, one column for each source of the uncertainty of f_d."""
     pooled = {
         row.label: row.quantities[_FRICTION]
         for row in material.content.campaign.rows
@@ -170,9 +149,9 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
         for label, one in pooled.items()
     ]
     if not rows:
-        yield Text("No run tells the dynamic friction coefficient.")
+        yield Text("No run determined the dynamic friction coefficient.")
         return
-    note = "Standard uncertainties. Repeats make the noise and what runs differ by smaller, and nothing else."
+    note = "Standard uncertainties. Repeats reduce the noise and the scatter between runs, and nothing else."
     header: list[Cell] = ["series", "value", "noise and repeats", *sources]
     yield Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
 
@@ -193,7 +172,7 @@ def _figures(material: CampaignReportInput) -> Iterator[Block]:
         items = [] if figure is None else [drawing(figure, CAPTION)]
         for analysis in material.shown:
             items += _of_run(analysis)
-    yield Drawings(items) if items else Text("No run tells friction.")
+    yield Drawings(items) if items else Text("No run determined friction.")
 
 
 def _of_run(analysis: Analysis) -> list[Drawing]:
@@ -214,26 +193,19 @@ def _runs(material: CampaignReportInput) -> Grid:
         "law",
         "dynamic friction",
     ]
-    facts = material.gathered.details
-    rows = [_run(run, facts[run.name], material) for run in material.gathered.runs]
+    rows: list[list[Cell]] = []
+    for run in material.gathered.runs:
+        details, found = material.gathered.details[run.name], run.results.get(_FRICTION)
+        rows.append(
+            [
+                _local(run.name, material),
+                run.series.label,
+                details.start_time.strftime("%Y-%m-%d %H:%M"),
+                details.operator,
+                details.conditions.as_text(),
+                details.note,
+                "left out" if run.excluded else _VERDICTS[run.adequate],
+                "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print,
+            ]
+        )
     return Grid(header, rows, numbers=1, small=True)
-
-
-def _run(run: RunResult, facts: RunDetails, material: CampaignReportInput) -> list[Cell]:
-    friction = run.results.get(_FRICTION)
-    return [
-        _local(run.name, material),
-        run.series.label,
-        facts.start_time.strftime("%Y-%m-%d %H:%M"),
-        facts.operator,
-        facts.conditions.as_text(),
-        facts.note,
-        "left out" if run.excluded else _VERDICTS[run.adequate],
-        "–" if friction is None else format_value(friction.value, friction.standard_uncertainty).in_print,
-    ]
-
-
-def _named(material: CampaignReportInput) -> list[Fingerprint]:
-    """Fingerprints by the paths of their runs, which are told apart in several folders too."""
-    runs = zip(material.gathered.runs, material.prints, strict=True)
-    return [msgspec.structs.replace(one, name=_local(run.name, material)) for run, one in runs]

@@ -70,8 +70,11 @@ _ENDINGS: Final = {
 def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str = "") -> list[Section]:
     """All sections of the report of one run; `excluded` is why it does not count."""
     found, run = analysis.identification, analysis.run
+    warnings = [f"{warning.message} ({warning.code})" for warning in found.warnings]
+    sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
+    columns = [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
     return [
-        Section("Result", [*_left_out(excluded), *_expired(found), *_result(found)]),
+        Section("Result", [*_notices(found, excluded), *_result(found)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
         stand_section([run.metadata.stand]),
@@ -80,28 +83,24 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Results", list(_results(found))),
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
-        Section("Warnings", [_warnings(found)]),
-        Section("Data", [*fingerprint_columns([print_of_file]), _columns(print_of_file)]),
+        Section("Warnings", [Points(warnings) if warnings else Text("None.")]),
+        Section("Data", [*fingerprint_columns([print_of_file]), without_empty(columns)]),
         signatures(),
     ]
 
 
-def _left_out(reason: str) -> list[Block]:
-    said = f"This run is left out of the campaign's results: {reason}. What follows is for information only."
-    return [Notice(said)] if reason else []
-
-
-def _expired(found: Identification) -> list[Block]:
-    """An expired calibration is not left to the list of warnings: every result rests on it."""
-    return [
-        Notice(str(caution.message), "warn")
-        for caution in found.warnings
-        if caution.code == "calibration-expired"
-    ]
+def _notices(found: Identification, excluded: str) -> Iterator[Block]:
+    """Notices above the result: an exclusion, and an expired calibration, which affects every result."""
+    if excluded:
+        left_out = f"This run is left out of the campaign's results: {excluded}."
+        yield Notice(f"{left_out} What follows is for information only.")
+    for warning in found.warnings:
+        if warning.code == "calibration-expired":
+            yield Notice(str(warning.message), "warn")
 
 
 def _result(found: Identification) -> Iterator[Block]:
-    """The first of the headlines that was found, and what is to be thought of it."""
+    """The first of the headline quantities that has a value, with its assessment."""
     key = next((key for key in _HEADLINES if key in found.results), None)
     if key is None:
         yield Text("The record gave no result; the warnings say why.")
@@ -129,6 +128,9 @@ def _test(analysis: Analysis) -> Facts:
     run, metadata = analysis.run, analysis.run.metadata
     ending, events = run.end, analysis.identification.events
     device = metadata.device
+    slip_s = None
+    if events.release_s is not None and events.slip_end_s is not None:
+        slip_s = events.slip_end_s - events.release_s
     rows = [
         ("run", run.path.name),
         ("title", metadata.title),
@@ -146,7 +148,7 @@ def _test(analysis: Analysis) -> Facts:
         ("source", metadata.source),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
         ("hold before release", "" if ending is None else in_unit(ending.dwell_s, SECOND, 2)),
-        ("slip lasted", _slip(events.release_s, events.slip_end_s)),
+        ("slip lasted", in_unit(slip_s, SECOND, 3)),
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
     ]
@@ -158,10 +160,6 @@ def _samples(losses: Losses) -> str:
         f"{count} {name}" for name in ("missing", "damaged", "overloaded") if (count := getattr(losses, name))
     ]
     return f"{losses.samples}, of which {', '.join(faults) if faults else 'none missing or damaged'}"
-
-
-def _slip(release_s: float | None, slip_end_s: float | None) -> str:
-    return "" if release_s is None or slip_end_s is None else in_unit(slip_end_s - release_s, SECOND, 3)
 
 
 def _conditions(metadata: RunMetadata) -> Facts:
@@ -188,35 +186,25 @@ def _results(found: Identification) -> Iterator[Block]:
         quantity = found.results.get(row.name)
         if quantity is not None and math.isfinite(quantity.value):
             shown = row.format(quantity, Place.REPORT)
-            rows.append(
-                [
-                    row.description,
-                    Symbol(row.symbol.markup),
-                    typeset(shown.value),
-                    shown.uncertainty or "–",
-                    _interval(row, quantity),
-                    shown.unit or "1",
-                ]
-            )
+            uncertainty, unit = shown.uncertainty or "–", shown.unit or "1"
+            symbol, interval = Symbol(row.symbol.markup), _interval(row, quantity)
+            rows.append([row.description, symbol, typeset(shown.value), uncertainty, interval, unit])
     if degree := found.labels.get("msk64_degree"):
         rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
     header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
     yield Grid(header, rows, numbers=4)
     if found.model is not None and found.model.tried:
-        yield Grid(
-            ["friction law", Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"],
+        laws: list[list[Cell]] = [
             [
-                [
-                    law.name,
-                    f"{law.friction_dynamic:.6f}",
-                    typeset(f"{law.bic:.1f}"),
-                    f"{MICROMETRE.number(law.residual_rms_m, 2)}",
-                ]
-                for law in found.model.tried
-            ],
-            numbers=3,
-            note="The law with the lowest BIC is taken.",
-        )
+                law.name,
+                f"{law.friction_dynamic:.6f}",
+                typeset(f"{law.bic:.1f}"),
+                MICROMETRE.number(law.residual_rms_m, 2),
+            ]
+            for law in found.model.tried
+        ]
+        heads: list[Cell] = ["friction law", Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
+        yield Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
 
 
 def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
@@ -232,7 +220,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     shares = {(str(line.source), line.contribution_to): line.standard_uncertainty for line in found.budget}
     sources = _by_size(found.budget, shown)
     if not sources:
-        yield Text("There is no result whose uncertainty could be broken down.")
+        yield Text("No result has an uncertainty budget.")
         return
     heads = [Symbol(row.symbol.markup, row.unit_at(Place.REPORT).symbol) for row in rows]
     body: list[list[Cell]] = [
@@ -250,7 +238,7 @@ def _budget(found: Identification) -> Iterator[Block]:
 
 
 def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
-    """Sources of the results that are shown: by what they add to the first of them, then to the others."""
+    """Sources of the results shown, sorted by their contribution to the first result, then to the others."""
     found: dict[str, None] = {}
     for key in shown:
         lines = [line for line in budget if line.contribution_to == key]
@@ -271,22 +259,9 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
 
 def _figures(analysis: Analysis) -> list[Block]:
     drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
-    caption = "Record, simulation with what was found, and what is left between them. Shaded: slip."
+    caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
     with print_style():
         whole = drawing(record_figure(analysis.record, analysis.identification), caption)
         made = [(one.render(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
         items = [drawing(figure, said) for figure, said in made if figure is not None]
     return [whole, Drawings(items)] if items else [whole]
-
-
-def _warnings(found: Identification) -> Block:
-    if not found.warnings:
-        return Text("None.")
-    return Points([f"{caution.message} ({caution.code})" for caution in found.warnings])
-
-
-def _columns(print_of_file: Fingerprint) -> Facts:
-    sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
-    return without_empty(
-        [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
-    )

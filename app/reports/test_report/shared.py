@@ -6,7 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from analysis.catalogue import MICROMETRE, MILLIMETRE, Unit
+from analysis.catalogue import ACCELERATION, KILOGRAM, MICROMETRE, MILLIMETRE, Unit
 from analysis.formatting import (
     NO_BREAK_SPACE,
     format_compact,
@@ -23,9 +23,9 @@ ROLES: Final = ("Tested by", "Checked by", "Approved by")
 NOT_STATED = "not stated"
 
 _PROCEDURE: Final = (
-    "The table is pulled back from rest, held, and released without push. Gauge 1 measures the table against"
-    " the fixed base, gauge 2 the upper plate. Both are recorded from the hold until the table is at rest, or"
-    " until waiting no longer narrows the results.",
+    "The table is pulled back from rest, held, and released without a push. Gauge 1 measures the table"
+    " against the fixed base, gauge 2 the upper plate. Both are recorded from the hold until the table is"
+    " at rest, or until waiting no longer narrows the results.",
     "Both records are compared with the exact motion of two masses with dry friction between them: period and"
     " damping come from the decay after the last slip; f_d, stiffness, damping, pullback, release and zeros"
     " are fitted together to all readings by least squares. The friction laws (f_s = f_d or f_s above f_d,"
@@ -50,21 +50,23 @@ def stand_section(stands: Sequence[Stand]) -> Section:
 
 def gauges_section(calibrations: Sequence[Gauges]) -> Section:
     """Calibrations of both gauges."""
-    blocks = [
-        Grid(["", "gauge 1, table", f"gauge 2, {_measured(gauges.relative)}"], _calibration(gauges))
-        for gauges in calibrations
-    ]
-    return Section("Gauges and calibration", [*blocks])
+    blocks: list[Block] = []
+    for gauges in calibrations:
+        reference = "base" if gauges.relative.measures == "plate" else "table"
+        rows: list[list[Cell]] = [[name, of(gauges.table), of(gauges.relative)] for name, of in _OF_GAUGE]
+        header: list[Cell] = ["", "gauge 1, table", f"gauge 2, plate against {reference}"]
+        blocks.append(Grid(header, [row for row in rows if any(row[1:])]))
+    return Section("Gauges and calibration", blocks)
 
 
 def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
-    """Hash of each run file, with its meaning."""
-    rows = [[one.name, f"{one.size_bytes}", one.sha256] for one in prints]
+    """Hash of each run file, with its explanation."""
+    rows: list[list[Cell]] = [[one.name, f"{one.size_bytes}", one.sha256] for one in prints]
     note = (
         "SHA-256 of the run files as they were when this report was made. The checksums of the samples in"
-        " them never change; the files do when an analysis is kept or a note is edited."
+        " them never change; the files change when an analysis is saved or a note is edited."
     )
-    return [Text(note), Grid(["file", "bytes", "SHA-256"], [list(row) for row in rows], small=True)]
+    return [Text(note), Grid(["file", "bytes", "SHA-256"], rows, small=True)]
 
 
 def signatures() -> Section:
@@ -96,36 +98,20 @@ def _stand(stand: Stand) -> Facts:
     geometry = ", ".join(
         f"{name.removesuffix('_m').replace('_', ' ')} {size:g} m" for name, size in stand.geometry.items()
     )
+    mass_1 = format_value(stand.table_mass_kg, stand.table_mass_standard_uncertainty_kg, KILOGRAM.symbol)
+    mass_2 = format_value(stand.plate_mass_kg, stand.plate_mass_standard_uncertainty_kg, KILOGRAM.symbol)
+    gravity = format_value(
+        stand.gravity_m_per_s2, stand.gravity_standard_uncertainty_m_per_s2, ACCELERATION.symbol
+    )
     return without_empty(
         [
             ("name", stand.name),
-            (
-                "table mass m1",
-                format_value(stand.table_mass_kg, stand.table_mass_standard_uncertainty_kg, "kg").in_print,
-            ),
-            (
-                "plate mass m2",
-                format_value(stand.plate_mass_kg, stand.plate_mass_standard_uncertainty_kg, "kg").in_print
-                + " without added mass",
-            ),
-            (
-                "gravity",
-                format_value(
-                    stand.gravity_m_per_s2, stand.gravity_standard_uncertainty_m_per_s2, "m/s²"
-                ).in_print,
-            ),
+            ("table mass m1", mass_1.in_print),
+            ("plate mass m2", f"{mass_2.in_print} without added mass"),
+            ("gravity", gravity.in_print),
             ("geometry", geometry),
         ]
     )
-
-
-def _measured(gauge: Gauge) -> str:
-    return "plate against base" if gauge.measures == "plate" else "plate against table"
-
-
-def _calibration(gauges: Gauges) -> list[list[Cell]]:
-    rows: list[list[Cell]] = [[name, of(gauges.table), of(gauges.relative)] for name, of in _OF_GAUGE]
-    return [row for row in rows if any(row[1:])]
 
 
 def _gain_uncertainty(gauge: Gauge) -> str:

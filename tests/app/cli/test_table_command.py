@@ -44,7 +44,7 @@ def test_text_fits_the_terminal(slipstand, folder, monkeypatch):
 
     assert said.code == 0
     assert max(map(len, [line for line in said.out.splitlines() if str(folder) not in line])) <= 80
-    assert "Found less printed" in said.out
+    assert "Measured minus published" in said.out
     assert "stiffness_n_per_m" in said.out
 
 

@@ -38,7 +38,7 @@ def test_report_of_a_campaign_names_both_stands_and_calibrations(recorded, slips
     found = sections()
 
     assert len(found["Stands"]) == len(found["Gauges and calibration"]) == 2
-    assert sum("was valid until 2025-01-12" in text for text in found["To be known"][0].texts) == 2
+    assert sum("was valid until 2025-01-12" in text for text in found["Warnings"][0].texts) == 2
 
 
 @pytest.fixture

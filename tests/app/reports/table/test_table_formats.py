@@ -104,7 +104,7 @@ def test_what_is_said_of_many_series_is_said_once():
     text = " ".join(as_text(TableContent(summarize(runs)), "text", 80).split())
 
     assert text.count("one run alone determined f_d") == 1
-    assert "The like is said of 4 others: 1FFM1, 1FFM2, 1FFM3, 2FFM0" in text
+    assert "The same applies to 4 other series: 1FFM1, 1FFM2, 1FFM3, 2FFM0" in text
 
 
 def test_wide_text_is_one_block(content):
@@ -196,7 +196,7 @@ def test_workbook_has_the_numbers_and_no_formula(content, tmp_path):
     numbers = book["Numbers"]
     header = [cell.value for cell in numbers[1]]
 
-    assert book.sheetnames == ["Table 1", "Numbers", "Repeats", "Said", "Published"]
+    assert book.sheetnames == ["Table 1", "Numbers", "Repeats", "Notes", "Published"]
     shown = [cell.value or "" for cell in book["Table 1"][2]]
     assert shown == list(row_cells(content.campaign.rows[0]))
     assert (
