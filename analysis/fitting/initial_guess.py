@@ -181,7 +181,7 @@ _READINGS = 60
 _STEPS_PER_PERIOD = 48
 """Of the times of release that are tried; chi-square of the first readings is smooth over one."""
 _STATIC_RATIOS = (1.0, 1.3, 1.7)
-_KEPT = 6
+_SLIPS_KEPT = 6
 
 
 def guess_release(
@@ -201,10 +201,10 @@ def guess_release(
     first_s = float(guided.table.time_s[0])
     window = guided.before(first_s + _WINDOW_PERIODS * period_s).decimated(_READINGS, np.inf)
     candidates = _candidates(window, start, period_s, pullback_m)
-    best = candidates[np.argsort(window.chi_squares(candidates, fit_zero=True))[: 4 * _KEPT]]
+    best = candidates[np.argsort(window.chi_squares(candidates, fit_zero=True))[: 4 * _SLIPS_KEPT]]
     refined = [window.minimise(_with_fitted_zero(window, point), WIDEST_LAW, 20) for point in best]
     refined.sort(key=lambda minimum: minimum.cost)
-    return [minimum.parameters for minimum in refined[:_KEPT]]
+    return [minimum.parameters for minimum in refined[:_SLIPS_KEPT]]
 
 
 def _candidates(window: FitProblem, start: Floats, period_s: float, pullback_m: float | None) -> Floats:

@@ -10,7 +10,7 @@ from messages.message import message
 
 NOISE_FLOOR_M = 1e-9
 """Noise below this is not believed: the readings are computed, not measured."""
-_READINGS_MIN = 30
+_SPECTRUM_READINGS_MIN = 30
 _DITHER = 0.4
 """Noise above this share of the converter's step makes rounding errors independent."""
 
@@ -40,9 +40,9 @@ def pool_noise(found: list[tuple[float, int]], otherwise: float) -> tuple[float,
 
     That is by a fifth at least, and by more than the number of readings lets it seem.
     """
-    used = [(noise, count) for noise, count in found if count >= _READINGS_MIN]
+    used = [(noise, count) for noise, count in found if count >= _SPECTRUM_READINGS_MIN]
     if not used:
-        return otherwise, _READINGS_MIN
+        return otherwise, _SPECTRUM_READINGS_MIN
     least, fewest = min(used)
     chance = [float(np.exp(5.0 * np.sqrt(0.5 / fewest + 0.5 / count))) for _, count in used]
     limits = [max(1.2, by_chance) * least + NOISE_FLOOR_M for by_chance in chance]

@@ -164,7 +164,7 @@ _DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)
 _HOPELESS = 14.0
 """Rise from which on a density of exp(-rise / 2) adds nothing to the interval."""
 _FINE = 2001
-_STEPS = 8
+_PROFILE_STEPS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +241,7 @@ class Profile:
         start = self.parameters.copy()
         start += shift * self.follow if follow else 0.0
         start[self.parameter] = self.parameters[self.parameter] + shift
-        there = self.problem.minimise(start, self.law, _STEPS, fixed=self.parameter)
+        there = self.problem.minimise(start, self.law, _PROFILE_STEPS, fixed=self.parameter)
         if there.parameters[self.parameter] != start[self.parameter]:  # the law does not allow that value
             return np.inf
         free = self.problem.free_parameters(self.law)
