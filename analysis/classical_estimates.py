@@ -15,8 +15,7 @@ from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.one_mass.turning_points import classical_log_decrement, find_crossings, find_turning_points
 from analysis.preparation.channels import Channel
-from analysis.preparation.free_decay import FreeDecay, prepare
-from analysis.preparation.mounting import relative_to_table
+from analysis.preparation.free_decay import FreeDecay, prepare, relative_to_table
 from analysis.record import Record, RecordError
 
 FRICTION_GRID = np.linspace(0.03, 0.3, 541)
@@ -34,12 +33,6 @@ class ClassicalEstimates:
 
     Attributes
     ----------
-    period_s, log_decrement, log_decrement_uncertainty : float or None
-        From the turning points of the stick tail.
-    cycles : int
-        Full cycles of the tail.
-    residual_displacement_m : Floats
-        u_s simulated at each of `SCANNED`, the other parameters as fitted.
     frictions_of_residual : tuple of float
         Every f_d of the grid range whose simulated u_s is the measured one; empty where u_s is not known.
     friction_of_paper : float or None
@@ -48,10 +41,13 @@ class ClassicalEstimates:
     """
 
     period_s: float | None
+    """From the turning points of the stick tail."""
     log_decrement: float | None
     log_decrement_uncertainty: float | None
     cycles: int
+    """Full cycles of the tail."""
     residual_displacement_m: Floats
+    """u_s simulated at each of `SCANNED`, the other parameters as fitted."""
     friction_candidates: tuple[float, ...]
     friction_by_paper_method: float | None
 

@@ -11,7 +11,7 @@ from scipy.signal import detrend, welch
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
-from analysis.preparation.noise import MAINS_HZ
+from analysis.preparation.channels import MAINS_HZ
 from analysis.record import AnalysisError
 from messages.message import Message, message
 

@@ -30,20 +30,14 @@ class ModelSelection:
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """Times in the base of `Record.time_s`; None where the record does not hold the event.
-
-    Attributes
-    ----------
-    release_s, slip_end_s, rest_s : float or None
-        The table let go, the end of the last slip, and the swing as small as the noise.
-    release_uncertainty_s, slip_end_uncertainty_s, rest_uncertainty_s : float or None
-        Standard uncertainties from the readings; None where they are not known.
-    """
+    """Times in the base of `Record.time_s`; None where the record does not hold the event."""
 
     release_s: float | None = None
+    """The table let go, the end of the last slip, and the swing as small as the noise."""
     slip_end_s: float | None = None
     rest_s: float | None = None
     release_uncertainty_s: float | None = None
+    """Standard uncertainties from the readings; None where they are not known."""
     slip_end_uncertainty_s: float | None = None
     rest_uncertainty_s: float | None = None
 
@@ -58,71 +52,47 @@ class Curves:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MonteCarlo:
-    """What drawing gives beside the budget.
-
-    Attributes
-    ----------
-    draws, refits : int
-        Numbers of draws through the linearised fit and of full fits.
-    linear, full : dict of Quantity
-        By the names of INTERFACE; `full` is empty without refits. The standard uncertainty is the scatter,
-        the interval holds 95 % of the draws.
-    agrees : dict of bool
-        Whether the ends of the interval of the budget are met by those drawn (by the refits where there
-        are any), within the tolerance.
-    tolerances : dict of float
-        Half a unit of the second digit of the standard uncertainty (JCGM 101, clause 8), and what the
-        number of draws leaves open.
-    """
+    """What drawing gives beside the budget."""
 
     draws: int
+    """Numbers of draws through the linearised fit and of full fits."""
     refits: int
     linear: dict[str, Quantity]
+    """By the names of INTERFACE; `full` is empty without refits. The standard uncertainty is the scatter, the
+    interval holds 95 % of the draws."""
     full: dict[str, Quantity]
     agrees: dict[str, bool]
+    """Whether the ends of the interval of the budget are met by those drawn (by the refits where there are
+    any), within the tolerance."""
     tolerances: dict[str, float] = field(default_factory=dict)
+    """Half a unit of the second digit of the standard uncertainty (JCGM 101, clause 8), and what the number
+    of draws leaves open."""
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """Result of `identify`; the same values as `analyze --json`.
-
-    Attributes
-    ----------
-    kind : str
-        "two-mass" or "one-mass".
-    results : dict of Quantity
-        By the names of INTERFACE ("results"); what cannot be determined is absent.
-    labels : dict of str or bool
-        Results that are not numbers: msk64_degree, coulomb_significant.
-    model : ModelVerdict or None
-        None where no law of motion was fitted.
-    budget : list of BudgetLine
-    events : Events
-    warnings : list of ResultWarning
-        "warnings" in the JSON.
-    parameters : dict of float
-        Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
-        damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used.
-    curves : callable or None
-        Fitted readings at given record times (n,).
-    objective : callable or None
-        Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted.
-    curves_by_friction : callable or None
-        Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`.
-    monte_carlo : MonteCarlo or None
-        Where it was asked for.
-    """
+    """Result of `identify`; the same values as `analyze --json`."""
 
     kind: str
+    """"two-mass" or "one-mass"."""
     results: dict[str, Quantity]
+    """By the names of INTERFACE ("results"); what cannot be determined is absent."""
     labels: dict[str, str | bool] = field(default_factory=dict)
+    """Results that are not numbers: msk64_degree, coulomb_significant."""
     model: ModelSelection | None = None
+    """None where no law of motion was fitted."""
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
     warnings: list[ResultWarning] = field(default_factory=list)
+    """"warnings" in the JSON."""
     parameters: dict[str, float] = field(default_factory=dict)
+    """Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
+    damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used."""
     curves: Callable[[Floats], Curves] | None = None
+    """Fitted readings at given record times (n,)."""
     objective: Callable[[Floats], Floats] | None = None
+    """Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted."""
     curves_by_friction: Callable[[float, Floats], Curves] | None = None
+    """Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`."""
     monte_carlo: MonteCarlo | None = None
+    """Where it was asked for."""

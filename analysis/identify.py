@@ -4,35 +4,49 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess, initial_points
 from analysis.fitting.problem import FitProblem
-from analysis.fitting.search import Fit, Search, may_be_friction
+from analysis.fitting.search import (
+    Fit,
+    Search,
+    build_problem,
+    guess_release,
+    initial_guess,
+    initial_points,
+    may_be_friction,
+)
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, law_by_name, law_without
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay, prepare
-from analysis.preparation.plausibility import pullback_warnings
+from analysis.preparation.oscillation import pullback_warnings
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError
-from analysis.results.curves import fitted_curves, friction_curves, friction_objective, named_parameters
-from analysis.results.decay_constants import (
+from analysis.results.fitted_quantities import (
+    add_fitted_quantities,
+    add_no_slip_bound,
+    add_static_friction_bounds,
+    build_events,
+    find_slip_end,
+)
+from analysis.results.joint_fit import (
     DecayConstants,
+    JointFit,
     add_constants,
+    assess_model,
+    choose_law,
     constants_from_joint_fit,
     constants_from_tail,
-)
-from analysis.results.fitted_quantities import add_fitted_quantities
-from analysis.results.joint_fit import JointFit, choose_law
-from analysis.results.mass_check import mass_warnings
-from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
-from analysis.results.slip import add_no_slip_bound, add_static_friction_bounds, build_events, find_slip_end
-from analysis.results.verdict import (
-    assess_model,
+    fitted_curves,
+    friction_curves,
+    friction_objective,
     identifiability_warnings,
     inadequate_warning,
+    named_parameters,
     tail_warnings,
 )
+from analysis.results.mass_check import mass_warnings
+from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import UncertaintyBudget, unstated_gains
 from messages.message import message
@@ -51,7 +65,6 @@ def identify(
 
     Parameters
     ----------
-    record : Record
     model : str
         "auto" (the likeliest of the compared laws; the fallback laws of `analysis.laws.catalogue` are tried
         only where none of these is adequate) or the name of a law.

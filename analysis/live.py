@@ -10,22 +10,24 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.averaging import average_record
-from analysis.damped_cosine import DampedCosine, damped_cosine, refit_damped_cosine
-from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess
-from analysis.fitting.least_squares import covariance
-from analysis.fitting.problem import FitProblem, motion_phases
-from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.fitting.problem import FitProblem, covariance, motion_phases
+from analysis.fitting.search import Fit, Search, build_problem, fit_at_minimum, guess_release, initial_guess
 from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.preparation.channels import Channel
+from analysis.preparation.channels import Channel, remove_drift
 from analysis.preparation.free_decay import FreeDecay, prepare
-from analysis.preparation.noise import remove_drift
+from analysis.preparation.oscillation import DampedCosine, damped_cosine, refit_damped_cosine
 from analysis.quantities import BudgetSource, Quantity
 from analysis.record import GaugeUncertainty, Record, RecordError
-from analysis.results.decay_constants import DecayConstants, constants_from_joint_fit, constants_from_tail
-from analysis.results.joint_fit import joint_fit_uncertainty
-from analysis.results.verdict import assess_model, identifiable_fits
+from analysis.results.joint_fit import (
+    DecayConstants,
+    assess_model,
+    constants_from_joint_fit,
+    constants_from_tail,
+    identifiable_fits,
+    joint_fit_uncertainty,
+)
 from analysis.uncertainty import ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
@@ -48,37 +50,26 @@ FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
 @dataclass(frozen=True, slots=True)
 class LiveState:
-    """What is known so far; None before it can be known.
-
-    Attributes
-    ----------
-    time_s : float
-        Last row seen, in the record's time.
-    release_s, slip_end_s : float or None
-        In the record's time; the slip end as fitted, None while the plate still slips.
-    law : str or None
-        Likeliest law so far.
-    friction_dynamic, period_s, damping_n1_per_s : Quantity or None
-    narrowing : tuple of str
-        Which of these three readings until 20 s after the release would still narrow by more than a
-        twentieth of their standard uncertainty (`analysis.live`).
-    may_stop : bool
-        True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing
-        slips: neither of the others).
-    is_enough : bool
-        The same with none of the three narrowed: the record may end by itself.
-    """
+    """What is known so far; None before it can be known."""
 
     time_s: float
+    """Last row seen, in the record's time."""
     release_s: float | None = None
+    """In the record's time; the slip end as fitted, None while the plate still slips."""
     slip_end_s: float | None = None
     law: str | None = None
+    """Likeliest law so far."""
     friction_dynamic: Quantity | None = None
     period_s: Quantity | None = None
     damping_n1_per_s: Quantity | None = None
     narrowing: tuple[str, ...] = (FRICTION, PERIOD, DAMPING)
+    """Which of these three readings until 20 s after the release would still narrow by more than a twentieth
+    of their standard uncertainty (`analysis.live`)."""
     may_stop: bool = False
+    """True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing slips:
+    neither of the others)."""
     is_enough: bool = False
+    """The same with none of the three narrowed: the record may end by itself."""
 
 
 class LiveIdentification:

@@ -12,9 +12,8 @@ from typing import Any, Self
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import build_problem_from_channels
 from analysis.fitting.problem import FitProblem
-from analysis.fitting.search import Fit, fit_at_minimum
+from analysis.fitting.search import Fit, build_problem_from_channels, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT, compared_law, default_point
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter

@@ -13,39 +13,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import build_problem
 from analysis.fitting.problem import FitProblem, project_to_bounds
-from analysis.fitting.search import Fit, fit_at_minimum
+from analysis.fitting.search import Fit, build_problem, fit_at_minimum
 from analysis.identification import Curves
 from analysis.laws.catalogue import OWN_PARAMETERS, law_by_name
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
 from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
-from analysis.results.curves import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
+from analysis.results.joint_fit import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Refit:
-    """What a refit found.
-
-    Attributes
-    ----------
-    parameters : dict of float
-        By the names of `Identification.parameters`.
-    chi_square, rms_m : float
-        Of the readings.
-    curves : callable
-        Fitted readings at given record times (n,).
-    steps : int
-        Evaluations that it took.
-    """
+    """What a refit found."""
 
     parameters: dict[str, float]
+    """By the names of `Identification.parameters`."""
     chi_square: float
+    """Of the readings."""
     rms_m: float
     curves: Callable[[Floats], Curves]
+    """Fitted readings at given record times (n,)."""
     steps: int
+    """Evaluations that it took."""
 
 
 class Refitter:

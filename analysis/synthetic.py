@@ -18,27 +18,7 @@ TABLE_MASS_KG = 131.6
 
 @dataclass(frozen=True)
 class Truth:
-    """One test and the way it is recorded; the values not named here are as in `TwoMassParameters`.
-
-    Attributes
-    ----------
-    hold_s, pull_s : float
-        Plateau before release (s); with `pull_s`, a rest and a slow pull come before it. A negative hold
-        starts the record after the release.
-    release_phase : float
-        Where between two samples the release lies (0 to 1).
-    noise_m, step_m : float
-        Standard deviation of white noise, and converter step (0: none).
-    offsets_m : (float, float)
-        Zeros of both gauges.
-    gain_errors, lag_s, clock_error
-        What the record does not know of: relative gain errors, lateness of gauge 2 (s), and by how much
-        true time runs faster than the record's.
-    drift_m_per_s : float
-        Drift of gauge 2.
-    seed : int
-        Of the noise.
-    """
+    """One test and the way it is recorded; the values not named here are as in `TwoMassParameters`."""
 
     period_s: float = 0.32
     damping_n1_per_s: float = 0.12
@@ -52,16 +32,25 @@ class Truth:
     rate_hz: float = 1000.0
     duration_s: float = 10.0
     hold_s: float = 1.0
+    """Plateau before release (s); with `pull_s`, a rest and a slow pull come before it. A negative hold
+    starts the record after the release."""
     pull_s: float = 0.0
     release_phase: float = 0.3
+    """Where between two samples the release lies (0 to 1)."""
     noise_m: float = 2e-5
+    """Standard deviation of white noise, and converter step (0: none)."""
     step_m: float = 0.0
     offsets_m: tuple[float, float] = (3e-4, 6e-3)
+    """Zeros of both gauges."""
     gain_errors: tuple[float, float] = (0.0, 0.0)
+    """What the record does not know of: relative gain errors, lateness of gauge 2 (s), and by how much true
+    time runs faster than the record's."""
     lag_s: float = 0.0
     clock_error: float = 0.0
     drift_m_per_s: float = 0.0
+    """Drift of gauge 2."""
     seed: int = 0
+    """Of the noise."""
 
     def parameters(self) -> TwoMassParameters:
         """The stand, contact and pullback of this test."""

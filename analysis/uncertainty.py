@@ -7,8 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from analysis.arrays import Floats, Indices
-from analysis.fitting.least_squares import covariance
-from analysis.fitting.problem import FitProblem
+from analysis.fitting.problem import FitProblem, covariance
 from analysis.fitting.search import Fit
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter

@@ -18,7 +18,7 @@ from reference_solvers import integrate_with_events, march_like_the_paper
 from analysis.laws import stribeck
 from analysis.motion import paper_method
 from analysis.motion.events import integrate_events
-from analysis.motion.gradients import sample_with_gradient
+from analysis.motion.sampling import sample_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from config.files import load_stand, published_table
 

@@ -1,8 +1,7 @@
 """Coulomb friction: f_d while the plate slides; at standstill f_s, which is f_d or larger."""
 
-from analysis.laws.law import FrictionLaw
+from analysis.laws.law import CLOSED_FORM, FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.laws.solvers import CLOSED_FORM
 
 COULOMB = FrictionLaw("coulomb", "f_s = f_d on a level plane", CLOSED_FORM)
 COULOMB_TILT = FrictionLaw("coulomb+tilt", "f_s = f_d on a tilted plane", CLOSED_FORM, (Parameter.TILT,))

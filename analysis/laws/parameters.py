@@ -34,23 +34,15 @@ SHARED_PARAMETER_COUNT = len(Parameter)
 
 @dataclass(frozen=True, slots=True)
 class OwnParameter:
-    """A parameter that one friction law adds.
-
-    Attributes
-    ----------
-    name : str
-        Key in results and in saved parameters, with its unit.
-    unit : str
-    default : float
-        Value in the vector of a law that does not use it.
-    lower, upper : float
-        Bounds of a fit.
-    """
+    """A parameter that one friction law adds."""
 
     name: str
+    """Key in results and in saved parameters, with its unit."""
     unit: str
     default: float
+    """Value in the vector of a law that does not use it."""
     lower: float
+    """Lower bound of a fit; `upper` is the other."""
     upper: float
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled_part
-from analysis.laws.law import FrictionLaw
+from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Parameter
-from analysis.laws.solvers import IntegratedSolver
 from analysis.motion.events import FRICTION_DYNAMIC, FRICTION_STATIC
 from analysis.motion.integration import IntegratedMotion, simulate_integrated
 from analysis.motion.two_mass import MotionError, TwoMassParameters

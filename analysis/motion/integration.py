@@ -68,27 +68,20 @@ class IntegratedKernels(NamedTuple):
 
     `parameters` are the ten of `analysis.motion.events`, then those of the law's own. FRICTION_STATIC is the
     coefficient above which a stick ends.
-
-    Attributes
-    ----------
-    integrate : callable
-        (parameters, duration_s) -> phases (m, 6), nodes (k, 7). Phases as `integrate_events` gives them, and
-        the first row of the phase in `nodes`. A node is a step of a slip: NODE_TAU (s since the phase began),
-        u1, u1', u2' - u1', u2 - u1, u1'', u2'' - u1''.
-    sample : callable
-        (parameters, phases, nodes, times, channels) -> (channels, n), as `sampling.sample`; times rise.
-    peak_rates : callable
-        (parameters, phases, nodes, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|; of a slip those at
-        five times in each step.
-    sample_with_gradient : callable
-        (parameters, times, directions (q, p)) -> u1 and u2 - u1 (2, n), and their central differences along
-        the directions (q, 2, n), good to about 1e-4 of their largest.
     """
 
     integrate: Callable[[Floats, float], tuple[Floats, Floats]]
+    """(parameters, duration_s) -> phases (m, 6), nodes (k, 7). Phases as `integrate_events` gives them, and
+    the first row of the phase in `nodes`. A node is a step of a slip: NODE_TAU (s since the phase began), u1,
+    u1', u2' - u1', u2 - u1, u1'', u2'' - u1''."""
     sample: Callable[[Floats, Floats, Floats, Floats, int], Floats]
+    """(parameters, phases, nodes, times, channels) -> (channels, n), as `sampling.sample`; times rise."""
     peak_rates: Callable[[Floats, Floats, Floats, float], Peaks]
+    """(parameters, phases, nodes, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|; of a slip those at
+    five times in each step."""
     sample_with_gradient: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
+    """(parameters, times, directions (q, p)) -> u1 and u2 - u1 (2, n), and their central differences along
+    the directions (q, 2, n), good to about 1e-4 of their largest."""
 
 
 def integrated_kernels(friction: Friction, name: str) -> IntegratedKernels:

@@ -23,24 +23,16 @@ class DecayError(AnalysisError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class OneMassDecay:
-    """A free decay, given by one of its turning points.
-
-    Attributes
-    ----------
-    period_s : float
-        Damped period ``2 pi / sqrt(k^2 - n^2)`` (s), above 0.
-    damping_n_per_s : float
-        Viscous damping constant n (1/s), 0 or above.
-    coulomb_displacement_m : float
-        x_k = F / c (m), 0 or above.
-    turning_s, turning_m : float
-        Time (s) and displacement from the middle of the rest band (m) of a turning point.
-    """
+    """A free decay, given by one of its turning points."""
 
     period_s: float
+    """Damped period ``2 pi / sqrt(k^2 - n^2)`` (s), above 0."""
     damping_n_per_s: float
+    """Viscous damping constant n (1/s), 0 or above."""
     coulomb_displacement_m: float
+    """x_k = F / c (m), 0 or above."""
     turning_s: float
+    """Time (s) and displacement from the middle of the rest band (m) of a turning point."""
     turning_m: float
 
     def __post_init__(self) -> None:
@@ -63,24 +55,18 @@ class OneMassDecay:
 
 @dataclass(frozen=True, eq=False)
 class OneMassMotion:
-    """Motion at the asked times, and where it ends.
-
-    Attributes
-    ----------
-    time_s, displacement_m, velocity_m_per_s, acceleration_m_per_s2 : (n,) float64
-    turning_s, turning_m : (k,) float64
-        Turning points from the given one to the last asked time or the stop.
-    stop_s : float or None
-        Time of the stop (s); None when the mass still moves at the last asked time.
-    """
+    """Motion at the asked times, and where it ends."""
 
     time_s: Floats
+    """(n,) float64."""
     displacement_m: Floats
     velocity_m_per_s: Floats
     acceleration_m_per_s2: Floats
     turning_s: Floats
+    """(k,) float64: turning points from the given one to the last asked time or the stop."""
     turning_m: Floats
     stop_s: float | None
+    """Time of the stop (s); None when the mass still moves at the last asked time."""
 
 
 def decay_from_state(

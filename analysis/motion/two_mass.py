@@ -26,29 +26,20 @@ class MotionError(AnalysisError, ValueError):
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """A motion at given times; every array has shape (n,). Before release the table is held at the pullback.
-
-    Attributes
-    ----------
-    time_s : float64
-        As asked for, zero at release.
-    table_displacement_m, relative_displacement_m : float64
-        u1 from the rest position, and u2 - u1 since release (m).
-    table_velocity_m_per_s, plate_velocity_m_per_s : float64
-    table_acceleration_m_per_s2, plate_acceleration_m_per_s2 : float64
-        Where a phase begins, its own first value.
-    phase : int8
-        0 where the masses move together, else the sign of u2' - u1'.
-    """
+    """A motion at given times, arrays of shape (n,). Before release the table is held at the pullback."""
 
     time_s: NDArray[np.float64]
+    """As asked for, zero at release."""
     table_displacement_m: NDArray[np.float64]
+    """u1 from the rest position, and u2 - u1 since release (m)."""
     relative_displacement_m: NDArray[np.float64]
     table_velocity_m_per_s: NDArray[np.float64]
     plate_velocity_m_per_s: NDArray[np.float64]
     table_acceleration_m_per_s2: NDArray[np.float64]
+    """Where a phase begins, its own first value."""
     plate_acceleration_m_per_s2: NDArray[np.float64]
     phase: NDArray[np.int8]
+    """0 where the masses move together, else the sign of u2' - u1'."""
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int8]]:
         """Arrays by name, in the order in which they are written to files."""
@@ -62,32 +53,21 @@ class MotionSamples:
 
 @dataclass(frozen=True, eq=False)
 class Motion(ABC):
-    """One simulated test from release to `duration_s`.
-
-    Attributes
-    ----------
-    duration_s : float
-    phase_starts_s : (m,) float64
-        First 0.0, the release.
-    phase_signs : (m,) int8
-        0 where the masses move together, else the sign of u2' - u1'.
-    slip_end_s : float
-        When the last slip ended: 0.0 when nothing slips, `duration_s` when it still slips then.
-    residual_displacement_m : float
-        u2 - u1 at the end.
-    table_velocity_max_m_per_s, plate_velocity_max_m_per_s : float
-    table_acceleration_max_m_per_s2, plate_acceleration_max_m_per_s2 : float
-        Largest absolute values.
-    """
+    """One simulated test from release to `duration_s`."""
 
     duration_s: float
     phase_starts_s: NDArray[np.float64]
+    """(m,) float64: first 0.0, the release."""
     phase_signs: NDArray[np.int8]
+    """(m,) int8: 0 where the masses move together, else the sign of u2' - u1'."""
     slip_end_s: float
+    """When the last slip ended: 0.0 when nothing slips, `duration_s` when it still slips then."""
     residual_displacement_m: float
+    """u2 - u1 at the end."""
     table_velocity_max_m_per_s: float
     plate_velocity_max_m_per_s: float
     table_acceleration_max_m_per_s2: float
+    """Largest absolute values."""
     plate_acceleration_max_m_per_s2: float
 
     @abstractmethod
@@ -151,26 +131,6 @@ def rising_times(
 class TwoMassParameters:
     """The stand, the contact and the pullback of one test.
 
-    Attributes
-    ----------
-    table_mass_kg, plate_mass_kg : float
-        m1, m2; positive.
-    stiffness_n_per_m : float
-        c; positive.
-    damping_coefficient_kg_per_s : float
-        mu; not negative, and the slipping table underdamped: mu < 2 sqrt(c m1).
-    friction_dynamic : float
-        f_d; not negative.
-    friction_static : float or None
-        f_s, not less than f_d; None means f_d.
-    tilt_rad : float
-        alpha, positive where gravity pulls the plate forward; |alpha| <= f_s, else the plate would not
-        have waited for the release.
-    pullback_m : float
-        u1 before release.
-    gravity_m_per_s2 : float
-        Positive.
-
     Raises
     ------
     MotionError
@@ -178,14 +138,23 @@ class TwoMassParameters:
     """
 
     table_mass_kg: float
+    """m1, m2; positive."""
     plate_mass_kg: float
     stiffness_n_per_m: float
+    """c; positive."""
     damping_coefficient_kg_per_s: float
+    """mu; not negative, and the slipping table underdamped: mu < 2 sqrt(c m1)."""
     friction_dynamic: float
+    """f_d; not negative."""
     friction_static: float | None = None
+    """f_s, not less than f_d; None means f_d."""
     tilt_rad: float = 0.0
+    """alpha, positive where gravity pulls the plate forward; |alpha| <= f_s, else the plate would not have
+    waited for the release."""
     pullback_m: float
+    """u1 before release."""
     gravity_m_per_s2: float = 9.81
+    """Positive."""
 
     def __post_init__(self) -> None:
         _check(self)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.damped_cosine import DampedCosine, fit_damped_cosine
 from analysis.formatting import format_number
 from analysis.motion.one_mass import free_decay, turning_magnitude
 from analysis.one_mass.turning_points import find_turning_points, regress_half_cycles
 from analysis.preparation.channels import Channel
+from analysis.preparation.oscillation import DampedCosine, fit_damped_cosine
 from analysis.record import RecordError
 
 _STEP = 1e-30

@@ -19,8 +19,7 @@ from analysis.one_mass.fit import (
 )
 from analysis.one_mass.turning_points import Crossings, find_crossings
 from analysis.preparation.channels import Channel
-from analysis.preparation.plausibility import check_gap
-from analysis.preparation.release import median_of_three
+from analysis.preparation.oscillation import check_gap, median_of_three
 from analysis.quantities import ResultWarning
 from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient

@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.preparation.channels import Channel
-from analysis.preparation.release import median_of_three, white_noise
+from analysis.preparation.oscillation import median_of_three, white_noise
 from analysis.record import RecordError
 
 _DEAD_BAND = (0.03, 0.35)

@@ -1,4 +1,4 @@
-"""The readings of a record that can be analysed: checked, on true time, gaps and overloads left out."""
+"""Readings of the gauges: invalid ones left out; noise, drift and mains hum measured."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Floats
-from analysis.formatting import format_number
+from analysis.formatting import format_length, format_number
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
-from messages.message import message
+from messages.message import Message, message
 
 DELAY_MAX_S = 0.5
 """A gauge later than this is not read in the same test."""
@@ -39,28 +39,19 @@ class Channel:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Channels:
-    """Both gauges on true time.
-
-    Attributes
-    ----------
-    table : Channel
-        Gauge 1.
-    relative : Channel or None
-        Gauge 2 as it reads (against the table, or against the base where `Record` says so).
-    origin_s, clock_scale : float
-        Record time of the first sample; true seconds per second of the record.
-    interval_s : float
-        Median time between rows.
-    quantisation_m : (float, float)
-        Smallest step of each gauge's readings.
-    """
+    """Both gauges on true time."""
 
     table: Channel
+    """Gauge 1."""
     relative: Channel | None
+    """Gauge 2 as it reads (against the table, or against the base where `Record` says so)."""
     origin_s: float
+    """Record time of the first sample; true seconds per second of the record."""
     clock_scale: float
     interval_s: float
+    """Median time between rows."""
     quantisation_m: tuple[float, float]
+    """Smallest step of each gauge's readings."""
 
     def to_record_time(self, time_s: float) -> float:
         """Time in the base of `Record.time_s`."""
@@ -245,3 +236,375 @@ def _relative(
         )
         return None
     return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))
+
+
+_SPIKE_SIGMAS = 9.0
+_SPIKE_SHARE_MAX = 0.02
+"""More readings than this do not stand out by accident: they are not spikes but something else."""
+_PASSES = 8
+_WIDE = 4.0
+"""A distance from the median of five beyond so many times what 97 % of the readings keep is a spike."""
+_JUMP = 0.6
+"""A motion that starts or stops goes a third of its next step at most in the first."""
+_NOISELESS_M = 2e-8
+"""Scatter of readings that are computed, not measured."""
+_FROZEN_RUN = 8
+_FROZEN_MAX = 0.2
+"""A gauge that stands still for longer than this share of the record is at rest."""
+_CLIPPED_RUN = 4
+_READINGS_MIN = 16
+_GAP = 3.5
+"""Readings this many median intervals apart are no neighbours."""
+_EVEN = 35.0 / 18.0
+"""1 + sum of squared weights of the cubic at even times."""
+_KINK_M_PER_S2 = 4.0
+"""A jump of acceleration, of 20 m/s2 at most, moves a reading off the cubic by a tenth of it times an
+interval squared; intervals are not all alike."""
+_REPEATS_MAX = 0.05
+"""A converter that repeats more of its readings than this is merely coarse."""
+
+
+def remove_invalid_readings(channel: Channel, gauge: int, warnings: list[ResultWarning]) -> Channel:
+    """Leave out what the gauge cannot have seen, with a warning for each kind."""
+    repeated = _repeated(channel.value_m)
+    clipped = _clipped(channel.value_m, repeated)
+    frozen = _frozen(channel, repeated) & ~clipped
+    kinds = (
+        ("clipped", clipped, message("stand still at the end of its range")),
+        ("frozen", frozen, message("repeat the one before exactly, at length")),
+    )
+    bad = np.zeros(len(channel), dtype=bool)
+    for code, found, what in kinds:
+        if found.any():
+            warnings.append(_warning(code, gauge, int(found.sum()), len(channel), what))
+            bad |= found
+    channel = Channel(channel.time_s[~bad], channel.value_m[~bad]) if bad.any() else channel
+    spikes = _spikes(channel)
+    if not spikes.any():
+        return channel
+    what = message(
+        "stand out from their neighbours by over {sigmas:.0f} standard deviations", sigmas=_SPIKE_SIGMAS
+    )
+    warnings.append(_warning("spikes", gauge, int(spikes.sum()), len(channel), what))
+    return Channel(channel.time_s[~spikes], channel.value_m[~spikes])
+
+
+def _warning(code: str, gauge: int, count: int, total: int, what: Message) -> ResultWarning:
+    return ResultWarning(
+        code,
+        message(
+            "{count} of {total} readings of gauge {gauge} {what}: they are left out.",
+            count=count,
+            total=total,
+            gauge=gauge,
+            what=what,
+        ),
+    )
+
+
+def _repeated(x: Floats) -> NDArray[np.bool_]:
+    """True for a reading that equals the one before."""
+    return np.concatenate(([False], np.diff(x) == 0.0))
+
+
+def _long_runs(member: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
+    """(first, past the last) of runs of at least `length` members."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], member, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
+
+
+def _clipped(x: Floats, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Readings at the largest or smallest value, where that is reached and held more than once."""
+    clipped = np.zeros(len(x), dtype=bool)
+    for extreme in (x.max(), x.min()):
+        at = x == extreme
+        elsewhere = repeated & ~at
+        if len(_long_runs(at, _CLIPPED_RUN)) > 1 and elsewhere.mean() < _REPEATS_MAX:
+            clipped |= at
+    return clipped
+
+
+def _frozen(channel: Channel, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Readings in long runs of one value, where readings seldom repeat.
+
+    Readings without noise, or with less than a converter's step, may repeat at rest; there a run counts
+    only if it begins or ends with a jump.
+    """
+    x = channel.value_m
+    frozen = np.zeros(len(x), dtype=bool)
+    runs = _long_runs(repeated, _FROZEN_RUN - 1)
+    inside = sum(b - a for a, b in runs)
+    if not runs or repeated.sum() - inside > _REPEATS_MAX * len(x) or inside > _FROZEN_MAX * len(x):
+        return frozen
+    noise, step = 1.4826 * float(np.median(np.abs(np.diff(x, 6)))) / float(np.sqrt(924.0)), quantisation_m(x)
+    may_repeat = noise < max(_NOISELESS_M, step)
+    smallest, whole_s = _NOISELESS_M + 2.0 * step, _GAP * float(np.median(np.diff(channel.time_s)))
+    for first, past in runs:
+        before, after = slice(max(0, first - 3), first), slice(past - 1, past + 2)
+        steps_out = [
+            (np.diff(x[end])[::order], np.diff(channel.time_s[end])[::order])
+            for end, order in ((before, -1), (after, 1))
+        ]
+        if not may_repeat or any(_jumps(*out, smallest, whole_s) for out in steps_out):
+            frozen[first - 1 : past] = True
+    return frozen
+
+
+def _jumps(steps: Floats, times: Floats, smallest: float, whole_s: float) -> bool:
+    """Whether the first of two steps out of a run is not the start of a motion; unknown across a gap."""
+    if len(steps) < 2 or times.max() > whole_s or abs(steps[0]) <= smallest:
+        return False
+    back = steps[0] * steps[1] < 0.0 and abs(steps[1]) > _JUMP * abs(steps[0])  # that is a spike
+    return not back and bool(abs(steps[0] / times[0]) > _JUMP * abs(steps[1] / times[1]))
+
+
+def _spikes(channel: Channel) -> NDArray[np.bool_]:
+    """Readings far from their neighbours; slow motion passes unnoticed, and so do kinks of it and gaps."""
+    x = channel.value_m
+    found = np.zeros(len(x), dtype=bool)
+    if len(x) < _READINGS_MIN:
+        return found
+    weights, widest_s = _cubic(channel.time_s)
+    even = widest_s < _GAP * float(np.median(np.diff(channel.time_s)))
+    # What a kink in the motion (a slip that begins or ends) or a converter's step may look like.
+    coarse = float(np.quantile(np.abs(np.diff(x, 2)), 0.9)) + 3.0 * quantisation_m(x)
+    kink = coarse + _KINK_M_PER_S2 * np.where(even, widest_s, 0.0) ** 2
+    off = np.where(even, x - _median_of_five(x), 0.0)
+    found |= np.abs(off) > _WIDE * (float(np.quantile(np.abs(off), 0.97)) + kink)
+    smooth = np.where(found, np.interp(channel.time_s, channel.time_s[~found], x[~found]), x)
+    for _ in range(_PASSES):
+        off = _off_cubic(smooth, weights)
+        limit = _SPIKE_SIGMAS * 1.4826 * float(np.median(np.abs(off[even]))) + kink
+        largest = np.abs(off)
+        for shift in (-2, -1, 1, 2):
+            largest = np.maximum(largest, np.abs(np.roll(off, shift)))
+        spikes = (np.abs(off) > limit) & (np.abs(off) >= largest) & even
+        if not spikes.any():
+            break
+        smooth[spikes] -= off[spikes]
+        found |= spikes
+    if found.mean() > _SPIKE_SHARE_MAX:
+        found[:] = False
+    return found
+
+
+def _median_of_five(x: Floats) -> Floats:
+    padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
+
+
+def _cubic(time_s: Floats) -> tuple[Floats, Floats]:
+    """Weights (4, n) of four neighbours in the cubic through them, and the widest interval among them (s)."""
+    widest_s = np.full(len(time_s), np.inf)
+    weights = np.zeros((4, len(time_s)))
+    windows = np.lib.stride_tricks.sliding_window_view(time_s, 5)
+    widest_s[2:-2] = np.diff(windows, axis=1).max(axis=1)
+    away = windows[:, (0, 1, 3, 4)] - windows[:, 2:3]
+    for j in range(4):
+        others = np.delete(away, j, axis=1)
+        weights[j, 2:-2] = np.prod(others / (others - away[:, j : j + 1]), axis=1)
+    return weights, widest_s
+
+
+def _off_cubic(x: Floats, weights: Floats) -> Floats:
+    """Reading minus the cubic through its four neighbours, in the scale of even times; zero at the ends."""
+    off = np.zeros_like(x)
+    curve = sum(w[2:-2] * y for w, y in zip(weights, (x[:-4], x[1:-3], x[3:-1], x[4:]), strict=True))
+    off[2:-2] = (x[2:-2] - curve) * np.sqrt(_EVEN / (1.0 + np.sum(weights[:, 2:-2] ** 2, axis=0)))
+    return off
+
+
+NOISE_FLOOR_M = 1e-9
+"""Noise below this is not believed: the readings are computed, not measured."""
+_POOLED_READINGS_MIN = 30
+_DITHER = 0.4
+"""Noise above this share of the converter's step makes rounding errors independent."""
+
+
+def detrended_noise(channel: Channel, block_s: float) -> float:
+    """Standard deviation of readings at rest about straight lines over blocks: drift does not count."""
+    if len(channel) < 6:
+        return 0.0
+    edges = np.arange(channel.time_s[0], channel.time_s[-1], block_s)
+    squares, freedom = 0.0, 0
+    for part in np.split(np.arange(len(channel)), np.searchsorted(channel.time_s, edges[1:])):
+        if len(part) >= 6:
+            t, x = channel.time_s[part] - channel.time_s[part[0]], channel.value_m[part]
+            residual = x - np.polyval(np.polyfit(t, x, 1), t)
+            squares, freedom = squares + float(residual @ residual), freedom + len(part) - 2
+    return float(np.sqrt(squares / freedom)) if freedom else 0.0
+
+
+def third_difference_noise(channel: Channel) -> float:
+    """Noise from third differences over all of the readings: slip and swing are smooth."""
+    third = np.diff(channel.value_m, 3)
+    return float(np.median(np.abs(third))) / 0.6745 / float(np.sqrt(20.0))
+
+
+def pool_noise(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int]:
+    """Common standard deviation of several stretches; not of those that are noisier than the quietest.
+
+    That is by a fifth at least, and by more than the number of readings lets it seem.
+    """
+    used = [(noise, count) for noise, count in found if count >= _POOLED_READINGS_MIN]
+    if not used:
+        return otherwise, _POOLED_READINGS_MIN
+    least, fewest = min(used)
+    chance = [float(np.exp(5.0 * np.sqrt(0.5 / fewest + 0.5 / count))) for _, count in used]
+    limits = [max(1.2, by_chance) * least + NOISE_FLOOR_M for by_chance in chance]
+    used = [pair for pair, limit in zip(used, limits, strict=True) if pair[0] <= limit]
+    total = sum(count for _, count in used)
+    return float(np.sqrt(sum(noise**2 * count for noise, count in used) / total)), total
+
+
+def noise_with_floor(noise_m: float, step_m: float) -> float:
+    """Return `noise_m`, or that of rounding to steps of `step_m` where this is larger."""
+    return max(noise_m, step_m / float(np.sqrt(12.0)), NOISE_FLOOR_M)
+
+
+def merge_repeated_readings(channel: Channel, noise_m: float, step_m: float) -> Channel:
+    """Readings of a converter coarser than the noise with each run of equal ones as a single reading.
+
+    A repeated reading repeats its rounding error, so it says nothing new; counted each time, a plate at
+    rest would outvote its motion.
+    """
+    if noise_m > _DITHER * step_m or step_m < NOISE_FLOOR_M:
+        return channel
+    bounds = np.concatenate(([0], np.flatnonzero(np.diff(channel.value_m)) + 1, [len(channel)]))
+    times = 0.5 * (channel.time_s[bounds[:-1]] + channel.time_s[bounds[1:] - 1])
+    return Channel(times, channel.value_m[bounds[:-1]])
+
+
+_DRIFT_SIGMAS = 6.0
+"""So far from none the drift of all readings must be, ..."""
+_STEADY_SIGMAS = 3.5
+"""... and so far that of the later half. It is steady where its parts differ by less."""
+_LINE_READINGS = 10
+
+
+def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | None:
+    """Steady drift of a gauge (m/s): its slope after slip, where that stands out; 0 where it does not.
+
+    None where it drifts, but neither alike in both halves of `rest` nor as before the release: it has
+    not one drift then. A late slip too small to be seen moves the first half only, and is no drift.
+    """
+    whole, half = _line(rest, noise_m), _line(_later_half(rest), noise_m)
+    if abs(whole[0]) < _DRIFT_SIGMAS * whole[1] or abs(half[0]) < _STEADY_SIGMAS * half[1]:
+        return 0.0
+    others = [half] if held is None or len(held) < _LINE_READINGS else [half, _line(held, noise_m)]
+    steady = all(abs(whole[0] - slope) < _STEADY_SIGMAS * deviation for slope, deviation in others)
+    return whole[0] if steady else None
+
+
+def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
+    """Warning of the drift of gauge 1 or 2; None as drift means that it is not steady."""
+    if drift_m_per_s is None:
+        text = message(
+            "gauge {gauge} drifts or jumps after slip, not steadily: f_d may be biased. Let the"
+            " amplifier warm up.",
+            gauge=gauge,
+        )
+    else:
+        moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
+        text = message(
+            "gauge {gauge} drifts by {drift_m_per_s}/s, {moved_m} in this record: the drift is taken"
+            " off. Let the amplifier warm up.",
+            gauge=gauge,
+            drift_m_per_s=format_length(drift_m_per_s),
+            moved_m=format_length(moved_m),
+        )
+    return ResultWarning(f"gauge-{gauge}-drifts", text)
+
+
+def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:
+    """Readings without a drift that is zero at `zero_s`."""
+    return Channel(channel.time_s, channel.value_m - drift_m_per_s * (channel.time_s - zero_s))
+
+
+def _later_half(channel: Channel) -> Channel:
+    return channel.between(0.5 * float(channel.time_s[0] + channel.time_s[-1]), np.inf)
+
+
+def _line(channel: Channel, noise_m: float) -> tuple[float, float]:
+    """Slope of readings in time and its standard uncertainty from their scatter, `noise_m` at least."""
+    t = channel.time_s - channel.time_s.mean()
+    slope, level = np.polyfit(t, channel.value_m, 1)
+    scatter = max(noise_m, float(np.std(channel.value_m - slope * t - level)))
+    return float(slope), scatter / float(np.sqrt(t @ t))
+
+
+MAINS_HZ = (50.0, 60.0)
+_BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
+_HUM_BLOCK_S = 0.4
+"""Whole cycles of 50, 60 and of all the frequencies beside them."""
+_BLOCKS = 25
+_REMAINING_POWER = (1.0 - np.sinc(np.array([*MAINS_HZ, *_BESIDE_HZ]) / MAINS_HZ[0])) ** 2
+"""What taking off means over a cycle, twice, leaves of each frequency."""
+_BLOCK_READINGS_MIN = 20
+_HUM_RATIO_MIN = 8.0
+"""Mean power of the mains over that beside them."""
+_NOTHING_M = 1e-7
+_DISTURBS = 0.002
+"""Hum of less than this share of the widest swing does not disturb the search for the release."""
+
+
+def detect_hum(channel: Channel) -> tuple[float, float] | None:
+    """Frequency (Hz) and amplitude (m) of the mains in the readings; None where they do not stand out."""
+    powers = _powers(channel)
+    if powers is None:
+        return None
+    beside = max(float(np.median(powers[len(MAINS_HZ) :])), _NOTHING_M**2)
+    strongest = int(np.argmax(powers[: len(MAINS_HZ)]))
+    if powers[strongest] <= _HUM_RATIO_MIN * beside:
+        return None
+    return MAINS_HZ[strongest], float(np.sqrt(powers[strongest]))
+
+
+def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
+    """Means over a cycle of both mains, where `hum` is wide enough to pass for motion; for finding things."""
+    if hum is None or hum[1] < _DISTURBS * float(np.ptp(channel.value_m)):
+        return channel
+    for frequency in MAINS_HZ:
+        channel = Channel(channel.time_s, _means(channel, 1.0 / frequency))
+    return channel
+
+
+def hum_warning(gauge: int, hum: tuple[float, float]) -> ResultWarning:
+    """Warning of mains hum, given frequency (Hz) and amplitude (m)."""
+    text = message(
+        "gauge {gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
+        " of the amplifier.",
+        gauge=gauge,
+        hum=hum[0],
+        hum_2=format_length(hum[1]),
+    )
+    return ResultWarning("mains-hum", text)
+
+
+def _powers(channel: Channel) -> Floats | None:
+    """Squared amplitudes at the mains and beside them, typical of blocks of whole cycles; None for few."""
+    still = Channel(channel.time_s, channel.value_m - _means(channel, 1.0 / MAINS_HZ[0]))
+    still = Channel(still.time_s, still.value_m - _means(still, 1.0 / MAINS_HZ[0]))
+    starts = np.arange(channel.time_s[0], channel.time_s[-1] - _HUM_BLOCK_S, _HUM_BLOCK_S)
+    chosen = starts[:: max(1, len(starts) // _BLOCKS)]
+    found = [_amplitudes(still.between(start, start + _HUM_BLOCK_S)) for start in chosen]
+    whole = [amplitudes for amplitudes in found if amplitudes is not None]
+    return np.median(np.square(whole), axis=0) if len(whole) > 1 else None
+
+
+def _amplitudes(block: Channel) -> Floats | None:
+    """Amplitudes at all frequencies; None for a block with a gap."""
+    steps = np.diff(block.time_s)
+    if len(block) < _BLOCK_READINGS_MIN or steps.max() > 0.1 * _HUM_BLOCK_S:
+        return None
+    turns = np.exp(2j * np.pi * np.outer((*MAINS_HZ, *_BESIDE_HZ), block.time_s))
+    return np.asarray(2.0 / len(block) * np.abs(turns @ block.value_m)) / _REMAINING_POWER
+
+
+def _means(channel: Channel, window_s: float) -> Floats:
+    """Mean of the readings within half of `window_s` of each."""
+    t, x = channel.time_s, channel.value_m
+    half_s = 0.5 * window_s * (1.0 + 1e-6)  # even windows, whatever rounding does to times
+    first, last = np.searchsorted(t, t - half_s), np.searchsorted(t, t + half_s, "right")
+    sums = np.concatenate(([0.0], np.cumsum(x - x.mean())))
+    return np.asarray((sums[last] - sums[first]) / (last - first) + x.mean())

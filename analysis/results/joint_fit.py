@@ -1,22 +1,157 @@
-"""The law that is chosen for a record, and the uncertainty of its parameters with every source."""
+"""The joint fit of a record: choice of the law, its verdict and uncertainty, curves, and decay constants."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import nonlinearity_slope_error, range_m
-from analysis.fitting.problem import FitProblem
-from analysis.fitting.search import Fit
-from analysis.identification import ModelSelection
+from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2, project_to_bounds
+from analysis.fitting.search import Fit, nonlinearity_slope_error, range_m
+from analysis.formatting import format_length
+from analysis.identification import Curves, FittedModel, ModelSelection
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
+from analysis.preparation.channels import NOISE_FLOOR_M
 from analysis.preparation.free_decay import FreeDecay
-from analysis.preparation.plausibility import check_friction
-from analysis.quantities import BudgetSource
-from analysis.record import Record
-from analysis.results.verdict import assess_model, identifiable_fits
-from analysis.uncertainty import ParameterUncertainty, levelling_shift, propagate_with_model_choice
+from analysis.preparation.oscillation import DampedCosine, check_friction, damped_cosine, envelope_curvature
+from analysis.quantities import BudgetSource, ResultWarning, Source
+from analysis.record import Record, RecordError
+from analysis.uncertainty import (
+    ParameterUncertainty,
+    UncertaintyBudget,
+    levelling_shift,
+    noise_variance_factor,
+    numerical_gradient,
+    propagate_with_model_choice,
+)
+from messages.message import message
+
+_BAND = 3.2905
+"""99.9 % of a normal distribution lie within this many standard deviations."""
+_BEND_SIGMAS = 5.0
+_NEGLIGIBLE = 0.25
+"""Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
+
+
+def identifiable_fits(fits: list[Fit]) -> list[Fit]:
+    """Fits of those laws whose tilt, if they have one, the record tells from f_d.
+
+    Raises RecordError if there is none.
+    """
+    candidates = [fit for fit in fits if not fit.law.has_tilt or fit.determines(Parameter.TILT)]
+    if not candidates:
+        raise RecordError(
+            "{law} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            " friction_dynamic act alike. Choose a model without tilt.",
+            law=fits[0].law.name,
+        )
+    return candidates
+
+
+def assess_model(
+    problem: FitProblem, chosen: Fit, fits: list[Fit], noise_readings: tuple[int, int], period_s: float
+) -> ModelSelection:
+    """Judge the chosen law by size and colour of its residuals.
+
+    `noise_readings` is the number of readings from which the noise of each gauge was measured.
+    """
+    adequate = True
+    residuals = (chosen.table_residual_m, chosen.relative_residual_m)
+    times = (
+        problem.table.time_s,
+        problem.table.time_s if problem.relative is None else problem.relative.time_s,
+    )
+    for residual, time, noise, readings in zip(
+        residuals, times, problem.noise_m, noise_readings, strict=True
+    ):
+        if len(residual):
+            adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
+    tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    count = np.array([len(residual) for residual in residuals])
+    noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
+    return ModelSelection(chosen.law.name, bool(adequate), chosen.rms_m, noise, tried)
+
+
+def inadequate_warning(judged: ModelSelection) -> ResultWarning:
+    """What a law that does not explain the record leaves."""
+    text = message(
+        "the law {name} leaves {residual_rms_m} of residual for {noise_rms_m} of noise, or a pattern"
+        " in it: f_d may be biased.",
+        name=judged.name,
+        residual_rms_m=format_length(judged.residual_rms_m),
+        noise_rms_m=format_length(judged.noise_rms_m),
+    )
+    return ResultWarning("model-inadequate", text)
+
+
+def identifiability_warnings(
+    chosen: Fit, uncertainty: ParameterUncertainty, *, slip_ended: bool
+) -> list[ResultWarning]:
+    """Warn of what the record does not determine about the chosen law and its motion."""
+    warnings = []
+    if not slip_ended:
+        text = message(
+            "by the fitted motion the plate slips at the end of the record or again after it: u_s"
+            " and the end of slip are not known. Record until the plate sticks."
+        )
+        warnings.append(ResultWarning("slip-not-ended", text))
+    if not chosen.determines(Parameter.FRICTION_DYNAMIC):
+        text = message("f_d does not change the fitted motion, so that it has no value: no slip was fitted.")
+        warnings.append(ResultWarning("friction-not-identified", text))
+    if BudgetSource.LEVELLING in uncertainty.shifts:
+        text = message(
+            "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
+            " mrad, which its uncertainty includes."
+        )
+        warnings.append(ResultWarning("tilt-not-identified", text))
+    if chosen.law.has_static_friction and not chosen.determines(Parameter.FRICTION_STATIC):
+        text = message("no stick ends in a slip: f_s has bounds, but no value.")
+        warnings.append(ResultWarning("static-not-identified", text))
+    return warnings
+
+
+def tail_warnings(decay: FreeDecay) -> list[ResultWarning]:
+    """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
+    tail = decay.tail
+    if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
+        return []
+    bend = envelope_curvature(decay.table.between(tail.start_s, np.inf), tail)
+    if abs(bend) < _BEND_SIGMAS:
+        return []
+    cause = (
+        message("dry friction in the stand") if bend < 0.0 else message("damping that grows with the swing")
+    )
+    text = message(
+        "the stick tail does not decay exponentially ({bend:.0f} standard deviations), as from"
+        " {cause}: n1 is a mean. Identify a run of the bare table.",
+        bend=abs(bend),
+        cause=cause,
+    )
+    return [ResultWarning("tail-not-exponential", text)]
+
+
+def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:
+    """Tell whether the mean square is within the band that both samples' sizes allow."""
+    ratio = float(np.mean(residual**2)) / noise_m**2
+    spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
+    return ratio <= float(np.exp(_BAND * spread))
+
+
+def _white(residual: Floats, time_s: Floats, period_s: float) -> bool:
+    """Tell whether means over eighths of a period scatter like those of white noise of the same size."""
+    edges = np.arange(time_s[0], time_s[-1], period_s / 8.0)
+    bounds = np.concatenate(([0], np.searchsorted(time_s, edges[1:]), [len(residual)]))
+    counts = np.diff(bounds)
+    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
+    used = counts > 0
+    square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
+    scatter = float(np.sum(sums[used] ** 2 / counts[used])) / square
+    # Chi-square stays below this limit in 99.95 % (Wilson and Hilferty).
+    freedom = int(used.sum())
+    small = 2.0 / (9.0 * freedom)
+    return scatter <= float(freedom * (1.0 - small + _BAND * np.sqrt(small)) ** 3)
+
 
 _TIME_POWERS = {
     Parameter.FRICTION_DYNAMIC: -2.0,
@@ -110,3 +245,184 @@ def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
     for place, power in powers.items():
         column[place] = power * parameters[place]
     return column
+
+
+PARAMETER_NAMES = {
+    Parameter.FRICTION_DYNAMIC: "friction_dynamic",
+    Parameter.FRICTION_STATIC: "friction_static",
+    Parameter.STIFFNESS: "stiffness_n_per_m",
+    Parameter.DAMPING: "damping_coefficient_kg_per_s",
+    Parameter.PULLBACK: "pullback_m",
+    Parameter.TILT: "tilt_rad",
+    Parameter.TABLE_MASS: "table_mass_kg",
+    Parameter.PLATE_MASS: "plate_mass_kg",
+    Parameter.GRAVITY: "gravity_m_per_s2",
+}
+SIGNED_PARAMETERS = (Parameter.PULLBACK, Parameter.TILT)
+
+
+def named_parameters(parameters: Floats, decay: FreeDecay) -> dict[str, float]:
+    """Parameters of the motion by name, in the frame of the record; `release_s` in the record's time."""
+    named = {
+        name: float(parameters[place]) * (decay.sign if place in SIGNED_PARAMETERS else 1)
+        for place, name in PARAMETER_NAMES.items()
+    }
+    return {**named, "release_s": decay.channels.to_record_time(float(parameters[Parameter.RELEASE]))}
+
+
+def fitted_curves(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Callable[[Floats], Curves]:
+    """What both gauges should read at record times; `delays_s` are the gauges' known delays."""
+
+    def curves(time_s: Floats) -> Curves:
+        true_s = decay.channels.from_record_time(np.array(time_s, dtype=np.float64))
+        since_s = true_s - decay.release.time_s
+        first = predict_gauge_1(fit.parameters, true_s - delays_s[0], fit.law)
+        table = decay.sign * (first + decay.table_drift_m_per_s * (since_s - delays_s[0]))
+        if decay.relative is None:
+            return Curves(table, None)
+        second = predict_gauge_2(fit.parameters, true_s - delays_s[1], fit.law, decay.gauge_2_absolute)
+        drifted = second + decay.drift_m_per_s * (since_s - delays_s[1])
+        return Curves(table, decay.relative_sign * drifted)
+
+    return curves
+
+
+def friction_objective(problem: FitProblem, fit: Fit) -> Callable[[Floats], Floats]:
+    """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted."""
+
+    def objective(friction_dynamic: Floats) -> Floats:
+        costs = []
+        for friction in np.asarray(friction_dynamic, dtype=np.float64):
+            first, second = problem.residuals(_with_friction(fit, float(friction)), fit.law)
+            costs.append(first @ first / problem.noise_m[0] ** 2 + second @ second / problem.noise_m[1] ** 2)
+        return np.array(costs)
+
+    return objective
+
+
+def friction_curves(
+    fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]
+) -> Callable[[float, Floats], Curves]:
+    """What both gauges would read with another f_d, f_s in the fitted ratio to it and all else as fitted."""
+
+    def curves(friction_dynamic: float, time_s: Floats) -> Curves:
+        moved = replace(fit, parameters=_with_friction(fit, friction_dynamic))
+        return fitted_curves(moved, decay, delays_s)(time_s)
+
+    return curves
+
+
+def _with_friction(fit: Fit, friction_dynamic: float) -> Floats:
+    ratio = fit.value(Parameter.FRICTION_STATIC) / fit.value(Parameter.FRICTION_DYNAMIC)
+    point = fit.parameters.copy()
+    point[Parameter.FRICTION_DYNAMIC], point[Parameter.FRICTION_STATIC] = (
+        friction_dynamic,
+        ratio * friction_dynamic,
+    )
+    return project_to_bounds(point, fit.law)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DecayConstants:
+    """Period, n1 and masses (T, n1, m1, m2) with their linearised distribution."""
+
+    point: Floats
+    uncertainty: ParameterUncertainty
+
+
+def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
+    """Period and n1 of the stick tail. The decay must have one."""
+    tail = decay.tail
+    if tail is None:
+        raise ValueError("no stick tail was fitted: take joint_constants")
+    point = np.array(
+        [tail.period_s, tail.damping_per_s, record.masses.table_mass_kg, record.masses.plate_mass_kg]
+    )
+    times = np.linspace(tail.start_s, tail.end_s, len(tail.residual_m))
+    unit = tail.residual_m / max(tail.rms_m, 1e-300)
+    by_shape = np.array([[0.0, -(tail.period_s**2) / (2.0 * np.pi)], [1.0, 0.0]])
+    noise = np.zeros((4, 4))
+    noise[:2, :2] = (
+        noise_variance_factor(unit, times, decay.period_s / 4.0)
+        * by_shape
+        @ tail.covariance[:2, :2]
+        @ by_shape.T
+    )
+    columns: dict[Source, Floats] = {
+        BudgetSource.TABLE_MASS: np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
+        BudgetSource.PLATE_MASS: np.array([0.0, 0.0, 0.0, record.masses.plate_mass_uncertainty_kg]),
+        BudgetSource.TIME_BASE: record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
+        BudgetSource.GAUGE_1_NONLINEARITY: np.append(
+            by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)
+        ),
+    }
+    return DecayConstants(point, ParameterUncertainty(columns, noise))
+
+
+def _shift_by_bend(record: Record, decay: FreeDecay, tail: DampedCosine) -> Floats:
+    """Shift (2,) of n1 and w by one standard uncertainty of a bent gauge: large swings read other than small.
+
+    As for one mass, the deviation from the calibration line is odd and vanishes at both ends of the range in
+    use (T3 of Chebyshev).
+    """
+    tau_s = np.linspace(0.0, tail.end_s - tail.start_s, len(tail.residual_m))
+    curve, slopes = damped_cosine(tail.parameters, tau_s)
+    share = (curve - tail.offset_m) / max(0.5 * float(np.ptp(decay.table.value_m)), 1e-300)
+    bend = record.table_gauge.nonlinearity_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+    return np.asarray(np.linalg.solve(slopes @ slopes.T, slopes @ bend)[:2])
+
+
+def constants_from_joint_fit(fit: Fit, fitted: ParameterUncertainty) -> DecayConstants:
+    """Period and n1 from the joint fit."""
+    slopes = np.stack([numerical_gradient(part, fit.parameters) for part in _CONSTANTS])
+    columns = {source: slopes @ column for source, column in fitted.shifts.items()}
+    point = np.array([part(fit.parameters) for part in _CONSTANTS])
+    return DecayConstants(point, ParameterUncertainty(columns, slopes @ fitted.noise_covariance @ slopes.T))
+
+
+def period_and_damping(parameters: Floats) -> tuple[float, float]:
+    """Period (s) and n1 (1/s) of fitted parameters (16,)."""
+    return _period(parameters), _n1(parameters)
+
+
+def add_constants(constants: DecayConstants, budget: UncertaintyBudget) -> None:
+    """Add period, damping and stiffness to the budget."""
+    for name, unit, function in _DECAY_QUANTITIES:
+        weights = numerical_gradient(function, constants.point)
+        budget.add(name, function(constants.point), unit, constants.uncertainty.contributions(weights))
+
+
+def _mass(p: Floats) -> float:
+    return float(p[Parameter.TABLE_MASS] + p[Parameter.PLATE_MASS])
+
+
+def _n1(p: Floats) -> float:
+    return float(p[Parameter.DAMPING]) / (2.0 * _mass(p))
+
+
+def _period(p: Floats) -> float:
+    return float(2.0 * np.pi / np.sqrt(p[Parameter.STIFFNESS] / _mass(p) - _n1(p) ** 2))
+
+
+_CONSTANTS: tuple[Callable[[Floats], float], ...] = (
+    _period,
+    _n1,
+    lambda p: float(p[Parameter.TABLE_MASS]),
+    lambda p: float(p[Parameter.PLATE_MASS]),
+)
+
+
+def _k1(p: Floats) -> float:
+    return float(np.hypot(2.0 * np.pi / p[0], p[1]))
+
+
+_DECAY_QUANTITIES: tuple[tuple[str, str, Callable[[Floats], float]], ...] = (
+    ("period_s", "s", lambda p: float(p[0])),
+    ("log_decrement", "1", lambda p: float(p[0] * p[1])),
+    ("damping_n1_per_s", "1/s", lambda p: float(p[1])),
+    ("damping_n2_per_s", "1/s", lambda p: float(p[1] * (p[2] + p[3]) / p[2])),
+    ("damping_coefficient_kg_per_s", "kg/s", lambda p: float(2.0 * p[1] * (p[2] + p[3]))),
+    ("frequency_k1_rad_per_s", "rad/s", _k1),
+    ("frequency_k2_rad_per_s", "rad/s", lambda p: _k1(p) * float(np.sqrt((p[2] + p[3]) / p[2]))),
+    ("stiffness_n_per_m", "N/m", lambda p: _k1(p) ** 2 * float(p[2] + p[3])),
+)

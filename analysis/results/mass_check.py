@@ -10,10 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.initial_guess import build_problem, initial_guess
-from analysis.fitting.least_squares import covariance
-from analysis.fitting.problem import FitProblem
-from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.fitting.problem import FitProblem, covariance
+from analysis.fitting.search import Fit, Search, build_problem, fit_at_minimum, initial_guess
 from analysis.formatting import format_number
 from analysis.laws.catalogue import COMPARED_LAWS, WIDEST_LAW
 from analysis.laws.parameters import Parameter

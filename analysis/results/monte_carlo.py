@@ -13,16 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.damped_cosine import refit_damped_cosine
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
 from analysis.identification import MonteCarlo
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
+from analysis.preparation.oscillation import refit_damped_cosine
 from analysis.quantities import Quantity
 from analysis.record import StandMasses
-from analysis.results.decay_constants import DecayConstants, period_and_damping
-from analysis.results.joint_fit import JointFit
+from analysis.results.joint_fit import DecayConstants, JointFit, period_and_damping
 from analysis.uncertainty import ParameterUncertainty
 
 LINEAR_DRAWS = 100_000

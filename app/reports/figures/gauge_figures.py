@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from analysis.calibration.calibrate import Calibration
 from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.gauge_health import GaugeHealth
-from analysis.preparation.noise import MAINS_HZ
+from analysis.preparation.channels import MAINS_HZ
 from app.reports.figures.style import DASHED, MUTED, PLATE, SIMULATION, TABLE, print_style, save_figure
 
 _BRANCHES = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))

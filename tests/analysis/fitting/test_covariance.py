@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, simulate_record
 
-from analysis.fitting.least_squares import covariance
+from analysis.fitting.problem import covariance
 from analysis.identify import identify
 
 

@@ -7,15 +7,20 @@ import pytest
 from scipy.optimize import least_squares
 from synthetic import Truth, simulate_readings, simulate_record
 
-from analysis.fitting.initial_guess import build_problem, initial_guess
-from analysis.fitting.least_squares import QuadraticModel, covariance, levenberg_marquardt_step, minimise
-from analysis.fitting.plate_path import estimate_from_plate_path
-from analysis.fitting.problem import predict_gauge_1, predict_gauge_2, project_to_bounds
+from analysis.fitting.problem import (
+    QuadraticModel,
+    covariance,
+    levenberg_marquardt_step,
+    minimise,
+    predict_gauge_1,
+    predict_gauge_2,
+    project_to_bounds,
+)
+from analysis.fitting.search import build_problem, estimate_from_plate_path, initial_guess
 from analysis.laws.catalogue import LAWS, WIDEST_LAW, default_point
 from analysis.laws.coulomb import COULOMB
 from analysis.laws.parameters import Parameter
-from analysis.preparation.channels import Channel, read_channels
-from analysis.preparation.cleaning import remove_invalid_readings
+from analysis.preparation.channels import Channel, read_channels, remove_invalid_readings
 from analysis.preparation.free_decay import prepare
 from analysis.record import GaugeUncertainty, Record, StandMasses
 from analysis.uncertainty import noise_variance_factor

@@ -8,14 +8,13 @@ from synthetic import Truth, simulate_record
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled_part
 from analysis.identify import identify
-from analysis.laws.law import FrictionLaw
+from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import (
     MOTION_PARAMETER_COUNT,
     SHARED_PARAMETER_COUNT,
     OwnParameter,
     Parameter,
 )
-from analysis.laws.solvers import IntegratedSolver
 from analysis.motion.events import FRICTION_DYNAMIC
 
 SLOPE_S_PER_M = 0.2

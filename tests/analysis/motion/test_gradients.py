@@ -14,8 +14,7 @@ from analysis.motion.events import (
     TILT,
     integrate_events,
 )
-from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.sampling import sample
+from analysis.motion.sampling import sample, sample_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 
 STAND = TwoMassParameters(

@@ -9,7 +9,7 @@ from random_stands import KINDS, ordinary
 from analysis.laws import stribeck
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT
 from analysis.motion.events import FRICTION_STATIC, integrate_events
-from analysis.motion.gradients import sample_with_gradient
+from analysis.motion.sampling import sample_with_gradient
 from analysis.motion.two_mass import MotionError, TwoMassParameters
 from benchmarks.reference_solvers import integrate_with_events
 

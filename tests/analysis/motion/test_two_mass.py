@@ -20,7 +20,7 @@ from analysis.motion.events import (
     STIFFNESS,
     integrate_events,
 )
-from analysis.motion.gradients import sample_with_gradient
+from analysis.motion.sampling import sample_with_gradient
 from analysis.motion.two_mass import (
     MotionError,
     MotionSamples,

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, simulate_readings, table_1_by_series
 
-from analysis.preparation.channels import Channel
-from analysis.preparation.cleaning import remove_invalid_readings
+from analysis.preparation.channels import Channel, remove_invalid_readings
 
 SOME = dict(table_1_by_series()[::5])
 

@@ -5,9 +5,8 @@ import pytest
 from synthetic import Truth, simulate_readings
 
 from analysis.identify import identify
-from analysis.preparation.channels import Channel
-from analysis.preparation.noise import detect_hum
-from analysis.preparation.release import find_releases
+from analysis.preparation.channels import Channel, detect_hum
+from analysis.preparation.oscillation import find_releases
 from analysis.record import Record, StandMasses
 
 

@@ -5,7 +5,7 @@ import pytest
 from synthetic import Truth, simulate_readings
 
 from analysis.preparation.channels import Channel
-from analysis.preparation.release import (
+from analysis.preparation.oscillation import (
     find_last_slip,
     find_releases,
     local_slopes,

@@ -6,7 +6,7 @@ from synthetic import Truth, simulate_record
 
 from analysis.identify import identify
 from analysis.preparation.free_decay import prepare
-from analysis.results.slip import find_rest
+from analysis.results.fitted_quantities import find_rest
 
 
 def drawn(seed):

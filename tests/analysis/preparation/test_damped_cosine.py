@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from analysis.damped_cosine import damped_cosine, dominant_period, envelope_curvature, fit_damped_cosine
 from analysis.preparation.channels import Channel
+from analysis.preparation.oscillation import (
+    damped_cosine,
+    dominant_period,
+    envelope_curvature,
+    fit_damped_cosine,
+)
 from analysis.record import RecordError
 
 TRUE = np.array([0.12, 2.0 * np.pi / 0.32, 2e-3, -1e-3, 3e-4])
