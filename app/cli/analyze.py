@@ -1,10 +1,9 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
-import dataclasses
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -15,18 +14,9 @@ from analysis.quantities import BudgetSource, Quantity
 from app.cli import output as out
 from app.cli.analysis_text import print_analysis
 from app.cli.errors import CommandError, error_text
-from app.cli.options import (
-    Force,
-    JobOptions,
-    Json,
-    PlateMass,
-    RunsOrFolders,
-    TableMass,
-    choice,
-    number,
-    with_options,
-)
+from app.cli.option_values import executor_options
 from app.cli.recover import print_interrupted_run
+from app.cli.result_options import AddedMassOptions, AnalyzeOptions
 from app.runs.analysis_json import quantity_document
 from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, AnalysisRequest, analyze_run
 from app.runs.batch.executors import ExecutorOptions, open_executor
@@ -34,79 +24,23 @@ from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs, bu
 from app.runs.listing import resolve_run_files
 from messages.message import message
 
-_MODELS = ("auto", *(law.name for law in LAWS))
+MODELS = ("auto", *(law.name for law in LAWS))
 
 
-@dataclasses.dataclass(frozen=True)
-class AddedMassOptions:
-    """Mass that was added to the table between two free decays."""
-
-    added_mass: Annotated[
-        float | None,
-        number(
-            "--added-mass",
-            above=0.0,
-            help="With --kind one-mass and two runs: mass (kg) that was added to the table in the second.",
-        ),
-    ] = None
-    added_mass_uncertainty: Annotated[
-        float,
-        number("--added-mass-uncertainty", least=0.0, help="Standard uncertainty of --added-mass (kg)."),
-    ] = 0.0
-
-    def check(self, kind: str, runs: int) -> None:
-        """Refuse an added mass that does not fit the other options. Raises CommandError."""
-        if self.added_mass is not None and (kind != "one-mass" or runs != 2):
-            raise CommandError(
-                "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with"
-                " the added mass"
-            )
-        if self.added_mass is None and self.added_mass_uncertainty:
-            raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
-
-
-@with_options
-def analyze(
-    *,
-    runs: RunsOrFolders,
-    model: Annotated[str, choice("--model", *_MODELS, help="Friction law; auto chooses one.")] = "auto",
-    kind: Annotated[
-        str,
-        choice("--kind", "two-mass", "one-mass", help="one-mass for a bare table or any free decay."),
-    ] = "two-mass",
-    table_mass: TableMass = None,
-    plate_mass: PlateMass = None,
-    monte_carlo: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Check the uncertainties by 100,000 draws and N full refits."),
-    ] = None,
-    added: AddedMassOptions,
-    save: Annotated[
-        bool, typer.Option("--save", help="Keep the result in the run, unless the same is kept and stands.")
-    ] = False,
-    anew: Annotated[
-        bool, typer.Option("--anew", help="With --save: analyse and keep it in any case.")
-    ] = False,
-    figure: Annotated[
-        Path | None, typer.Option(help="Draw record against simulation to this PNG, SVG or PDF (one run).")
-    ] = None,
-    jobs: JobOptions,
-    force: Force = False,
-    as_json: Json = False,
-) -> None:
+def analyze(options: AnalyzeOptions) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
-    request = _request(model, kind, table_mass, plate_mass, monte_carlo)
-    executor = jobs.executor()
-    paths = resolve_run_files(runs)
-    added.check(request.kind, len(paths))
-    target = _figure_file(figure, len(paths), force)
-    tasks = [AnalysisTask(str(path), request, save, anew) for path in paths]
+    request = _request(options)
+    executor = executor_options(options.jobs)
+    paths = resolve_run_files(options.runs)
+    options.added.check(request.kind, len(paths))
+    target = _figure_file(options.figure, len(paths), force=options.force)
+    tasks = [AnalysisTask(str(path), request, options.save, options.anew) for path in paths]
     outcomes = _analyze_with_figure(tasks[0], target) if target else _analyze_runs(tasks, executor)
     failed = False
-    with out.print_json_list() if as_json else nullcontext(_discard) as add, closing(outcomes):
-        documents: Iterator[dict[str, Any]] = (_report_run(outcome, as_json) for outcome in outcomes)
-        if added.added_mass is not None:  # computed from both analyses, or not at all
-            documents = _with_table_mass(list(documents), added, as_json)
+    with out.print_json_list() if options.as_json else nullcontext(_discard) as add, closing(outcomes):
+        documents: Iterator[dict[str, Any]] = (_report_run(outcome, options.as_json) for outcome in outcomes)
+        if options.added.added_mass is not None:  # computed from both analyses, or not at all
+            documents = _with_table_mass(list(documents), options.added, options.as_json)
         for document in documents:
             failed |= "error" in document
             add(document)
@@ -128,7 +62,7 @@ def _with_table_mass(
     return iter(documents)
 
 
-def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
+def _figure_file(figure: Path | None, runs: int, *, force: bool) -> Path | None:
     if figure is None:
         return None
     if runs > 1:
@@ -138,22 +72,24 @@ def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
     return out.output_file(figure, force)
 
 
-def _request(
-    model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
-) -> AnalysisRequest:
+def _request(options: AnalyzeOptions) -> AnalysisRequest:
     """Build the request. Raises CommandError for options that do not fit together."""
-    if kind == "one-mass":
-        if model != "auto" or monte_carlo is not None:
+    model, refits = options.model, options.monte_carlo
+    if model not in MODELS:
+        raise CommandError(f"--model {model!r} is not known. Use {', '.join(MODELS[:-1])} or {MODELS[-1]}")
+    table_kg, plate_kg = options.table_mass, options.plate_mass
+    if options.kind == "one-mass":
+        if model != "auto" or refits is not None:
             raise CommandError(
                 "--model and --monte-carlo are for two masses. Leave them out with --kind one-mass"
             )
-        return AnalysisRequest(kind="one-mass", table_mass_kg=table_mass, plate_mass_kg=plate_mass)
-    if monte_carlo is not None and monte_carlo != 0 and not REFITS_MIN <= monte_carlo <= REFITS_MAX:
+        return AnalysisRequest(kind="one-mass", table_mass_kg=table_kg, plate_mass_kg=plate_kg)
+    if refits is not None and refits != 0 and not REFITS_MIN <= refits <= REFITS_MAX:
         raise CommandError(
-            f"--monte-carlo {monte_carlo} refits give no interval. Give {REFITS_MIN} to {REFITS_MAX}, some"
+            f"--monte-carlo {refits} refits give no interval. Give {REFITS_MIN} to {REFITS_MAX}, some"
             " thousand are good, or 0 for the draws alone"
         )
-    return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
+    return AnalysisRequest(model, "two-mass", table_kg, plate_kg, refits)
 
 
 def _analyze_runs(tasks: list[AnalysisTask], options: ExecutorOptions) -> Generator[AnalysisOutcome]:

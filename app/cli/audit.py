@@ -1,28 +1,16 @@
 """`slipstand audit`: whether a published table agrees with itself and with the equations of motion."""
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from analysis.audit import AuditReport
 from analysis.audit import audit as check
 from app.cli import output as out
-from app.cli.options import Json
+from app.cli.result_options import AuditOptions
 from config.files import load_published_rows, load_stand, published_table
 
 
-def audit(
-    table: Annotated[
-        Path | None, typer.Argument(help="CSV with Table 1's columns; the paper's if absent.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Check a published table against itself and the motion.
-
-    Each row is checked for stiffness, damping, velocity, acceleration, breakaway and residual.
-    """
-    rows = load_published_rows(table.expanduser()) if table else list(published_table().values())
+def audit(options: AuditOptions) -> None:
+    """Check a published table against itself and the motion."""
+    given = options.table
+    rows = load_published_rows(given.expanduser()) if given else list(published_table().values())
     stand = load_stand()
     report = check(
         rows,
@@ -30,7 +18,7 @@ def audit(
         pullbacks_m={row.series: stand.series(row.series).pullback_m for row in rows},
         gravity_m_per_s2=stand.gravity_m_per_s2,
     )
-    if as_json:
+    if options.as_json:
         rows_found = [{"series": row.series, "flags": row.flags} for row in report.rows]
         out.print_json({"rows": rows_found, "counts": report.counts})
     else:

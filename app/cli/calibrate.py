@@ -1,10 +1,9 @@
 """`slipstand calibrate`: counts of a gauge against a dial gauge, to a calibration file."""
 
-import dataclasses
 import datetime
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -15,20 +14,11 @@ from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.formatting import format_value
 from app.acquisition.messages import PortSettings
 from app.cli import output as out
-from app.cli.calibration_check import check
 from app.cli.calibration_live import measure_points
+from app.cli.device_options import CalibrateOptions, CertificateOptions, ReadingOptions
 from app.cli.errors import CommandError
-from app.cli.options import (
-    CalibrationFile,
-    FigureFile,
-    Json,
-    LinkOptions,
-    calibration_file,
-    check_figure_file,
-    choice,
-    number,
-    with_options,
-)
+from app.cli.option_values import calibration_file, check_figure_file, port_settings
+from app.cli.options import LinkOptions
 from app.runs.analysis_json import quantity_document as describe_quantity
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, read_points
 from config.files import activate_calibration, config_directory, load_gauges, save_calibration
@@ -36,132 +26,61 @@ from config.files import activate_calibration, config_directory, load_gauges, sa
 _CHANNELS = {"table": 0, "relative": 1}
 
 
-@dataclasses.dataclass(frozen=True)
-class ReadingOptions:
-    """Where the readings come from: a file, or a device."""
-
-    points: Annotated[
-        Path | None,
-        typer.Option("--points", help="CSV of readings: counts, dial_mm, perhaps direction and round."),
-    ] = None
-    port: Annotated[
-        str | None, typer.Option("--port", help="Serial port or URL, to read the counts live.")
-    ] = None
-    protocol: Annotated[str | None, typer.Option("--protocol", help="Protocol name, with --port.")] = None
-    settle: Annotated[
-        float, number("--settle", above=0.0, help="Seconds over which counts are averaged.")
-    ] = 1.0
-
-    def device(self, link: LinkOptions) -> PortSettings | None:
-        """Return the device to read; None for a file. Raises CommandError unless one of them is given."""
-        if (self.points is None) == (self.port is None):
-            raise CommandError("give the readings with --points FILE, or a device with --port and --protocol")
-        if self.port is None:
-            return None
-        if self.protocol is None:
-            raise CommandError(f"--port {self.port} needs --protocol. See `slipstand device list`")
-        return link.port_settings(self.port, self.protocol)
-
-
-@dataclasses.dataclass(frozen=True)
-class CertificateOptions:
-    """What is stated of dial gauge and calibration."""
-
-    dial_resolution: Annotated[
-        float, number("--dial-resolution", least=0.0, help="Resolution of the dial readings (mm).")
-    ] = 0.01
-    dial_uncertainty: Annotated[
-        float | None,
-        number(
-            "--dial-uncertainty",
-            least=0.0,
-            help="Standard uncertainty of the dial gauge, of its certificate (mm).",
-        ),
-    ] = None
-    reference: Annotated[str | None, typer.Option("--reference", help="Which dial gauge.")] = None
-    certificate: Annotated[str, typer.Option("--certificate", help="Its certificate.")] = ""
-    serial_number: Annotated[str | None, typer.Option("--serial-number", help="Of the gauge calibrated.")] = (
-        None
-    )
-    gauge_range: Annotated[float | None, number("--range", above=0.0, help="Range of the gauge (mm).")] = None
-    by: Annotated[str, typer.Option("--by", help="Who calibrates.")] = ""
-    valid_until: Annotated[
-        datetime.datetime | None,
-        typer.Option("--valid-until", formats=["%Y-%m-%d"], help="Last day on which it holds."),
-    ] = None
-
-    def dial(self) -> DialGauge:
-        """Return the dial gauge."""
-        return DialGauge(self.dial_resolution * 1e-3, _from_mm(self.dial_uncertainty))
-
-    def details(self) -> CalibrationDetails:
-        """Return what is kept beside the calibration. Raises CommandError."""
-        today = datetime.datetime.now().astimezone().date()
-        last_day = self.valid_until.date() if self.valid_until else None
-        if last_day is not None and last_day < today:
-            raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
-        reference = f"dial gauge {self.dial_resolution:g} mm" if self.reference is None else self.reference
-        return CalibrationDetails(
-            today,
-            last_day,
-            reference,
-            self.certificate,
-            self.by,
-            self.serial_number,
-            _from_mm(self.gauge_range),
-        )
-
-
-commands = typer.Typer(invoke_without_command=True, add_completion=False, rich_markup_mode=None)
-commands.command("check")(check)
-
-
-@commands.callback()
-@with_options
-def calibrate(
-    *,
-    context: typer.Context,
-    gauge: Annotated[
-        str | None, choice("--gauge", *_CHANNELS, help="table (gauge 1) or relative (gauge 2).")
-    ] = None,
-    source: ReadingOptions,
-    link: LinkOptions,
-    degree: Annotated[int, typer.Option(help="1 for a line, 2 or 3 for a polynomial.")] = 1,
-    certificate: CertificateOptions,
-    calibration: CalibrationFile = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="A new file; a dated one beside gauges.toml if absent."),
-    ] = None,
-    use: Annotated[bool, typer.Option("--use", help="Make it gauges.toml; the one before is kept.")] = False,
-    figure: FigureFile = None,
-    as_json: Json = False,
-) -> None:
-    """Calibrate a gauge against a dial: live, or from a file.
-
-    Live, the device gives the counts, and the dial is typed in at each step.
-    Take the table up and down in even steps, twice or more. Without --use give the file to `record
-    --calibration`.
-    """
-    if context.invoked_subcommand is not None:
-        return
-    if gauge is None:
+def calibrate(options: CalibrateOptions) -> None:
+    """Calibrate a gauge against a dial: live, or from a file."""
+    if options.gauge is None:
         raise typer.BadParameter("it must be given: table or relative", param_hint="'--gauge'")
-    if degree not in (1, 2, 3):
-        raise CommandError(f"--degree {degree} is not offered. Use 1 for a line, 2 or 3")
-    figure = check_figure_file(figure)
-    device = source.device(link)
-    base = calibration_file(calibration)
-    target = _new_file(output)
-    details = certificate.details()
-    points = _readings(source, device, base, gauge, target)
-    found = find_calibration(points, certificate.dial(), degree)
-    file, kept = _save(gauge, found, details, base, target, use)
+    if options.degree not in (1, 2, 3):
+        raise CommandError(f"--degree {options.degree} is not offered. Use 1 for a line, 2 or 3")
+    figure = check_figure_file(options.figure)
+    device = _device(options.source, options.link)
+    base = calibration_file(options.calibration)
+    target = _new_file(options.output)
+    details = _details(options.certificate)
+    points = _readings(options.source, device, base, options.gauge, target)
+    found = find_calibration(points, _dial(options.certificate), options.degree)
+    file, kept = _save(options.gauge, found, details, base, target, options.use)
     if figure is not None:
         from app.reports.figures.gauge_figures import save_calibration_figure  # loads matplotlib
 
-        save_calibration_figure(figure, found, f"calibration of the {gauge} gauge")
-    print_calibration(gauge, found, file, kept, use=use, as_json=as_json)
+        save_calibration_figure(figure, found, f"calibration of the {options.gauge} gauge")
+    print_calibration(options.gauge, found, file, kept, use=options.use, as_json=options.as_json)
+
+
+def _details(certificate: CertificateOptions) -> CalibrationDetails:
+    """Return what is kept beside the calibration. Raises CommandError."""
+    today = datetime.datetime.now().astimezone().date()
+    last_day = certificate.valid_until.date() if certificate.valid_until else None
+    if last_day is not None and last_day < today:
+        raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
+    reference = certificate.reference
+    if reference is None:
+        reference = f"dial gauge {certificate.dial_resolution:g} mm"
+    return CalibrationDetails(
+        today,
+        last_day,
+        reference,
+        certificate.certificate,
+        certificate.by,
+        certificate.serial_number,
+        _from_mm(certificate.gauge_range),
+    )
+
+
+def _dial(certificate: CertificateOptions) -> DialGauge:
+    """Return the dial gauge."""
+    return DialGauge(certificate.dial_resolution * 1e-3, _from_mm(certificate.dial_uncertainty))
+
+
+def _device(source: ReadingOptions, link: LinkOptions) -> PortSettings | None:
+    """Return the device to read; None for a file. Raises CommandError unless one of them is given."""
+    if (source.points is None) == (source.port is None):
+        raise CommandError("give the readings with --points FILE, or a device with --port and --protocol")
+    if source.port is None:
+        return None
+    if source.protocol is None:
+        raise CommandError(f"--port {source.port} needs --protocol. See `slipstand device list`")
+    return port_settings(link, source.port, source.protocol)
 
 
 def _from_mm(length_mm: float | None) -> float | None:

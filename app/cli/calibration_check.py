@@ -1,9 +1,8 @@
 """`slipstand calibrate check`: a gauge against a known displacement or a shunt, and the verdict kept."""
 
-import dataclasses
 import math
 import sys
-from typing import Annotated, Any, Literal, cast
+from typing import Any, Literal, cast
 
 import typer
 
@@ -15,16 +14,9 @@ from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
 from app.acquisition.run_setup import complete_port_settings
 from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out
+from app.cli.device_options import CheckOptions, StepOptions
 from app.cli.errors import CommandError
-from app.cli.options import (
-    CalibrationFile,
-    DeviceOptions,
-    GaugeName,
-    Json,
-    calibration_file,
-    number,
-    with_options,
-)
+from app.cli.option_values import calibration_file, device_settings
 from config.files import append_check, checks_path, load_checks, load_gauges
 from config.schema import GaugeCheck
 
@@ -32,91 +24,56 @@ GAUGES = ("table", "relative")
 _WINDOWS = 5
 
 
-@dataclasses.dataclass(frozen=True)
-class StepOptions:
-    """The known step that the gauge is checked with."""
-
-    displacement: Annotated[
-        float | None,
-        typer.Option("--displacement", help="How far the gauge is moved, with its sign (mm)."),
-    ] = None
-    shunt: Annotated[
-        float | None, typer.Option("--shunt", help="Instead: what the shunt resistor stands for (mm).")
-    ] = None
-    shunt_counts: Annotated[
-        float | None, typer.Option("--shunt-counts", help="Instead: the shunt's shift in counts.")
-    ] = None
-    uncertainty: Annotated[
-        float | None,
-        number(
-            "--uncertainty",
-            least=0.0,
-            help="Standard uncertainty of what is known (mm, or counts with --shunt-counts).",
-        ),
-    ] = None
-
-    def step(self) -> ReferenceStep:
-        """Return the step in SI units or counts. Raises CommandError."""
-        options = {
-            "--displacement": self.displacement,
-            "--shunt": self.shunt,
-            "--shunt-counts": self.shunt_counts,
-        }
-        given = {name: value for name, value in options.items() if value is not None}
-        if len(given) != 1:
-            raise CommandError(
-                "give one of --displacement, --shunt and --shunt-counts: what the gauge is tried with"
-            )
-        ((name, value),) = given.items()
-        if not math.isfinite(value) or value == 0.0:
-            raise CommandError(f"{name} {value:g} checks nothing. Give a finite number that is not 0")
-        if name == "--shunt-counts":
-            return ReferenceStep(value, self.uncertainty, "count", "shunt")
-        uncertainty_m = None if self.uncertainty is None else self.uncertainty * 1e-3
-        return ReferenceStep(
-            value * 1e-3, uncertainty_m, "m", "displacement" if name == "--displacement" else "shunt"
-        )
-
-
-@with_options
-def check(
-    *,
-    gauge: GaugeName,
-    source: DeviceOptions,
-    step: StepOptions,
-    seconds: Annotated[
-        float, number("--seconds", above=0.0, help="Seconds over which counts are averaged.")
-    ] = 2.0,
-    reference: Annotated[str, typer.Option(help="Which dial gauge, gauge block or resistor.")] = "",
-    by: Annotated[str, typer.Option(help="Who checks.")] = "",
-    calibration: CalibrationFile = None,
-    as_json: Json = False,
-) -> None:
-    """Check a gauge by a known displacement or its shunt.
-
-    Before a test, move it so far, or switch its shunt resistor on.
-    It passes if it is no further off than twice the combined standard uncertainty of calibration,
-    displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
-    """
-    device = source.device()
-    known = step.step()
-    gauges = load_gauges(calibration_file(calibration))
+def check(options: CheckOptions) -> None:
+    """Check a gauge by a known displacement or its shunt."""
+    device = device_settings(options.source)
+    known = _step(options.step)
+    gauges = load_gauges(calibration_file(options.calibration))
     load_checks(checks_path())  # a damaged file is refused before anybody moves the table
-    name = cast(Literal["table", "relative"], gauge)
+    name = cast(Literal["table", "relative"], options.gauge)
     port = complete_port_settings(device, gauges.device)
     with open_stream(port, gauges) as stream, CountAverager(stream, GAUGES.index(name)) as averager:
         title = stream.identity.name or device.protocol
         out.print_status(f"{title}, {stream.rate_hz:g} Hz")
-        rest = _read(averager, seconds, _at_rest(known))
-        moved = _read(averager, seconds, _with_it(known))
+        rest = _read(averager, options.seconds, _at_rest(known))
+        moved = _read(averager, options.seconds, _with_it(known))
     found = check_gauge(rest, moved, getattr(gauges, name), known)
     entry = check_entry(
-        name, getattr(gauges, name), found, known, reference=reference, checked_by=by, device=title
+        name,
+        getattr(gauges, name),
+        found,
+        known,
+        reference=options.reference,
+        checked_by=options.by,
+        device=title,
     )
     out.print_status(f"kept in {append_check(entry)}")
-    _report(found, entry, as_json)
+    _report(found, entry, options.as_json)
     if not found.passed:
         raise typer.Exit(1)
+
+
+def _step(known: StepOptions) -> ReferenceStep:
+    """Return the step in SI units or counts. Raises CommandError."""
+    options = {
+        "--displacement": known.displacement,
+        "--shunt": known.shunt,
+        "--shunt-counts": known.shunt_counts,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    if len(given) != 1:
+        raise CommandError(
+            "give one of --displacement, --shunt and --shunt-counts: what the gauge is tried with"
+        )
+    ((name, value),) = given.items()
+    if not math.isfinite(value) or value == 0.0:
+        raise CommandError(f"{name} {value:g} checks nothing. Give a finite number that is not 0")
+    if name == "--shunt-counts":
+        return ReferenceStep(value, known.uncertainty, "count", "shunt")
+    uncertainty_m = None if known.uncertainty is None else known.uncertainty * 1e-3
+    return ReferenceStep(
+        value * 1e-3, uncertainty_m, "m", "displacement" if name == "--displacement" else "shunt"
+    )
 
 
 def _at_rest(known: ReferenceStep) -> str:

@@ -6,40 +6,45 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from app.cli.options import command_function
 from app.log import start_log
 from app.version import __version__
 
 
 class CommandEntry(NamedTuple):
-    """A command before its module is imported.
-
-    Attributes
-    ----------
-    name : str
-        As on the command line.
-    target : str
-        "module:name" of its function, or of the `typer.Typer` of a group of commands.
-    summary : str
-        First line of the function's docstring, for the list of commands.
-    example : str
-        Shown below the help.
-    """
+    """A command before its modules are imported."""
 
     name: str
+    options: str
+    """Module and class of its options, imported when the command is named: "library_options:Runs"."""
     target: str
+    """Module and function that does the work, imported when the command runs."""
     summary: str
+    """First line of the help, for the list of commands."""
     example: str = ""
+    """Shown below the help."""
+    group: type[TyperGroup] | None = None
+    """Group of the commands below this one."""
 
     def load(self) -> Any:
-        """Import the module, and return the Click command."""
-        module, _, name = self.target.partition(":")
-        target = getattr(import_module(f"app.cli.{module}"), name)
-        if not isinstance(target, typer.Typer):
-            function, target = target, _typer()
-            target.command(self.name, epilog=self.example or None)(function)
-        command = typer.main.get_command(target)
+        """Import the options, and return the Click command."""
+        function = command_function(_load(self.options), self._run)
+        commands = _typer()
+        if self.group:
+            commands.callback(cls=self.group, invoke_without_command=True)(function)
+        else:
+            commands.command(self.name, epilog=self.example or None)(function)
+        command = typer.main.get_command(commands)
         command.name = self.name
         return command
+
+    def _run(self, options: Any) -> None:
+        _load(self.target)(options)
+
+
+def _load(target: str) -> Any:
+    module, _, name = target.partition(":")
+    return getattr(import_module(f"app.cli.{module}"), name)
 
 
 class LazyGroup(TyperGroup):
@@ -62,55 +67,127 @@ class LazyGroup(TyperGroup):
         return name, entry.load() if entry else command, rest
 
 
+class CalibrateGroup(LazyGroup):
+    """Commands of `slipstand calibrate`."""
+
+    entries = (
+        CommandEntry(
+            "check",
+            "device_options:CheckOptions",
+            "calibration_check:check",
+            "Check a gauge by a known displacement or its shunt.",
+        ),
+    )
+
+
 class SlipstandGroup(LazyGroup):
     """Commands of `slipstand`."""
 
     entries = (
-        CommandEntry("demo", "demo:demo", "Record a simulated pullback, and compare it with the truth."),
+        CommandEntry(
+            "demo",
+            "measurement_options:DemoOptions",
+            "demo:demo",
+            "Record a simulated pullback, and compare it with the truth.",
+        ),
         CommandEntry(
             "record",
+            "measurement_options:RecordOptions",
             "record:record",
             "Record a pullback test from a device into a run file.",
             "Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
         ),
         CommandEntry(
-            "analyze", "analyze:analyze", "Identify friction, stiffness and damping of one or more runs."
+            "analyze",
+            "result_options:AnalyzeOptions",
+            "analyze:analyze",
+            "Identify friction, stiffness and damping of one or more runs.",
         ),
         CommandEntry(
             "simulate",
+            "measurement_options:SimulateOptions",
             "simulate:simulate",
             "Simulate one pullback test: numbers, a CSV file or a run.",
             "Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv",
         ),
         CommandEntry(
             "plan",
+            "measurement_options:PlanOptions",
             "plan:plan",
             "Predict what a test will show, before it is made.",
             "Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500",
         ),
         CommandEntry(
             "import",
+            "library_options:ImportOptions",
             "import_record:import_record",
             "Make a run of a CSV, .mat, .xlsx or .parquet file.",
             "Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm --series 1FFM0"
             " -o test.h5",
         ),
-        CommandEntry("export", "export:export", "Write samples and coefficients of runs for other programs."),
-        CommandEntry("table", "table:table", "Pool runs to the paper's Table 1, a row a series."),
-        CommandEntry("figures", "figures:figures", "Draw the paper's figures 2 to 5 from runs, for print."),
-        CommandEntry("report", "report:report", "Write a test report of one run or a campaign, as PDF."),
-        CommandEntry("runs", "runs:runs", "List recorded runs, oldest first."),
         CommandEntry(
-            "recover", "recover:recover", "Rebuild runs that a crash cut short, from their journals."
-        ),
-        CommandEntry("edit", "edit:edit", "Change what is known of runs, kept as history."),
-        CommandEntry("trash", "runs:trash", "Move runs to the trash, and bring them back."),
-        CommandEntry("audit", "audit:audit", "Check a published table against itself and the motion."),
-        CommandEntry(
-            "doctor", "doctor.command:doctor", "Check installation, settings, gauges, ports and clocks."
+            "export",
+            "library_options:ExportOptions",
+            "export:export",
+            "Write samples and coefficients of runs for other programs.",
         ),
         CommandEntry(
-            "calibrate", "calibrate:commands", "Calibrate a gauge against a dial: live, or from a file."
+            "table",
+            "result_options:TableOptions",
+            "table:table",
+            "Pool runs to the paper's Table 1, a row a series.",
+        ),
+        CommandEntry(
+            "figures",
+            "result_options:FiguresOptions",
+            "figures:figures",
+            "Draw the paper's figures 2 to 5 from runs, for print.",
+        ),
+        CommandEntry(
+            "report",
+            "result_options:ReportOptions",
+            "report:report",
+            "Write a test report of one run or a campaign, as PDF.",
+        ),
+        CommandEntry(
+            "runs", "library_options:ListRunsOptions", "runs:runs", "List recorded runs, oldest first."
+        ),
+        CommandEntry(
+            "recover",
+            "library_options:RecoverOptions",
+            "recover:recover",
+            "Rebuild runs that a crash cut short, from their journals.",
+        ),
+        CommandEntry(
+            "edit",
+            "library_options:EditOptions",
+            "edit:edit",
+            "Change what is known of runs, kept as history.",
+        ),
+        CommandEntry(
+            "trash",
+            "library_options:TrashOptions",
+            "runs:trash",
+            "Move runs to the trash, and bring them back.",
+        ),
+        CommandEntry(
+            "audit",
+            "result_options:AuditOptions",
+            "audit:audit",
+            "Check a published table against itself and the motion.",
+        ),
+        CommandEntry(
+            "doctor",
+            "library_options:DoctorOptions",
+            "doctor.command:doctor",
+            "Check installation, settings, gauges, ports and clocks.",
+        ),
+        CommandEntry(
+            "calibrate",
+            "device_options:CalibrateOptions",
+            "calibrate:calibrate",
+            "Calibrate a gauge against a dial: live, or from a file.",
+            group=CalibrateGroup,
         ),
     )
 
@@ -120,14 +197,35 @@ class DeviceGroup(LazyGroup):
 
     entries = (
         CommandEntry(
-            "list", "device:list_devices", "List the protocols, and what each was verified against."
+            "list",
+            "device_options:ListDevicesOptions",
+            "device:list_devices",
+            "List the protocols, and what each was verified against.",
         ),
-        CommandEntry("ports", "device:list_ports", "List the serial ports of this computer."),
-        CommandEntry("probe", "device:probe", "Look at ports: what speaks on them, how to record it."),
         CommandEntry(
-            "simulate", "simulate_device:simulate_device", "Be a simulated stand on a port until interrupted."
+            "ports",
+            "device_options:ListPortsOptions",
+            "device:list_ports",
+            "List the serial ports of this computer.",
         ),
-        CommandEntry("health", "health:health", "Look at both gauges at rest: noise, drift, hum, range."),
+        CommandEntry(
+            "probe",
+            "device_options:ProbeOptions",
+            "device:probe",
+            "Look at ports: what speaks on them, how to record it.",
+        ),
+        CommandEntry(
+            "simulate",
+            "device_options:SimulateDeviceOptions",
+            "simulate_device:simulate_device",
+            "Be a simulated stand on a port until interrupted.",
+        ),
+        CommandEntry(
+            "health",
+            "device_options:HealthOptions",
+            "health:health",
+            "Look at both gauges at rest: noise, drift, hum, range.",
+        ),
     )
 
 

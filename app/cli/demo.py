@@ -3,7 +3,7 @@
 import datetime
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 import typer
@@ -16,7 +16,8 @@ from app.cli import output as out
 from app.cli.analysis_text import print_analysis
 from app.cli.analyze import save_figure
 from app.cli.errors import CommandError
-from app.cli.options import Directory, JobOptions, Json, calibration_file, number, with_options
+from app.cli.measurement_options import DemoOptions
+from app.cli.option_values import calibration_file, executor_options, recordings_folder
 from app.cli.recording import record_with_progress
 from app.runs.analyze import AnalysisRequest, analyze_run
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
@@ -42,45 +43,24 @@ _RECORD_S = 8.0
 """The demo's run ends this long after release."""
 
 
-@with_options
-def demo(
-    *,
-    series: Annotated[
-        str | None, typer.Option("--series", help="Series code; with --campaign several, 1FFM0,1FFM1.")
-    ] = None,
-    friction: Annotated[
-        float | None, number("--friction", above=0.0, help="True f_d; the series' if absent.")
-    ] = None,
-    directory: Directory = None,
-    campaign: Annotated[
-        bool, typer.Option("--campaign", help="All series of Table 1, each some times, not in real time.")
-    ] = False,
-    repeats: Annotated[int, typer.Option(help="With --campaign: tests of each series.")] = 3,
-    scatter: Annotated[
-        float, typer.Option(help="With --campaign: standard deviation of f_d from run to run, as a share.")
-    ] = 0.0,
-    seed: Annotated[int, typer.Option(help="With --campaign: of everything that is drawn.")] = 1,
-    jobs: JobOptions,
-    as_json: Json = False,
-) -> None:
-    """Record a simulated pullback, and compare it with the truth.
-
-    The simulated stand is read over a real serial port; the run is kept, identified and drawn.
-
-    With --campaign the 36 series of Table 1 are simulated, read by gauges that err as they state, and stored
-    as runs; their table is held against the truth.
-    """
-    if campaign:
-        if friction is not None:
+def demo(options: DemoOptions) -> None:
+    """Record a simulated pullback, and compare it with the truth."""
+    if options.campaign:
+        if options.friction is not None:
             raise CommandError("--friction is for one test. In a campaign f_d is that of Table 1")
-        codes = tuple(code.strip() for code in (series or "").split(",") if code.strip())
+        codes = tuple(code.strip() for code in (options.series or "").split(",") if code.strip())
         try:
-            options = CampaignOptions(series=codes, repeats=repeats, friction_scatter=scatter, seed=seed)
+            campaign = CampaignOptions(
+                series=codes,
+                repeats=options.repeats,
+                friction_scatter=options.scatter,
+                seed=options.seed,
+            )
         except ValueError as error:
             raise CommandError(str(error)) from None
-        demo_campaign(options, directory, jobs.executor(), as_json=as_json)
+        demo_campaign(campaign, options.directory, executor_options(options.jobs), as_json=options.as_json)
         return
-    _one_test(series, friction, directory, as_json)
+    _one_test(options.series, options.friction, options.directory, options.as_json)
 
 
 def _one_test(series: str | None, friction: float | None, directory: Path | None, as_json: bool) -> None:
@@ -92,7 +72,7 @@ def _one_test(series: str | None, friction: float | None, directory: Path | None
     with SimulatedStand.start(options) as stand:
         port = PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz)
         run = RunSettings(
-            directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
+            directory=str(recordings_folder(directory)),
             series=options.series,
             duration_s=_RECORD_S,
             operator="demo",

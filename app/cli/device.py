@@ -4,13 +4,11 @@ import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 import config
 from app.cli import output as out
-from app.cli.options import Json
+from app.cli.device_options import ListDevicesOptions, ListPortsOptions, ProbeOptions
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, other_port_users, port_info
 from drivers.port import list_ports as present_ports
@@ -20,14 +18,14 @@ from drivers.registry import DRIVERS
 UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
 
 
-def list_devices(as_json: Json = False) -> None:
+def list_devices(options: ListDevicesOptions) -> None:
     """List the protocols, and what each was verified against."""
     rows = [
         {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,
          "verified": p.verified}
         for p in DRIVERS.values()
     ]  # fmt: skip
-    if as_json:
+    if options.as_json:
         out.print_json(rows)
         return
     out.print_table(
@@ -36,10 +34,10 @@ def list_devices(as_json: Json = False) -> None:
     )
 
 
-def list_ports(as_json: Json = False) -> None:
+def list_ports(options: ListPortsOptions) -> None:
     """List the serial ports of this computer."""
     ports = present_ports()
-    if as_json:
+    if options.as_json:
         out.print_json([asdict(port) for port in ports])
     elif ports:
         rows = [
@@ -56,29 +54,17 @@ def list_ports(as_json: Json = False) -> None:
         out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
 
 
-def probe(
-    ports: Annotated[
-        list[str] | None, typer.Argument(help="Ports or URLs to look at; all serial ports if absent.")
-    ] = None,
-    write: Annotated[
-        bool,
-        typer.Option("--write", help="Ask silent devices who they are. Without it nothing is sent to any."),
-    ] = False,
-    as_json: Json = False,
-) -> None:
-    """Look at ports: what speaks on them, how to record it.
-
-    Also what is plugged in, and which program has it open.
-    """
-    present = _ports(ports)
+def probe(options: ProbeOptions) -> None:
+    """Look at ports: what speaks on them, how to record it."""
+    present = _ports(options.ports)
     reports = []
     for port in present:
-        report = probe_port(port, write, _status_printer(port))
+        report = probe_port(port, options.write, _status_printer(port))
         reports.append(report)
-        if not as_json:
+        if not options.as_json:
             for line in report_lines(report):
                 out.print_line(line)
-    if as_json:
+    if options.as_json:
         out.print_json([port_document(report) for report in reports])
     elif not present:
         out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")

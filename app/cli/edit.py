@@ -2,14 +2,14 @@
 
 import getpass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import PlateMass, Runs, SeriesCode, TableMass, key_values, number
+from app.cli.library_options import EditOptions
+from app.cli.option_values import key_values
 from app.runs.edits import edit_run, series_fields, undo_edit
 from app.runs.metadata import Conditions
 from app.runs.metadata_io import Change
@@ -18,55 +18,34 @@ from config.files import load_gauges
 from config.schema import Gauges
 
 
-def edit(
-    runs: Runs,
-    series: SeriesCode = None,
-    table_mass: TableMass = None,
-    plate_mass: PlateMass = None,
-    pullback: Annotated[float | None, number("--pullback", above=0.0, help="Nominal pullback (m).")] = None,
-    operator: Annotated[str | None, typer.Option(help="Who recorded.")] = None,
-    title: Annotated[str | None, typer.Option(help="Title of the run.")] = None,
-    note: Annotated[str | None, typer.Option(help="A remark.")] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(help="Calibration file; displacements are computed anew from the counts.")
-    ] = None,
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="temperature_c=21.5, plate_id=P1, ...; repeatable."),
-    ] = None,
-    exclude: Annotated[
-        str | None,
-        typer.Option(metavar="REASON", help="The run does not count in tables and reports, and why."),
-    ] = None,
-    include: Annotated[bool, typer.Option("--include", help="A run that was left out counts again.")] = False,
-    author: Annotated[str | None, typer.Option(help="Who edits; you, if absent.")] = None,
-    undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back.")] = False,
-    history: Annotated[bool, typer.Option("--history", help="Show all edits.")] = False,
-) -> None:
-    """Change what is known of runs, kept as history.
-
-    What was measured is never touched, and --undo gives old values back.
-    """
+def edit(options: EditOptions) -> None:
+    """Change what is known of runs, kept as history."""
     given: dict[str, Any] = {
-        "table_mass_kg": table_mass, "plate_mass_kg": plate_mass, "pullback_m": pullback, "series": series,
-        "operator": operator, "title": title, "note": note, "gauges": _gauges(calibration),
-        "excluded": _reason(exclude, include=include),
-    }  # fmt: skip
+        "table_mass_kg": options.table_mass,
+        "plate_mass_kg": options.plate_mass,
+        "pullback_m": options.pullback,
+        "series": options.series,
+        "operator": options.operator,
+        "title": options.title,
+        "note": options.note,
+        "gauges": _gauges(options.calibration),
+        "excluded": _reason(options.exclude, include=options.include),
+    }
     given = {name: value for name, value in given.items() if value is not None}
-    if bool(given or condition) + undo + history != 1:
+    if bool(given or options.condition) + options.undo + options.history != 1:
         raise CommandError("give either new values, --undo or --history. See slipstand edit --help")
-    who = author or getpass.getuser()
-    for path in runs:
+    who = options.author or getpass.getuser()
+    for path in options.runs:
         run = open_run(path.expanduser())
-        if history:
+        if options.history:
             _print_history(run)
             continue
         change = (
             undo_edit(run.path, who)
-            if undo
-            else edit_run(run.path, who, **_fields_of_run(run, given, condition))
+            if options.undo
+            else edit_run(run.path, who, **_fields_of_run(run, given, options.condition))
         )
-        out.print_line(f"{run.path}: {', '.join(change.fields)} {'undone' if undo else 'changed'}")
+        out.print_line(f"{run.path}: {', '.join(change.fields)} {'undone' if options.undo else 'changed'}")
 
 
 def _reason(exclude: str | None, *, include: bool) -> str | None:

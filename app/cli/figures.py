@@ -1,16 +1,15 @@
 """`slipstand figures`: the paper's Figs. 2 to 5 from runs, for print."""
 
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
-import typer
 
 from analysis.campaign.campaign import Campaign
 from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Force, JobOptions, Json, RunsOrFolders, choice, with_options
+from app.cli.option_values import executor_options
+from app.cli.result_options import FiguresOptions
 from app.reports.figures.figure_files import (
     NUMBERS,
     FigureFile,
@@ -18,41 +17,18 @@ from app.reports.figures.figure_files import (
     representative_runs,
     write_figures,
 )
-from app.reports.figures.style import FORMATS
 from app.runs.campaign.collect import CollectedRuns
 
 
-@with_options
-def figures(
-    *,
-    paths: RunsOrFolders,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to, made if absent.")],
-    format_name: Annotated[
-        str, choice("--format", *FORMATS, help="Format of the files; png has 300 dpi.")
-    ] = "png",
-    series: Annotated[
-        list[str] | None,
-        typer.Option(help="Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent."),
-    ] = None,
-    figure: Annotated[
-        list[str] | None, typer.Option(help="Only this figure: 2, 3a, 3b, 4a, 4b, 5a or 5b; repeatable.")
-    ] = None,
-    jobs: JobOptions,
-    force: Force = False,
-    as_json: Json = False,
-) -> None:
-    """Draw the paper's figures 2 to 5 from runs, for print.
-
-    2 is f_s and f_d by contact, 3a to 5b are the motion of a run.
-    Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
-    """
-    numbers, executor = _numbers(figure), jobs.executor()
-    folder = _folder(output, format_name, force)
+def figures(options: FiguresOptions) -> None:
+    """Draw the paper's figures 2 to 5 from runs, for print."""
+    numbers, executor = _numbers(options.figure), executor_options(options.jobs)
+    folder = _folder(options.output, options.format_name, options.force)
     folder.check()
-    gathered, campaign = load_campaign(paths, executor)
-    chosen = _chosen(paths, series or [], gathered, campaign)
+    gathered, campaign = load_campaign(options.paths, executor)
+    chosen = _chosen(options.paths, options.series or [], gathered, campaign)
     written, notes = _write(folder, numbers, chosen, gathered, campaign) if gathered.runs else ([], [])
-    if as_json:
+    if options.as_json:
         failures = msgspec.to_builtins(gathered.failures)
         out.print_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})
     else:

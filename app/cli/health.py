@@ -1,7 +1,7 @@
 """`slipstand device health`: how the gauges do while the stand rests."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -11,47 +11,26 @@ from app.acquisition.messages import PortSettings
 from app.acquisition.run_setup import complete_port_settings
 from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out
-from app.cli.options import (
-    CalibrationFile,
-    DeviceOptions,
-    FigureFile,
-    Json,
-    calibration_file,
-    check_figure_file,
-    number,
-    with_options,
-)
+from app.cli.device_options import HealthOptions
+from app.cli.option_values import calibration_file, check_figure_file, device_settings
 from app.presenters.gauge_health import GAUGE_NAMES, GaugeHealthState, gauge_health_state
 from config.files import load_gauges
 
 
-@with_options
-def health(
-    *,
-    source: DeviceOptions,
-    seconds: Annotated[
-        float, number("--seconds", above=0.0, help="Seconds of watching; the stand rests meanwhile.")
-    ] = 5.0,
-    calibration: CalibrationFile = None,
-    figure: FigureFile = None,
-    as_json: Json = False,
-) -> None:
-    """Look at both gauges at rest: noise, drift, hum, range.
-
-    Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
-    """
-    figure = check_figure_file(figure)
-    title, pair = _watch_gauges(source.device(), calibration_file(calibration), seconds)
+def health(options: HealthOptions) -> None:
+    """Look at both gauges at rest: noise, drift, hum, range."""
+    figure, port = check_figure_file(options.figure), device_settings(options.source)
+    title, pair = _watch_gauges(port, calibration_file(options.calibration), options.seconds)
     measured = [measure_health(gauge) for gauge in pair]
     states = [gauge_health_state(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
     if figure is not None:
         from app.reports.figures.gauge_figures import save_health_figure  # loads matplotlib
 
         save_health_figure(figure, measured, GAUGE_NAMES, title)
-    if as_json:
-        out.print_json(health_document(title, seconds, measured, states))
+    if options.as_json:
+        out.print_json(health_document(title, options.seconds, measured, states))
     else:
-        _print_health(title, seconds, states)
+        _print_health(title, options.seconds, states)
     if any(state.verdict is HealthGrade.BAD for state in states):
         raise typer.Exit(1)
 

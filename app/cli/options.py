@@ -1,68 +1,60 @@
-"""Options that several commands share, with their checks.
+"""Declarations of options that several commands share.
 
-An option group is a dataclass: a field is an option. `with_options` expands the groups among a function's
-parameters, so that Typer sees one parameter an option, and the function one object a group.
+A command declares its options in a dataclass: a field is an option, or a group of options, which is one
+too. `command_function` makes a function of it, so that `--help` imports nothing of what the command does.
 """
 
 import dataclasses
-import functools
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from app.acquisition.messages import PortSettings
-from app.cli import output as out
 from app.cli.errors import CommandError
-from app.runs.batch.executors import ExecutorOptions
-from app.runs.metadata import Conditions
-from config.files import load_stand, settings_file
 
 
-def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Expand the option groups among the parameters of a command."""
-    signature = inspect.signature(function)
-    groups: dict[str, type] = {
-        name: parameter.annotation
-        for name, parameter in signature.parameters.items()
-        if isinstance(parameter.annotation, type) and dataclasses.is_dataclass(parameter.annotation)
-    }
+def command_function(options: type[Any], run: Callable[[Any], None]) -> Callable[..., None]:
+    """Return a function, as Typer needs it, with a parameter for each option; it calls `run(options)`.
 
-    @functools.wraps(function)
-    def command(**values: Any) -> None:
-        for name, group in groups.items():
-            given = {field.name for field in dataclasses.fields(group)} & values.keys()
-            values[name] = group(**{field: values.pop(field) for field in given})
-        function(**values)
+    As the function of a group it leaves the work to the subcommand where one is given.
+    """
+    context = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
 
-    parameters = [
-        option
-        for name, parameter in signature.parameters.items()
-        for option in (_options_of(groups[name]) if name in groups else [parameter])
-    ]
-    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in parameters]
-    )
+    def command(context: typer.Context, **values: Any) -> None:
+        if context.invoked_subcommand is None:
+            run(_collect(options, values))
+
+    command.__doc__ = options.__doc__
+    command.__signature__ = inspect.Signature([context, *_parameters(options)])  # type: ignore[attr-defined]
     command.__annotations__ = {}
     return command
 
 
-def _options_of(group: type) -> list[inspect.Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    required = [field for field in dataclasses.fields(group) if field.default is dataclasses.MISSING]
-    optional = [field for field in dataclasses.fields(group) if field.default is not dataclasses.MISSING]
-    return [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field in required else field.default,
-            annotation=hints[field.name],
+def _collect(options: Any, values: dict[str, Any]) -> Any:
+    """Build the dataclass and the groups in it."""
+    given = {}
+    for name, annotation in get_type_hints(options).items():
+        given[name] = _collect(annotation, values) if dataclasses.is_dataclass(annotation) else values[name]
+    return options(**given)
+
+
+def _parameters(options: Any) -> Iterator[inspect.Parameter]:
+    """Yield a parameter for each option, groups expanded; in a group required options stand first."""
+    hints = get_type_hints(options, include_extras=True)
+    for field in dataclasses.fields(options):
+        annotation = hints[field.name]
+        if dataclasses.is_dataclass(annotation):
+            yield from sorted(
+                _parameters(annotation), key=lambda option: option.default is not inspect.Parameter.empty
+            )
+            continue
+        default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+        yield inspect.Parameter(
+            field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
         )
-        for field in (*required, *optional)
-    ]
 
 
 def choice(name: str, *values: str, help: str) -> Any:  # noqa: A002 - as Typer calls it
@@ -157,22 +149,6 @@ class MassOptions:
     plate_mass: PlateMass = None
     table_mass: TableMass = None
 
-    def print_overrides(self) -> None:
-        """Print which masses replace those of stand and series. Raises ConfigError for an unknown series."""
-        stand = load_stand()
-        series = stand.series(self.series) if self.series else None
-        plate_kg, owner = (
-            (series.plate_mass_kg, f"series {series.code}") if series else (stand.plate_mass_kg, "the stand")
-        )
-        for name, given, usual, source in (
-            ("table", self.table_mass, stand.table_mass_kg, "the stand"),
-            ("plate", self.plate_mass, plate_kg, owner),
-        ):
-            if given is not None and given != usual:
-                out.print_status(
-                    f"note: the {name} mass is {given:g} kg as given, not the {usual:g} kg of {source}"
-                )
-
 
 @dataclasses.dataclass(frozen=True)
 class ConditionOptions:
@@ -196,18 +172,6 @@ class ConditionOptions:
         typer.Option("--condition", metavar="NAME=TEXT", help="Any other condition; repeatable."),
     ] = None
 
-    def conditions(self) -> Conditions:
-        """Return the checked conditions. Raises CommandError, MetadataError."""
-        return Conditions(
-            temperature_c=self.temperature,
-            humidity_percent=self.humidity,
-            plate_id=self.plate_id.strip(),
-            contact_id=self.contact_id.strip(),
-            surface_preparation=self.surface.strip(),
-            run_in_number=self.run_in,
-            other=key_values(self.condition, "--condition"),
-        )
-
 
 @dataclasses.dataclass(frozen=True)
 class LinkOptions:
@@ -228,18 +192,6 @@ class LinkOptions:
     parity: Annotated[str, choice("--parity", "N", "E", "O", help="N (none), E (even) or O (odd).")] = "N"
     settings: DeviceSettings = None
 
-    def port_settings(self, port: str, protocol: str) -> PortSettings:
-        """Return the settings of the device on a port. Raises CommandError."""
-        return PortSettings(
-            url=port,
-            protocol=protocol,
-            baud=self.baud,
-            parity=self.parity,
-            rate_hz=self.rate,
-            device=key_values(self.settings),
-            relative_url=self.relative_port,
-        )
-
 
 @dataclasses.dataclass(frozen=True)
 class DeviceOptions(LinkOptions):
@@ -251,10 +203,6 @@ class DeviceOptions(LinkOptions):
     protocol: Annotated[
         str, typer.Option("--protocol", help="Protocol name, see `slipstand device list`.")
     ] = dataclasses.field(kw_only=True)
-
-    def device(self) -> PortSettings:
-        """Return the settings of the device. Raises CommandError."""
-        return self.port_settings(self.port, self.protocol)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -270,45 +218,3 @@ class JobOptions:
     dask: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Run them on a Dask cluster: tcp://HOST:PORT.")
     ] = ""
-
-    def executor(self) -> ExecutorOptions:
-        """Return the options of the executor. Raises CommandError."""
-        if self.jobs is not None and self.jobs < 1:
-            raise CommandError(f"--jobs {self.jobs} does nothing. Give 1 or more")
-        if self.jobs is not None and self.dask:
-            raise CommandError("--jobs is for this computer, --dask for a cluster. Give one of them")
-        return ExecutorOptions(self.jobs, self.dask)
-
-
-_EXAMPLES = {"--set": "separator=;", "--condition": "temperature_c=21.5"}
-
-
-def key_values(pairs: list[str] | None, option: str = "--set") -> dict[str, str]:
-    """Turn the KEY=VALUE pairs of an option into a dict. Raises CommandError."""
-    settings = {}
-    for pair in pairs or []:
-        key, equals, value = pair.partition("=")
-        if not equals or not key.strip():
-            raise CommandError(
-                f"{option} {pair!r} must be KEY=VALUE, for example {option} {_EXAMPLES[option]}"
-            )
-        settings[key.strip()] = value
-    return settings
-
-
-def calibration_file(given: Path | None) -> Path:
-    """Return the calibration file to use: the one given, or gauges.toml."""
-    return given.expanduser().resolve() if given else settings_file("gauges.toml")
-
-
-def check_figure_file(figure: Path | None) -> Path | None:
-    """Return the path of a figure to draw. Raises CommandError for an unknown format or a missing folder."""
-    if figure is None:
-        return None
-    if figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    if not figure.expanduser().absolute().parent.is_dir():
-        raise CommandError(
-            f"--figure {figure}: there is no such folder. Make it first or choose another path"
-        )
-    return figure.expanduser()

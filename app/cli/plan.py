@@ -1,49 +1,31 @@
 """`slipstand plan`: what a test will show, before it is made."""
 
-from typing import Annotated, Any
+from typing import Any
 
 from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, definition
 from analysis.formatting import format_value
 from app.cli import output as out
-from app.cli.motion_options import MotionOptions, check_samples
-from app.cli.options import CalibrationFile, Json, number, with_options
+from app.cli.measurement_options import PlanOptions
+from app.cli.motion_parameters import check_samples, motion_parameters
 from app.runs.plan_json import build_planned_test, plan_document
 from config.files import load_gauges, load_stand
 
 
-@with_options
-def plan(
-    *,
-    motion: MotionOptions,
-    rate: Annotated[float, number("--rate", above=0.0, help="Samples a second.")] = 1000.0,
-    noise: Annotated[
-        float,
-        number(
-            "--noise",
-            above=0.0,
-            help="Standard deviation of both gauges' readings (m); see `device health`.",
-        ),
-    ] = 2e-5,
-    duration: Annotated[
-        float, number("--duration", above=0.0, help="Seconds after release that are recorded.")
-    ] = 10.0,
-    calibration: CalibrationFile = None,
-    as_json: Json = False,
-) -> None:
-    """Predict what a test will show, before it is made.
-
-    Shows motion, u_s, use of the gauges' ranges, the uncertainty of f_d, and what would halve it.
-    Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
-    Options override the values of the series.
-    """
-    check_samples(duration, rate)
-    parameters = motion.parameters()
-    gauges = load_gauges(calibration.expanduser() if calibration else None)
+def plan(options: PlanOptions) -> None:
+    """Predict what a test will show, before it is made."""
+    check_samples(options.duration, options.rate)
+    parameters = motion_parameters(options.motion)
+    gauges = load_gauges(options.calibration.expanduser() if options.calibration else None)
     test = build_planned_test(
-        parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration
+        parameters,
+        load_stand(),
+        gauges,
+        rate_hz=options.rate,
+        noise_m=options.noise,
+        duration_s=options.duration,
     )
-    document = {"series": motion.series} | plan_document(test)
-    if as_json:
+    document = {"series": options.motion.series} | plan_document(test)
+    if options.as_json:
         out.print_json(document)
     else:
         _print_plan(document)

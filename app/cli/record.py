@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 import typer
@@ -10,89 +10,45 @@ import typer
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import (
-    CalibrationFile,
-    ConditionOptions,
-    DeviceOptions,
-    Directory,
-    Json,
-    MassOptions,
+from app.cli.measurement_options import RecordOptions
+from app.cli.option_values import (
     calibration_file,
-    choice,
-    number,
-    with_options,
+    checked_conditions,
+    device_settings,
+    print_mass_overrides,
+    recordings_folder,
 )
 from app.cli.recording import check_recording, record_with_progress
 from app.cli.recover import print_unfinished_runs
-from app.runs.paths import recordings_directory
 from config.files import load_stand
 
 
-@with_options
-def record(
-    *,
-    source: DeviceOptions,
-    masses: MassOptions,
-    pullback: Annotated[
-        float | None, number("--pullback", above=0.0, help="Pullback (m), if not the series'.")
-    ] = None,
-    tolerance: Annotated[
-        float | None,
-        number(
-            "--tolerance", above=0.0, help="How far off the pullback it may be held (m); 2 % of it if absent."
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        number("--duration", above=0.0, help="Seconds after release, or from the start with --trigger none."),
-    ] = None,
-    until_rest: Annotated[
-        bool, typer.Option("--until-rest", help="End at rest or when enough; the default without --duration.")
-    ] = False,
-    trigger: Annotated[
-        str, choice("--trigger", "pullback", "none", help="pullback, or none to record at once.")
-    ] = "pullback",
-    pretrigger: Annotated[float, typer.Option(help="Seconds kept from before the release.")] = 1.0,
-    trigger_timeout: Annotated[
-        float, number("--trigger-timeout", above=0.0, help="Seconds to wait for a release.")
-    ] = 600.0,
-    calibration: CalibrationFile = None,
-    directory: Directory = None,
-    operator: Annotated[str, typer.Option(help="Who records.")] = "",
-    note: Annotated[str, typer.Option(help="A remark kept with the run.")] = "",
-    conditions: ConditionOptions,
-    count: Annotated[int, typer.Option(min=1, help="How many runs, one after another.")] = 1,
-    as_json: Json = False,
-) -> None:
-    """Record a pullback test from a device into a run file.
-
-    Ctrl-C ends the run and keeps it. With --count the next run arms itself when one is stored, without the
-    keyboard.
-    """
-    if until_rest and duration is not None:
+def record(options: RecordOptions) -> None:
+    """Record a pullback test from a device into a run file."""
+    if options.until_rest and options.duration is not None:
         raise CommandError("--duration and --until-rest exclude each other. Give one of them")
-    if trigger == "none" and duration is None:
+    if options.trigger == "none" and options.duration is None:
         raise CommandError("--trigger none has no rest to wait for. Add --duration")
-    port = source.device()
+    port = device_settings(options.source)
     run = RunSettings(
-        directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
-        series=_checked_series(masses.series),
-        pullback_m=pullback,
-        pullback_tolerance_m=tolerance,
-        plate_mass_kg=masses.plate_mass,
-        table_mass_kg=masses.table_mass,
-        trigger=trigger,
-        pretrigger_s=pretrigger,
-        duration_s=duration,
-        trigger_timeout_s=trigger_timeout,
-        operator=operator,
-        note=note,
-        conditions=conditions.conditions(),
+        directory=str(recordings_folder(options.directory)),
+        series=_checked_series(options.masses.series),
+        pullback_m=options.pullback,
+        pullback_tolerance_m=options.tolerance,
+        plate_mass_kg=options.masses.plate_mass,
+        table_mass_kg=options.masses.table_mass,
+        trigger=options.trigger,
+        pretrigger_s=options.pretrigger,
+        duration_s=options.duration,
+        trigger_timeout_s=options.trigger_timeout,
+        operator=options.operator,
+        note=options.note,
+        conditions=checked_conditions(options.conditions),
     )
-    gauges_file = calibration_file(calibration)
+    gauges_file = calibration_file(options.calibration)
     check_recording(run, gauges_file)
-    dataclasses.replace(masses, series=run.series).print_overrides()
-    _record(port, run, gauges_file, count, as_json)
+    print_mass_overrides(dataclasses.replace(options.masses, series=run.series))
+    _record(port, run, gauges_file, options.count, options.as_json)
 
 
 def _checked_series(series: str | None) -> str | None:

@@ -1,32 +1,24 @@
 """`slipstand recover`: runs from the journals that a crash has left."""
 
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
 import typer
 
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.cli import output as out
-from app.cli.options import Json
+from app.cli.library_options import RecoverOptions
 from app.runs.journal import unfinished_journals
 from app.runs.paths import journal_fallback_folders, recordings_directory
 
 
-def recover(
-    directory: Annotated[
-        Path | None,
-        typer.Argument(
-            help="Folder of runs; if absent, the recordings folder and where journals move to.",
-            metavar="[DIR]",
-        ),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+def recover(options: RecoverOptions) -> None:
     """Rebuild runs that a crash cut short, from their journals."""
-    folder = directory.expanduser().absolute() if directory else recordings_directory()
+    folder = options.directory.expanduser().absolute() if options.directory else recordings_directory()
     folders = (
-        [folder] if directory else [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
+        [folder]
+        if options.directory
+        else [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
     )
     found = []
     for one in folders:
@@ -34,14 +26,14 @@ def recover(
             found += recover_folder(
                 one, lambda journal, share: update(share, journal.name), original_folder=folder
             )
-    if as_json:
+    if options.as_json:
         out.print_json([msgspec.to_builtins(one) | {"message": str(one.message)} for one in found])
     elif not found:
         out.print_line(f"No journals in {folder}: nothing was left unfinished there")
     for recovery in found:
         if recovery.state is RecoveryState.FAILED:
             out.print_status(f"error: {recovery.message}")
-        elif not as_json:
+        elif not options.as_json:
             out.print_line(recovery_text(recovery))
     if any(recovery.state is RecoveryState.FAILED for recovery in found):
         raise typer.Exit(1)

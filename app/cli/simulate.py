@@ -3,61 +3,38 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 
 from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, definition
 from analysis.motion.paper_method import simulate as simulate_by_paper
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.motion_options import MotionOptions, check_samples
-from app.cli.options import Force, Json, choice, number, with_options
+from app.cli.measurement_options import SimulateOptions
+from app.cli.motion_parameters import check_samples, motion_parameters
 from app.runs.disk import atomic_write
 from app.runs.simulated import write_simulated_run
 
 
-@with_options
-def simulate(
-    *,
-    motion: MotionOptions,
-    duration: Annotated[float, number("--duration", above=0.0, help="Seconds after release.")] = 10.0,
-    rate: Annotated[float, number("--rate", above=0.0, help="Samples a second.")] = 1000.0,
-    method: Annotated[
-        str, choice("--method", "exact", "paper", help="exact, or paper for its three-state algorithm.")
-    ] = "exact",
-    step: Annotated[float, number("--step", above=0.0, help="Time step of --method paper (s).")] = 1e-4,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="FILE.csv of the motion, or FILE.h5, a run; numbers are shown if absent."
-        ),
-    ] = None,
-    force: Force = False,
-    as_json: Json = False,
-) -> None:
-    """Simulate one pullback test: numbers, a CSV file or a run.
-
-    Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
-    Options override the values of the series.
-    """
-    check_samples(duration, rate)
-    if output is not None and output.suffix not in (".csv", ".h5"):
-        raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
-    target = out.output_file(output, force) if output else None
-    parameters = motion.parameters()
+def simulate(options: SimulateOptions) -> None:
+    """Simulate one pullback test: numbers, a CSV file or a run."""
+    check_samples(options.duration, options.rate)
+    if options.output is not None and options.output.suffix not in (".csv", ".h5"):
+        raise CommandError(f"-o {options.output.name} has no known ending. Use .csv or .h5")
+    target = out.output_file(options.output, options.force) if options.output else None
+    parameters = motion_parameters(options.motion)
     if target is not None and target.suffix == ".h5" and parameters.pullback_m == 0.0:
         raise CommandError("--pullback 0 makes no run: nothing moves. Give another pullback, or -o FILE.csv")
-    if method == "paper":
-        _check_step(step, parameters)
-    simulated = _solve(parameters, duration, method, step)
+    if options.method == "paper":
+        _check_step(options.step, parameters)
+    simulated = _solve(parameters, options.duration, options.method, options.step)
     if target is not None:
-        _store(target, simulated, parameters, motion.series, rate, replace=force)
+        _store(target, simulated, parameters, options.motion.series, options.rate, replace=options.force)
         out.print_status(f"wrote {target}")
-    document = _document(simulated, parameters, method, step)
-    if as_json:
+    document = _document(simulated, parameters, options.method, options.step)
+    if options.as_json:
         out.print_json(document)
     elif target is None:
         _print_motion(document)

@@ -4,18 +4,16 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from analysis.audit import audit
 from analysis.campaign.campaign import Campaign, compare_all_with_published
 from app.cli import output as out
 from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Exclude, Force, JobOptions, Json, RunsOrFolders, choice, with_options
+from app.cli.option_values import executor_options
+from app.cli.result_options import TableOptions
 from app.reports.table.content import PublishedRowComparison, TableContent
-from app.reports.table.files import FORMATS, as_text, write_text, write_workbook
+from app.reports.table.files import as_text, write_text, write_workbook
 from app.reports.table.text import note_sections
 from app.runs.campaign.collect import CollectedRuns
 from config.files import load_stand, published_table
@@ -23,37 +21,14 @@ from config.files import load_stand, published_table
 _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 
 
-@with_options
-def table(
-    *,
-    paths: RunsOrFolders,
-    format_name: Annotated[str, choice("--format", *FORMATS, help="Format of the table.")] = "text",
-    published: Annotated[
-        bool, typer.Option("--published", help="Beside the paper's Table 1, with the audit's flags.")
-    ] = False,
-    repeats: Annotated[
-        bool, typer.Option("--repeats", help="Text, Markdown: show how the runs of each series differ.")
-    ] = False,
-    exclude: Exclude = None,
-    save: Annotated[bool, typer.Option("--save", help="Keep new analyses in their runs.")] = False,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; xlsx needs one.")
-    ] = None,
-    jobs: JobOptions,
-    force: Force = False,
-    as_json: Json = False,
-) -> None:
-    """Pool runs to the paper's Table 1, a row a series.
-
-    Below it stands what f_d depends on. A run's newest analysis that is not stale is
-    taken, else the run is analysed.
-    """
-    name = _format(format_name, output, as_json=as_json)
-    target = out.output_file(output, force) if output else None
-    executor, excluded = jobs.executor(), excluded_runs(paths, exclude or [])
-    gathered, campaign = load_campaign(paths, executor, save=save, excluded=excluded)
-    content = table_content(gathered, campaign, published=published)
-    _write_table(content, name, target, with_repeats=repeats, replace=force)
+def table(options: TableOptions) -> None:
+    """Pool runs to the paper's Table 1, a row a series."""
+    name = _format(options.format_name, options.output, as_json=options.as_json)
+    target = out.output_file(options.output, options.force) if options.output else None
+    executor, excluded = executor_options(options.jobs), excluded_runs(options.paths, options.exclude or [])
+    gathered, campaign = load_campaign(options.paths, executor, save=options.save, excluded=excluded)
+    content = table_content(gathered, campaign, published=options.published)
+    _write_table(content, name, target, with_repeats=options.repeats, replace=options.force)
     if target or name in ("csv", "latex"):
         _print_remarks(content)
     exit_with_failures(content.failures)

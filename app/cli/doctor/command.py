@@ -3,41 +3,26 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 from importlib import import_module
-from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from app.cli import output as out
 from app.cli.doctor import Finding, FindingState, fail
-from app.cli.options import Force, Json
+from app.cli.library_options import DoctorOptions
 
 
-def doctor(
-    bundle: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.zip",
-            help="Write findings, versions, ports, settings and log to one file for a bug report.",
-        ),
-    ] = None,
-    force: Force = False,
-    as_json: Json = False,
-) -> None:
-    """Check installation, settings, gauges, ports and clocks.
-
-    Recordings are checked too. Ends with 1 if something fails.
-    """
-    target = out.output_file(bundle, force) if bundle else None
+def doctor(options: DoctorOptions) -> None:
+    """Check installation, settings, gauges, ports and clocks."""
+    target = out.output_file(options.bundle, options.force) if options.bundle else None
     findings = []
     for finding in _findings():
         findings.append(finding)
-        if not as_json:
+        if not options.as_json:
             out.print_line(f"{finding.state:4}  {finding.subject}: {finding.message}")
             if finding.remedy:
                 out.print_line(f"      {finding.remedy}")
     failed = sum(finding.state is FindingState.FAIL for finding in findings)
-    if as_json:
+    if options.as_json:
         out.print_json({"ok": not failed, "checks": [asdict(finding) for finding in findings]})
     if target is not None:
         out.print_status(f"wrote {target}. It holds no recording, but:")

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from cli_kit import assert_one_error_line
 
+from app.cli.measurement_options import MotionOptions, SimulateOptions
+from app.cli.simulate import simulate
 from app.runs.reader import open_run
 
 SCHEMA_KEYS = {
@@ -27,10 +29,8 @@ SCHEMA_KEYS = {
 @pytest.fixture(scope="module")
 def simulated_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a simulated test."""
-    from app.cli.simulate import simulate
-
     path = tmp_path_factory.mktemp("runs") / "good.h5"
-    simulate(series="1FFM0", output=path, rate=500.0)
+    simulate(SimulateOptions(motion=MotionOptions(series="1FFM0"), output=path, rate=500.0))
     return path
 
 

@@ -1,11 +1,17 @@
 """`--help` of every command: whole sentences in the lists, and a unit for every number."""
 
 import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from app.cli.commands import DeviceGroup, SlipstandGroup
+from app.cli.commands import CalibrateGroup, DeviceGroup, SlipstandGroup
+from app.cli.result_options import FIGURE_FORMATS, TABLE_FORMATS
+from app.reports.figures import style
+from app.reports.table import files
 
 LISTS = ((), ("calibrate",), ("device",))
 COMMANDS = (
@@ -47,6 +53,7 @@ def test_lists_of_commands_say_in_whole_sentences_what_they_do(
 def test_the_list_of_commands_says_the_first_line_of_their_help(slipstand: Any) -> None:
     entries = [(entry, ()) for entry in SlipstandGroup.entries]
     entries += [(entry, ("device",)) for entry in DeviceGroup.entries]
+    entries += [(entry, ("calibrate",)) for entry in CalibrateGroup.entries]
     for entry, group in entries:
         text = " ".join(slipstand(*group, entry.name, "--help").out.split())
         assert entry.summary in text, entry.name
@@ -78,3 +85,51 @@ def test_defaults_are_shown(slipstand: Any) -> None:
 
     assert shown["--rate"].endswith("Samples a second. [default: 1000.0]")
     assert "--no-control" not in slipstand("device", "simulate", "--help").out
+
+
+def test_help_imports_only_the_options() -> None:
+    code = (
+        "import sys\n"
+        "from app.cli.commands import CalibrateGroup, DeviceGroup, SlipstandGroup\n"
+        "for group in (CalibrateGroup, DeviceGroup, SlipstandGroup):\n"
+        "    for entry in group.entries:\n"
+        "        entry.load()\n"
+        "print(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+
+    assert not {"numpy", "scipy", "numba", "h5py", "matplotlib", "PySide6"} & set(loaded.split())
+
+
+def test_formats_are_those_of_the_reports() -> None:
+    assert (TABLE_FORMATS, FIGURE_FORMATS) == (files.FORMATS, style.FORMATS)
+
+
+REFERENCE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "commands.md"
+
+
+def reference_parts() -> list[tuple[tuple[str, ...], str]]:
+    """Rows of the table and sections of the page on commands, each with the commands that it is about."""
+    table, *sections = re.split(r"^## ", REFERENCE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    parts: list[tuple[tuple[str, ...], str]] = []
+    for row in re.findall(r"^\| `slipstand (.*)$", table, re.MULTILINE):
+        names = [name for name in COMMANDS if re.match(rf"{name}\b", row)]
+        parts.append(((max(names, key=len),), row))
+    for section in sections:
+        heading, text = section.split("\n", 1)
+        names = re.findall(r"`([a-z ]+?)(?: --campaign)?`", heading)
+        parts.append((tuple(names), text if names else ""))
+    return parts
+
+
+def test_the_reference_lists_every_command() -> None:
+    assert {name for names, _ in reference_parts() for name in names} == set(COMMANDS)
+
+
+@pytest.mark.parametrize(("commands", "text"), reference_parts())
+def test_the_reference_names_only_options_that_there_are(
+    slipstand: Any, commands: tuple[str, ...], text: str
+) -> None:
+    known = {"--help"}.union(*(options_of(slipstand(*name.split(), "--help").out) for name in commands))
+
+    assert set(re.findall(r"`(--[a-z][a-z0-9-]*)", text)) <= known

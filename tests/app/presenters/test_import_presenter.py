@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 
+from app.cli.commands import SlipstandGroup
 from app.presenters.base import Tone
 from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat, validate
 from app.presenters.runs.import_presenter import ImportPresenter, pending_text
@@ -181,11 +181,8 @@ def test_a_gain_and_a_part_are_taken(path: Path) -> None:
 
 
 def test_all_that_the_command_line_can_is_in_the_form() -> None:
-    from app.cli.import_record import import_record
-
-    cli = typer.Typer(add_completion=False)
-    cli.command()(import_record)
-    options = {parameter.name for parameter in typer.main.get_command(cli).params}
+    entry = next(entry for entry in SlipstandGroup.entries if entry.name == "import")
+    options = {parameter.name for parameter in entry.load().params}
     elsewhere = {"file", "output", "force", "as_json"}  # the dialog's own file, a free name in the folder
     renamed = {
         "relative": "second", "plate": "second", "no_header": "header", "plate_mass": "plate_mass_kg",
