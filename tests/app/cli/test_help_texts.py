@@ -51,7 +51,7 @@ def test_lists_of_commands_say_in_whole_sentences_what_they_do(
 
 
 def test_the_list_of_commands_says_the_first_line_of_their_help(slipstand: Any) -> None:
-    entries = [(entry, ()) for entry in SlipstandGroup.entries]
+    entries: list[tuple[Any, tuple[str, ...]]] = [(entry, ()) for entry in SlipstandGroup.entries]
     entries += [(entry, ("device",)) for entry in DeviceGroup.entries]
     entries += [(entry, ("calibrate",)) for entry in CalibrateGroup.entries]
     for entry, group in entries:
