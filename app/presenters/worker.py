@@ -238,10 +238,13 @@ def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
     with contextlib.suppress(EOFError, OSError):
         while True:
             task, argument = pipe.recv()
+            name = task.name if isinstance(task, LazyFunction) else getattr(task, "__name__", "task")
+            _log.info("task %s starts", name)
             try:
                 answer = task(argument, lambda progress: pipe.send(("progress", progress)))
             except Exception as error:
-                _log.warning("task failed: %s", error)
+                _log.warning("task %s failed: %s", name, error)
                 pipe.send(("failed" if is_user_error(error) else "error", error_report(error)))
             else:
+                _log.info("task %s is done", name)
                 pipe.send(("done", answer))
