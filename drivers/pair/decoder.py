@@ -65,15 +65,11 @@ class PairDecoder:
     @property
     def losses(self) -> Losses:
         """Counts until now. Missing readings are known from the host's time alone, so they are estimates."""
-        rows, both = self._rows, [channel.source.losses for channel in self._channels]
-        return Losses(
-            samples=rows.samples,
-            missing_estimated=rows.missing_estimated,
-            damaged=rows.damaged,
-            overloaded=rows.overloaded,
-            discarded_bytes=self._unwrapper.discarded_bytes
-            + self._foreign_bytes
-            + sum(one.discarded_bytes for one in both),
+        both = [channel.source.losses for channel in self._channels]
+        discarded = self._unwrapper.discarded_bytes + self._foreign_bytes
+        return replace(
+            self._rows,
+            discarded_bytes=discarded + sum(one.discarded_bytes for one in both),
             restarts=sum(one.restarts for one in both),
             repeated=sum(one.repeated for one in both),
             unexplained_drops=sum(one.unexplained_drops for one in both),
