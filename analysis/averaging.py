@@ -11,13 +11,7 @@ AVERAGED_RATE_HZ = 500.0
 
 
 class BlockAverager:
-    """Means of blocks of consecutive rows.
-
-    Parameters
-    ----------
-    count : int
-        Rows of a block; 1 keeps the rows.
-    """
+    """Means of blocks of `count` consecutive rows; 1 keeps the rows."""
 
     def __init__(self, count: int) -> None:
         self._count = max(1, count)

@@ -79,9 +79,9 @@ class Unit:
     symbol: str
     """"" for pure numbers."""
     scale: float = 1.0
-    """How many of it make one SI unit."""
+    """Number of these units in one SI unit."""
     latex: str = ""
-    """The same for LaTeX, where it differs."""
+    """Symbol in LaTeX, where it differs."""
 
     @property
     def in_latex(self) -> str:
@@ -103,7 +103,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """What the campaign's table needs to know of a quantity."""
+    """Column of a quantity in the campaign's table."""
 
     position: int
     """In the paper's Table 1, from 1; columns of our own follow."""
@@ -112,9 +112,9 @@ class TableColumn:
     is_proportional: bool = True
     """Runs differ by a share of the value rather than by an amount."""
     is_of_stand: bool = False
-    """A property of the stand: its scatter is the same whatever rubs on it."""
+    """A property of the stand: its scatter does not depend on the contact."""
     missing: str = ""
-    """Why no run may have determined it."""
+    """Reason why no run may have determined it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +129,8 @@ class QuantityDefinition:
     description: str
     """A few words for people; English, marked for translation."""
     display: Unit
-    """In which it is shown."""
     display_at: dict[Place, Unit] = field(default_factory=dict)
-    """Where another unit is shown."""
+    """Other units, by place."""
     column: TableColumn | None = None
     """None for quantities that the campaign's table does not hold."""
     is_minor: bool = False

@@ -1,4 +1,4 @@
-"""Numbers as text: the one place that rounds for people.
+"""Numbers as text: the only module that rounds for display.
 
 A value with its standard uncertainty follows JCGM 100, 7.2.6: two significant digits of the uncertainty,
 the value to the same place, no negative zero. `typeset` puts true minus signs for window and print; the
@@ -14,7 +14,7 @@ MINUS = "\u2212"
 THIN_SPACE = "\u202f"
 NO_BREAK_SPACE = "\u00a0"
 _NEGLIGIBLE = 1e-9
-"""Relative uncertainty of a simulated record without noise: rounding errors, which say nothing."""
+"""Relative uncertainty below which only rounding errors of a simulated record remain."""
 _DIGITS, _DIGITS_OF_EXACT = 6, 9
 """Significant digits of a value without an uncertainty, and of one whose uncertainty is negligible."""
 _SMALL_M = 0.9995e-3
@@ -33,7 +33,7 @@ class FormattedValue:
 
     value: str
     uncertainty: str = ""
-    """"" where there is none to speak of."""
+    """"" where it is unknown or negligible."""
     unit: str = ""
     """"" for pure numbers."""
 

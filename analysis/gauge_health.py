@@ -159,9 +159,9 @@ def _check(gauge: GaugeSamples, present: int) -> None:
 
 
 def _drift(time_s: Floats, x: Floats) -> tuple[float, float, Floats]:
-    """Slope (m/s) with its standard uncertainty, and what a straight line leaves of the readings (n,).
+    """Slope (m/s) with its standard uncertainty, and the residuals (n,) of a straight line.
 
-    The line goes through means of ten blocks, whose scatter tells of slow noise too.
+    The line goes through means of ten blocks, whose scatter includes slow noise.
     """
     blocks = np.array_split(np.arange(len(x)), _BLOCKS)
     times = np.array([time_s[block].mean() for block in blocks])
@@ -204,7 +204,7 @@ def _line(spectrum: Spectrum, frequency_hz: float) -> float:
 
 
 def _oscillation(spectrum: Spectrum) -> float:
-    """Amplitude of a slow line that is more than all the rest of the spectrum."""
+    """Amplitude of a slow line that exceeds the rest of the spectrum."""
     power = spectrum.density_m_per_sqrt_hz**2
     slow = np.where(spectrum.frequency_hz < _MOTION_HZ, power, 0.0)
     strongest = int(np.argmax(slow))
@@ -292,7 +292,7 @@ def diagnose(health: GaugeHealth) -> tuple[Symptom, ...]:
 
 
 def _signal_faults(health: GaugeHealth) -> Iterator[Symptom]:
-    """Yield what keeps readings from arriving, or makes them wrong."""
+    """Yield faults that suppress or falsify readings."""
     if health.missing_fraction > _MISSING[0]:
         yield Symptom(
             "absent",
@@ -364,7 +364,7 @@ def _dead_channel(health: GaugeHealth) -> Iterator[Symptom]:
 
 
 def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
-    """Yield what adds to the readings."""
+    """Yield disturbances that add to the readings."""
     if health.noise_rms_m > NOISE_M[0]:
         yield Symptom(
             "noisy",

@@ -1,4 +1,4 @@
-"""A number that can be signed: value, standard uncertainty, 95 % interval, unit."""
+"""Quantities with standard uncertainty and 95 % interval, result warnings, and uncertainty budgets."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -29,7 +29,7 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class ResultWarning:
-    """A fact that limits what a result is worth."""
+    """A fact that limits the validity of a result."""
 
     code: str
     """Stable name, for programs."""

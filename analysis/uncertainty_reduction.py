@@ -1,4 +1,4 @@
-"""What halves the standard uncertainty of f_d: a higher rate, repeats, a longer pullback, better gauges.
+"""Measures that halve the standard uncertainty of f_d: rate, repeats, pullback, calibration.
 
 Each measure is tried by planning the test again. The contribution of noise falls with rate and repeats. The
 contributions of calibration, masses and gravity do not: they are the floor that no rate and no number of
@@ -90,7 +90,7 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
 
 
 def reduction_options(test: PlannedTest) -> list[ReductionOption]:
-    """Every measure with the value that it takes, or why it does not help; empty where f_d is undetermined.
+    """Return every measure with its value, or why it does not help; empty where f_d is undetermined.
 
     Raises AnalysisError for an impossible test.
     """

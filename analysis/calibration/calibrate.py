@@ -259,10 +259,8 @@ def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: 
     gauge there, and repeats do not reduce them. Certificate errors of the dial gauge are independent at both
     ends of its travel.
 
-    Raises
-    ------
-    CalibrationError
-        Too few steps, a degree that is not offered, or a polynomial that does not suit the readings.
+    Raises CalibrationError for too few steps, a degree that is not offered, or a polynomial that does not
+    suit the readings.
     """
     if degree not in POLYNOMIAL_DEGREES:
         raise CalibrationError("degree {degree} is not offered. Use 1 for a line, 2 or 3", degree=degree)

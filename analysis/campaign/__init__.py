@@ -1,1 +1,1 @@
-"""From the results of many runs to the paper's table, its effects and what they are worth."""
+"""Summary of many runs: the paper's table, its effects and their uncertainties."""

@@ -41,12 +41,8 @@ class Campaign:
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
     """Summarize runs: one row for each series, in the paper's order.
 
-    Parameters
-    ----------
-    runs : sequence of RunResult
-        Of one campaign; their order does not change the numbers.
-    known_contacts : sequence of str
-        Codes of the stand. Runs with others get a warning. Empty: none is known.
+    The order of `runs` does not change the numbers. Runs with a contact that is not in `known_contacts`
+    (codes of the stand) get a warning; an empty sequence allows all.
     """
     counted = sorted(
         (run for run in runs if not run.excluded), key=lambda run: (run.series.sort_key, run.name)

@@ -10,17 +10,8 @@ from typing import Final
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.campaign.linear_model import (
-    LEVEL,
-    DesignMatrix,
-    LinearFit,
-    build_design,
-    estimate_linear_form,
-    f_test,
-    fit_linear_model,
-    is_usable,
-    observations,
-)
+from analysis.campaign import linear_model
+from analysis.campaign.linear_model import DesignMatrix, LinearFit
 from analysis.campaign.rows import SeriesRow
 from analysis.formatting import format_signed, uncertainty_decimals
 from analysis.quantities import Quantity
@@ -104,12 +95,12 @@ def find_effects(rows: Sequence[SeriesRow]) -> Effects:
     table velocity are linear. Each cause is tested with the others in the model, so a confounded cause is
     not named. The covariance holds errors that series share, and the scatter of the series about the model.
     """
-    taken = [row for row in rows if is_usable(row)]
+    taken = [row for row in rows if linear_model.is_usable(row)]
     if not taken:
         reason = message("no series has f_d, v_max and a pullback")
         return Effects(tuple(_undetermined(cause, reason) for cause in Cause), None, 0)
-    laid = build_design(taken)
-    fitted = fit_linear_model(laid.matrix, observations(taken))
+    laid = linear_model.build_design(taken)
+    fitted = linear_model.fit_linear_model(laid.matrix, linear_model.observations(taken))
     effects = tuple(_effect(cause, laid, fitted) for cause in Cause)
     return Effects(effects, None if fitted is None else fitted.excess_deviation, len(taken))
 
@@ -120,9 +111,9 @@ def _effect(cause: Cause, laid: DesignMatrix, fitted: LinearFit | None) -> Effec
         return _undetermined(cause, question)
     if fitted is None:
         return _undetermined(cause, message("there are no repeats and too few series. Repeat the tests"))
-    tested = f_test(fitted, question.combinations, question.patterns)
+    tested = linear_model.f_test(fitted, question.combinations, question.patterns)
     sizes = tuple(EffectSize(step, _change_quantity(fitted, weights)) for step, weights in question.steps)
-    found, seen = tested.p_value < LEVEL, _relative_change(tested.detectable_size)
+    found, seen = tested.p_value < linear_model.LEVEL, _relative_change(tested.detectable_size)
     named: Sequence[EffectSize] = sizes[:1]
     if found:
         significance = [abs(size.change.value) / size.change.standard_uncertainty for size in sizes]
@@ -144,7 +135,7 @@ def _undetermined(cause: Cause, reason: Message) -> Effect:
 
 def _change_quantity(fitted: LinearFit, weights: Floats) -> Quantity:
     """Relative change from a difference of ln f_d."""
-    value, deviation, half = estimate_linear_form(fitted, weights)
+    value, deviation, half = linear_model.estimate_linear_form(fitted, weights)
     ends = _relative_change(value - half), _relative_change(value + half)
     return Quantity(_relative_change(value), (1.0 + _relative_change(value)) * deviation, ends, "1")
 

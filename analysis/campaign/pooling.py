@@ -155,15 +155,7 @@ def pool(
     `proportional` (`estimate_scatter`). The interval has Student's coverage factor, and is never narrower
     than the runs' own uncertainties give. Shared errors are added at full size (JCGM 100, 5.2.4).
 
-    Parameters
-    ----------
-    kinds : sequence of str, optional
-        Kind of each series; by default all are of one kind.
-
-    Returns
-    -------
-    list of Pooled
-        In the order of `series`.
+    `kinds` is the kind of each series; by default all are of one kind. The result has the order of `series`.
     """
     of_kind: dict[str, list[int]] = {}
     for place, kind in enumerate(kinds or [""] * len(series)):
@@ -222,7 +214,6 @@ def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:
 
 
 def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[SharedError, float]:
-    """Error of the mean from each shared error."""
     common: dict[SharedError, float] = {}
     for one, share in zip(readings, shares, strict=True):
         for key, deviation in one.common.items():

@@ -111,7 +111,7 @@ def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassF
 
 
 def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMassFit:
-    """Fit up to the stop that the start foretells, then up to that of the fit, until they agree."""
+    """Fit up to the stop predicted by the start, then up to that of the fit, until they agree."""
     part = readings_before_stop(channel, start)
     found = fit(part, start, order)
     for _ in range(_STOPS_TRIED):

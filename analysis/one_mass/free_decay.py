@@ -47,7 +47,7 @@ class SpectralLine:
 
 @dataclass(frozen=True, slots=True)
 class ResidualAssessment:
-    """What was found in residuals."""
+    """Assessment of residuals."""
 
     adequate: bool
     """They are noise, or the rounding of the converter."""
@@ -150,7 +150,7 @@ _GAP_PERIODS_MAX = 1000.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FreeDecayFit:
-    """The fitted decay and what is to be said about it."""
+    """A fitted decay with its assessment and warnings."""
 
     fit: OneMassFit
     """With viscous and Coulomb damping."""

@@ -1,4 +1,4 @@
-"""Turning points of a free decay, and what they alone tell: period, log decrement, Coulomb part."""
+"""Turning points of a free decay, and the period, log decrement and Coulomb part that follow from them."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _CLASSICAL_SHARE = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoints:
-    """Extremes of a decay that were seen."""
+    """Measured extremes of a decay."""
 
     number: "np.ndarray[tuple[int], np.dtype[np.int64]]"
     """(k,) int64: half cycles since the first; increasing, not necessarily without gaps."""

@@ -1,4 +1,4 @@
-"""Whether the masses given agree with the motion.
+"""Check that the stated masses agree with the motion.
 
 While the plate slides, the table swings alone, with c/m1 instead of c/(m1 + m2). So the record determines the
 ratio of the masses. Where no law explains a record, a wrong ratio may be the cause. The ratio is estimated
@@ -22,7 +22,7 @@ from analysis.results.joint_fit import JointFit
 from messages.message import message
 
 _LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
-"""Table masses that are tried, as shares of the one given, and the step from one to the next."""
+"""Table masses that are tried, as shares of the one given, and the step between neighbours."""
 _ALIKE = 0.05
 """Relative deviation of the ratio of the masses up to which they may be each other's."""
 _WINDOW_PERIODS = 1.5
@@ -35,7 +35,7 @@ _SHARE = 0.01
 _SIGMAS = 5.0
 """A table mass is contradicted by a difference of so many standard uncertainties."""
 _BETTER = 0.1
-"""What chi-square has too much must shrink to this share."""
+"""The excess of chi-square must shrink to this share."""
 
 
 def mass_warnings(joint: JointFit) -> list[ResultWarning]:
@@ -76,7 +76,7 @@ def _loosened(problem: FitProblem, fit: Fit) -> Fit:
 
 
 def _deviation(fit: Fit) -> float:
-    """Standard uncertainty (kg) of a free table mass; without end where the motion does not tell it."""
+    """Standard uncertainty (kg) of a free table mass; infinite where the motion does not determine it."""
     if not fit.determines(Parameter.TABLE_MASS):
         return float("inf")
     variance, _ = covariance(fit.normal_matrix)
@@ -105,7 +105,7 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
 
 
 def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[Floats]]:
-    """The search with another table mass, and where its first slip leads."""
+    """Search with another table mass, and the point fitted to its first slip."""
     masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
     problem = build_problem(record.replace(masses=masses), decay)
     start, guided = initial_guess(problem, decay)

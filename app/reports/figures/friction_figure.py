@@ -1,4 +1,4 @@
-"""Fig. 2 of the paper: static and dynamic friction by contact, with what each series found."""
+"""Fig. 2 of the paper: static and dynamic friction by contact, with the values of each series."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -26,7 +26,7 @@ _NAME_LENGTH = 14
 
 
 def contact_names(stands: Iterable[Stand]) -> dict[str, str]:
-    """What the codes of contacts stand for on these stands."""
+    """Names of contacts on these stands, by code."""
     return {code: contact.name for stand in stands for code, contact in stand.contacts.items()}
 
 
@@ -88,14 +88,14 @@ def _beside(place: float, count: int) -> list[float]:
 
 
 def _look(colour: str, shade: float) -> dict[str, Any]:
-    """An opaque tint: darker for f_s, so that grey print tells them apart; patterns do not print alike."""
+    """Return an opaque tint, darker for f_s, so that both differ in grey print; patterns print unevenly."""
     ink = np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)])
     face = tuple(np.round(255.0 - shade * (255.0 - ink)) / 255.0)
     return {"facecolor": face, "edgecolor": colour, "linewidth": 0.8}
 
 
 def _label(contact: str, names: Mapping[str, str]) -> str:
-    """Code, and below it what it stands for, in lines."""
+    """Code, and below it the name in lines."""
     if not contact:
         return "contact\nunknown"
     lines = [contact]

@@ -271,7 +271,7 @@ def _simulated(axes: Axes, time_s: Floats, value: Floats) -> None:
 
 
 def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: tuple[str, str]) -> None:
-    """Table and plate, told apart by colour and dash."""
+    """Draw table and plate in different colours and dashes."""
     axes.plot(time_s, values[0], color=TABLE, linewidth=0.9, label=labels[0])
     axes.plot(time_s, values[1], color=PLATE, linewidth=1.1, linestyle=DASHED, label=labels[1])
 

@@ -75,9 +75,9 @@ def print_style() -> Iterator[None]:
         yield
 
 
-def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Figure, Axes]:
-    """An empty figure with its axes, a column wide."""
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+def new_figure(height_in: float = 2.5) -> tuple[Figure, Axes]:
+    """Return an empty figure with its axes, one column wide."""
+    figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
     return figure, figure.subplots()
 
 

@@ -1,1 +1,1 @@
-"""A test report to sign, of one run or a campaign: what it says, and how it becomes PDF."""
+"""Test report to sign, of one run or a campaign: content and typesetting as PDF."""

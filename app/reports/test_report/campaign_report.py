@@ -17,6 +17,7 @@ from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
 from app.reports.table.content import TableContent, row_cells, table_quantities
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
+from app.reports.test_report import shared
 from app.reports.test_report.blocks import (
     Block,
     Cell,
@@ -28,15 +29,6 @@ from app.reports.test_report.blocks import (
     Section,
     Symbol,
     Text,
-)
-from app.reports.test_report.shared import (
-    drawing,
-    fingerprint_columns,
-    gauges_section,
-    procedure,
-    signatures,
-    stand_section,
-    without_empty,
 )
 from app.runs.analyze import Analysis
 from app.runs.campaign.collect import CollectedRuns
@@ -84,12 +76,12 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
         Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
         Section("Repeatability", [repeats], wide=True),
         Section("Figures", list(_figures(material))),
-        stand_section(list(gathered.stands.values())),
-        gauges_section(list(gathered.gauges.values())),
-        procedure(),
+        shared.stand_section(list(gathered.stands.values())),
+        shared.gauges_section(list(gathered.gauges.values())),
+        shared.procedure(),
         Section("Runs", [_runs(material)], wide=True),
-        Section("Data", fingerprint_columns(prints)),
-        signatures(),
+        Section("Data", shared.fingerprint_columns(prints)),
+        shared.signatures(),
     ]
 
 
@@ -111,7 +103,7 @@ def _summary(material: CampaignReportInput) -> Facts:
         ("stand", ", ".join(stand.name for stand in gathered.stands.values())),
         ("source", ", ".join(sorted({one.source for one in facts if one.source}))),
     ]
-    return without_empty(rows)
+    return shared.without_empty(rows)
 
 
 def _notes(material: CampaignReportInput) -> Iterator[Section]:
@@ -134,15 +126,15 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
         for row in material.content.campaign.rows
         if _FRICTION in row.quantities
     }
-    shared = {label: _by_source(one) for label, one in pooled.items()}
-    sources = list(dict.fromkeys(source for of_it in shared.values() for source in of_it))
+    by_source = {label: _by_source(one) for label, one in pooled.items()}
+    sources = list(dict.fromkeys(source for of_it in by_source.values() for source in of_it))
     rows: list[list[Cell]] = [
         [
             label,
             format_value(one.quantity.value, one.quantity.standard_uncertainty).in_print,
             typeset(format_uncertainty(one.repeatable)),
             *(
-                typeset(format_uncertainty(shared[label][source])) if source in shared[label] else ""
+                typeset(format_uncertainty(by_source[label][source])) if source in by_source[label] else ""
                 for source in sources
             ),
         ]
@@ -157,7 +149,7 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
 
 
 def _by_source(pooled: PooledQuantity) -> dict[str, float]:
-    """Shared parts by source, whoever shares them."""
+    """Shared uncertainties by source, combined over calibrations and stands."""
     found: dict[str, float] = {}
     for error, deviation in pooled.common.items():
         source = str(error.source)
@@ -169,7 +161,7 @@ def _figures(material: CampaignReportInput) -> Iterator[Block]:
     names = contact_names(material.gathered.stands.values())
     with print_style():
         figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
-        items = [] if figure is None else [drawing(figure, CAPTION)]
+        items = [] if figure is None else [shared.drawing(figure, CAPTION)]
         for analysis in material.shown:
             items += _of_run(analysis)
     yield Drawings(items) if items else Text("No run determined friction.")
@@ -179,7 +171,7 @@ def _of_run(analysis: Analysis) -> list[Drawing]:
     drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
     made = [(one.render(drawn), f"{run}. {one.caption}") for one in RUN_FIGURES if one.number in _DRAWN]
-    return [drawing(figure, said) for figure, said in made if figure is not None]
+    return [shared.drawing(figure, said) for figure, said in made if figure is not None]
 
 
 def _runs(material: CampaignReportInput) -> Grid:

@@ -1,4 +1,4 @@
-"""What the report of one run says."""
+"""Sections of the report of one run."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -21,6 +21,7 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
+from app.reports.test_report import shared
 from app.reports.test_report.blocks import (
     Block,
     Cell,
@@ -33,17 +34,6 @@ from app.reports.test_report.blocks import (
     Section,
     Symbol,
     Text,
-)
-from app.reports.test_report.shared import (
-    drawing,
-    fingerprint_columns,
-    format_time,
-    gauges_section,
-    in_unit,
-    procedure,
-    signatures,
-    stand_section,
-    without_empty,
 )
 from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
@@ -77,15 +67,15 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Result", [*_notices(found, excluded), *_result(found)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
-        stand_section([run.metadata.stand]),
-        gauges_section([run.metadata.gauges]),
-        procedure(),
+        shared.stand_section([run.metadata.stand]),
+        shared.gauges_section([run.metadata.gauges]),
+        shared.procedure(),
         Section("Results", list(_results(found))),
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
         Section("Warnings", [Points(warnings) if warnings else Text("None.")]),
-        Section("Data", [*fingerprint_columns([print_of_file]), without_empty(columns)]),
-        signatures(),
+        Section("Data", [*shared.fingerprint_columns([print_of_file]), shared.without_empty(columns)]),
+        shared.signatures(),
     ]
 
 
@@ -136,9 +126,9 @@ def _test(analysis: Analysis) -> Facts:
         ("title", metadata.title),
         ("series", metadata.series or "none"),
         ("contact", metadata.contact),
-        ("begun", format_time(metadata.start_time)),
+        ("begun", shared.format_time(metadata.start_time)),
         ("operator", metadata.operator),
-        ("nominal pullback", in_unit(metadata.pullback_m, MILLIMETRE, 2)),
+        ("nominal pullback", shared.in_unit(metadata.pullback_m, MILLIMETRE, 2)),
         ("table mass m1", f"{metadata.table_mass_kg:g} {KILOGRAM.symbol}"),
         ("plate mass m2", f"{metadata.plate_mass_kg:g} {KILOGRAM.symbol}"),
         ("device", " ".join(filter(None, (device.name, device.firmware, device.serial_number)))),
@@ -147,12 +137,12 @@ def _test(analysis: Analysis) -> Facts:
         ("nominal rate", "" if metadata.rate_hz is None else f"{metadata.rate_hz:g} samples a second"),
         ("source", metadata.source),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
-        ("hold before release", "" if ending is None else in_unit(ending.dwell_s, SECOND, 2)),
-        ("slip lasted", in_unit(slip_s, SECOND, 3)),
+        ("hold before release", "" if ending is None else shared.in_unit(ending.dwell_s, SECOND, 2)),
+        ("slip lasted", shared.in_unit(slip_s, SECOND, 3)),
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
     ]
-    return without_empty(rows)
+    return shared.without_empty(rows)
 
 
 def _samples(losses: Losses) -> str:
@@ -165,8 +155,8 @@ def _samples(losses: Losses) -> str:
 def _conditions(metadata: RunMetadata) -> Facts:
     conditions: Conditions = metadata.conditions
     rows = [
-        ("temperature", in_unit(conditions.temperature_c, Unit("°C"), 1)),
-        ("humidity", in_unit(conditions.humidity_percent, Unit("%"), 0)),
+        ("temperature", shared.in_unit(conditions.temperature_c, Unit("°C"), 1)),
+        ("humidity", shared.in_unit(conditions.humidity_percent, Unit("%"), 0)),
         ("plate", conditions.plate_id),
         ("surfaces", conditions.contact_id),
         ("surface preparation", conditions.surface_preparation),
@@ -176,7 +166,7 @@ def _conditions(metadata: RunMetadata) -> Facts:
         ),
         *conditions.other.items(),
     ]
-    stated = without_empty(rows)
+    stated = shared.without_empty(rows)
     return stated if stated.rows else Facts([("conditions", "none were noted")])
 
 
@@ -214,7 +204,7 @@ def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
 
 
 def _budget(found: Identification) -> Iterator[Block]:
-    """A row a source, a column a result; the largest source of the first result first."""
+    """One row for each source, one column for each result; the largest source of the first result first."""
     rows = [definition(name) for name in _BUDGETED if name in found.results]
     shown = [row.name for row in rows]
     shares = {(str(line.source), line.contribution_to): line.standard_uncertainty for line in found.budget}
@@ -233,7 +223,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     ]
     total: list[Cell] = ["together", ""]
     total += [_share(found.results[row.name].standard_uncertainty, row) for row in rows]
-    note = "Standard uncertainty that each source adds; A: by statistics, B: by what is stated. Empty: none."
+    note = "Standard uncertainty by source; A: from statistics, B: from stated values. Empty: none."
     yield Grid(["source", "type", *heads], [*body, total], numbers=len(shown), note=note)
 
 
@@ -261,7 +251,7 @@ def _figures(analysis: Analysis) -> list[Block]:
     drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
     with print_style():
-        whole = drawing(record_figure(analysis.record, analysis.identification), caption)
+        whole = shared.drawing(record_figure(analysis.record, analysis.identification), caption)
         made = [(one.render(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
-        items = [drawing(figure, said) for figure, said in made if figure is not None]
+        items = [shared.drawing(figure, said) for figure, said in made if figure is not None]
     return [whole, Drawings(items)] if items else [whole]
