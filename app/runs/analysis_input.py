@@ -28,7 +28,6 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
 
     Parameters
     ----------
-    run : Run
     metres_only : bool
         Refuse readings that are not displacements in metres. An analysis of free decay alone takes
         any unit; its results are then in `run.metadata.unit`.

@@ -84,8 +84,6 @@ def analyze_run(
 
     Parameters
     ----------
-    path, request
-    save : bool
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
     validator : Validator, optional

@@ -30,24 +30,16 @@ class BlockLayout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunBlock:
-    """Consecutive rows of a run.
-
-    Attributes
-    ----------
-    time_s : (n,) float64
-        Since the first stored sample, on the device's or nominal clock.
-    readings : (n, channels) float64
-        Calibrated readings, displacements (m) as a rule; NaN where absent.
-    status : (n,) uint8
-        `drivers.samples.SampleStatus` flags.
-    counts : (n, channels) int32 or float64, or None
-        As received, of the type that the layout says.
-    """
+    """Consecutive rows of a run."""
 
     time_s: NDArray[np.float64]
+    """(n,) float64: since the first stored sample, on the device's or nominal clock."""
     readings: NDArray[np.float64]
+    """(n, channels) float64: calibrated readings, displacements (m) as a rule; NaN where absent."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
     counts: NDArray[np.int32] | NDArray[np.float64] | None = None
+    """(n, channels) int32 or float64, or None: as received, of the type that the layout says."""
 
     def __len__(self) -> int:
         return len(self.time_s)

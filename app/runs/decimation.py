@@ -23,26 +23,17 @@ _ROWS_AT_ONCE = 1 << 16
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DecimatedRun:
-    """What a small drawing of a run shows.
-
-    Attributes
-    ----------
-    path : Path
-    unit : str
-        Of the readings.
-    release_s : float or None
-        As the newest saved analysis found it, else as it was when recorded.
-    time_s : (m,) float64
-        Of each span of rows, twice; of each row where the run is short.
-    readings : tuple of (m,) float64
-        Lowest and highest reading of each span, of the table gauge and of the other if there is one.
-    """
+    """What a small drawing of a run shows."""
 
     path: Path
     unit: str
+    """Of the readings."""
     release_s: float | None
+    """As the newest saved analysis found it, else as it was when recorded."""
     time_s: Floats
+    """(m,) float64: of each span of rows, twice; of each row where the run is short."""
     readings: tuple[Floats, ...]
+    """Lowest and highest reading of each span, of the table gauge and of the other if there is one."""
 
 
 def open_decimated(
@@ -54,6 +45,8 @@ def open_decimated(
 ) -> DecimatedRun:
     """Read a run as it is drawn small.
 
+    Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
+
     Parameters
     ----------
     path
@@ -64,10 +57,6 @@ def open_decimated(
         Leave out what came earlier than so long before the release, where that is known.
     validator
         As in `app.runs.reader.open_run`.
-
-    Raises
-    ------
-    RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
     """
     return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
 

@@ -49,7 +49,6 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Ch
 
     Parameters
     ----------
-    path, author
     fields
         Only an edit of one of these is undone. What was edited again since stays as it is.
 

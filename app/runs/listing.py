@@ -43,11 +43,6 @@ class SummaryCache:
 
     A cache that is damaged, or of another version, is begun anew; one that cannot be written is kept in
     memory for this time.
-
-    Attributes
-    ----------
-    known : dict
-        File state and summary of each path, as they were when it was opened.
     """
 
     def __init__(self, path: str) -> None:

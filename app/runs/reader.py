@@ -38,41 +38,28 @@ _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Run:
-    """A run as stored, with all edits applied.
-
-    Attributes
-    ----------
-    path : Path
-    identifier : str
-        UUID given when it was recorded.
-    metadata : RunMetadata
-        With the latest value of every edited field.
-    end : EndMetadata or None
-        None for a run that was never closed: its writer died.
-    time_s : (n,) float64
-        Since the first stored sample, on the device's or nominal clock.
-    table_reading : (n,) float64
-        Gauge 1, in `metadata.unit`; NaN where absent.
-    relative_reading : (n,) float64 or None
-        Gauge 2, plate against table or against base as its calibration says; None without one.
-    status : (n,) uint8
-        `drivers.samples.SampleStatus` flags.
-    analyses : tuple of SavedAnalysis
-        Oldest first.
-    changes : tuple of Change
-        Edits, oldest first.
-    """
+    """A run as stored, with all edits applied."""
 
     path: Path
     identifier: str
+    """UUID given when it was recorded."""
     metadata: RunMetadata
+    """With the latest value of every edited field."""
     end: EndMetadata | None
+    """None for a run that was never closed: its writer died."""
     time_s: NDArray[np.float64]
+    """(n,) float64: since the first stored sample, on the device's or nominal clock."""
     table_reading: NDArray[np.float64]
+    """(n,) float64: gauge 1, in `metadata.unit`; NaN where absent."""
     relative_reading: NDArray[np.float64] | None
+    """(n,) float64 or None: gauge 2, plate against table or against base as its calibration says; None
+    without one."""
     status: NDArray[np.uint8]
+    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
     analyses: tuple[SavedAnalysis, ...]
+    """Oldest first."""
     changes: tuple[Change, ...]
+    """Edits, oldest first."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -89,30 +76,21 @@ class Run:
 
 
 class Fingerprint(msgspec.Struct, frozen=True):
-    """Hash, identifier and checksums of one run file.
-
-    Attributes
-    ----------
-    name : str
-        File name without folder.
-    size_bytes : int
-    sha256 : str
-        Of the whole file. It changes with every analysis or edit that is added to the run.
-    identifier : str
-        UUID given when it was recorded; never changes.
-    columns : dict of str
-        CRC-32 of each column of samples, hexadecimal, as stored when the run was closed; never changes.
-    """
+    """Hash, identifier and checksums of one run file."""
 
     name: str
+    """File name without folder."""
     size_bytes: int
     sha256: str
+    """Of the whole file. It changes with every analysis or edit that is added to the run."""
     identifier: str = ""
+    """UUID given when it was recorded; never changes."""
     columns: dict[str, str] = {}
+    """CRC-32 of each column of samples, hexadecimal, as stored when the run was closed; never changes."""
 
 
 def open_run(path: Path | str, *, validator: Validator | None = None, trusted: bool = False) -> Run:
-    """Read a run.
+    """Read a run. Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
 
     Parameters
     ----------
@@ -123,10 +101,6 @@ def open_run(path: Path | str, *, validator: Validator | None = None, trusted: b
         many runs.
     trusted
         The caller wrote and checked the file itself: read it without validation.
-
-    Raises
-    ------
-    RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
     """
     return validate_and_read(path, _read, validator=validator, trusted=trusted)
 
@@ -178,9 +152,7 @@ def validate_and_read(
 def check_openable(path: Path) -> None:
     """Refuse, without HDF5, what is visibly no closed or abandoned run.
 
-    Raises
-    ------
-    RunNotFoundError, BeingRecordedError, NotARunError
+    Raises RunNotFoundError, BeingRecordedError, NotARunError.
     """
     try:
         if path.is_dir():

@@ -222,6 +222,8 @@ def _or_none(value: float) -> float | None:
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples, which never change.
 
+    Raises DamagedRunError.
+
     Parameters
     ----------
     file
@@ -230,10 +232,6 @@ def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses
         What `read_metadata` gives of it, where that has been read already.
     masses_kg
         `table_mass_kg`, `plate_mass_kg`: what stood for the run's own in the analysis.
-
-    Raises
-    ------
-    DamagedRunError
     """
     metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}

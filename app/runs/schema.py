@@ -72,66 +72,43 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One metadata field.
-
-    Attributes
-    ----------
-    path : str
-        Where it is stored.
-    description : str
-        One line for people.
-    attribute : str
-        Dotted path of the value in memory; "" where the program writes the field by itself.
-    kind : Kind
-    unit : str
-        Attribute `units`; `{unit}` stands for the unit of the readings.
-    default : object
-        Value of a field that the file does not hold or that is NaN.
-    required : bool
-        A file without the field is damaged.
-    reserved_bytes : int
-        Room that the template makes for a text which is known at the end only.
-    since : str
-        Version of the program that wrote the field first.
-    """
+    """One metadata field."""
 
     path: str
+    """Where it is stored."""
     description: str
+    """One line for people."""
     attribute: str = ""
+    """Dotted path of the value in memory; "" where the program writes the field by itself."""
     kind: Kind = Kind.NUMBER
     unit: str = ""
+    """Attribute `units`; `{unit}` stands for the unit of the readings."""
     default: Any = None
+    """Value of a field that the file does not hold or that is NaN."""
     required: bool = False
+    """A file without the field is damaged."""
     reserved_bytes: int = 0
+    """Room that the template makes for a text which is known at the end only."""
     since: str = FIRST_VERSION
+    """Version of the program that wrote the field first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One dataset that grows with the run.
-
-    Attributes
-    ----------
-    path, description : str
-    dtype : str
-    attributes : dict
-        Attributes of HDF5.
-    fill : float
-        Value of rows that are not written.
-    chunk : int
-        Rows a chunk; 0 is `CHUNK`.
-    compressed : bool
-        Only datasets that are written when the run is closed are: a `kill -9` can make a compressed dataset
-        that grows unreadable.
-    """
+    """One dataset that grows with the run."""
 
     path: str
     description: str
     dtype: str
     attributes: dict[str, str]
+    """Attributes of HDF5."""
     fill: float = 0.0
+    """Value of rows that are not written."""
     chunk: int = 0
+    """Rows a chunk; 0 is `CHUNK`."""
     compressed: bool = False
+    """Only datasets that are written when the run is closed are: a `kill -9` can make a compressed dataset
+    that grows unreadable."""
 
 
 def _text(path: str, description: str, attribute: str = "", **more: Any) -> Field:

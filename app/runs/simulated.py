@@ -40,11 +40,8 @@ def write_simulated_run(
 ) -> StoredRun:
     """Store a simulated motion as a run: held at the pullback for `plateau_s`, then released.
 
-    The run's nominal pullback is the size alone, as of a recorded one; its truth holds the side too.
-
-    Raises
-    ------
-    RunError, ConfigError
+    The run's nominal pullback is the size alone, as of a recorded one; its truth holds the side too. Raises
+    RunError, ConfigError.
     """
     held = round(plateau_s * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
@@ -77,12 +74,7 @@ def store_motion(
     release_s: float | None = None,
     replace: bool = False,
 ) -> StoredRun:
-    """Store even samples (n,) at `metadata.rate_hz` as a run without counts.
-
-    Raises
-    ------
-    RunError
-    """
+    """Store even samples (n,) at `metadata.rate_hz` as a run without counts. Raises RunError."""
     if metadata.rate_hz is None:
         raise ValueError("rate_hz is None: even samples need a rate. Give one")
     n = len(table_displacement_m)

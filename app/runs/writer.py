@@ -52,9 +52,7 @@ def create_run_in(
 ) -> "RunWriter":
     """Create a run under the next free name in `folder`, like `20261121T143205_1FFM0_001.h5`.
 
-    Raises
-    ------
-    MetadataError, DiskFullError, WriteError
+    Raises MetadataError, DiskFullError, WriteError.
     """
     make_folder(folder)
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
@@ -79,6 +77,8 @@ def create_run(
 ) -> "RunWriter":
     """Create a run file with everything that is known before the first sample.
 
+    Raises RunExistsError, MetadataError, DiskFullError, WriteError.
+
     Parameters
     ----------
     path
@@ -89,10 +89,6 @@ def create_run(
         Its raw bytes are copied into the file at the end.
     identifier
         UUID of the run; a new one if empty.
-
-    Raises
-    ------
-    RunExistsError, MetadataError, DiskFullError, WriteError
     """
     path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
@@ -116,11 +112,7 @@ def write_run(
 ) -> StoredRun:
     """Write a whole run at once, imported or simulated, or no file.
 
-    `path` must not exist unless `replace`.
-
-    Raises
-    ------
-    RunExistsError, MetadataError, DiskFullError, WriteError
+    `path` must not exist unless `replace`. Raises RunExistsError, MetadataError, DiskFullError, WriteError.
     """
     path = path.absolute()
     target = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") if replace else path
@@ -140,17 +132,7 @@ def write_run(
 
 
 class RunWriter:
-    """An open run file, made by `create_run`. After a WriteError it must not be used again.
-
-    Attributes
-    ----------
-    losses : Losses
-        Statistics of the rows appended until now, from their flags.
-    flushed_samples : int
-        Rows that the file holds whatever happens next.
-    usable : bool
-        False once HDF5 failed. The file must then be left alone: it stays as it was flushed last.
-    """
+    """An open run file, made by `create_run`. After a WriteError it must not be used again."""
 
     def __init__(
         self,

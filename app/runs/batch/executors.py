@@ -59,18 +59,12 @@ class Executor(Protocol):
 
 
 class ExecutorOptions(msgspec.Struct, frozen=True):
-    """Choice of executor.
-
-    Attributes
-    ----------
-    jobs : int or None
-        Largest number of processes; None uses all processors, and this process alone for few runs.
-    dask : str
-        Address of a Dask scheduler; "" for this computer.
-    """
+    """Choice of executor."""
 
     jobs: int | None = None
+    """Largest number of processes; None uses all processors, and this process alone for few runs."""
     dask: str = ""
+    """Address of a Dask scheduler; "" for this computer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +79,7 @@ class FailedItem(Generic[Item]):
 def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
     """Open an executor for this many runs; an error in the block cancels its work.
 
-    Raises
-    ------
-    ExtraMissingError, ClusterError
+    Raises ExtraMissingError, ClusterError.
     """
     executor = _choose(options, runs)
     try:
@@ -113,7 +105,6 @@ def ordered_map(
 
     Parameters
     ----------
-    executor
     work
         Function of a module.
     items

@@ -22,49 +22,31 @@ from messages.message import Message, MessageError, message
 
 
 class AnalysisTask(msgspec.Struct, frozen=True):
-    """One run to analyse.
-
-    Attributes
-    ----------
-    path : str
-    request : AnalysisRequest
-    save : bool
-        Keep the result in the run, unless one of the same request is kept there that still stands.
-    anew : bool
-        Analyse and save in any case.
-    """
+    """One run to analyse."""
 
     path: str
     request: AnalysisRequest = AnalysisRequest()
     save: bool = False
+    """Keep the result in the run, unless one of the same request is kept there that still stands."""
     force: bool = False
+    """Analyse and save in any case."""
 
 
 class AnalysisOutcome(msgspec.Struct, frozen=True):
-    """What became of one run.
-
-    Attributes
-    ----------
-    run : str
-        Absolute path.
-    document : Document or None
-        As `analyze --json` says it; None where the run could not be analysed.
-    error : Message
-        Reason why not; empty otherwise.
-    up_to_date : bool
-        The document is the one that was kept in the run.
-    unit : str
-        Of the readings.
-    ended : str
-        Why the recording ended; "" for a run that was never closed.
-    """
+    """What became of one run."""
 
     run: str
+    """Absolute path."""
     document: Document | None = None
+    """As `analyze --json` says it; None where the run could not be analysed."""
     error: Message = Message("")
+    """Reason why not; empty otherwise."""
     up_to_date: bool = False
+    """The document is the one that was kept in the run."""
     unit: str = "m"
+    """Of the readings."""
     ended: str = ""
+    """Why the recording ended; "" for a run that was never closed."""
 
 
 def analyze_one(

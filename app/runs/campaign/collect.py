@@ -25,25 +25,16 @@ Progress = Callable[[float, str], None]
 
 
 class CollectOptions(msgspec.Struct, frozen=True):
-    """How to gather.
-
-    Attributes
-    ----------
-    crew : CrewOptions
-        Who does it.
-    save : bool
-        Keep new results in their runs.
-    request : AnalysisRequest
-        How to analyse runs whose result does not stand.
-    excluded : dict of str
-        Why runs do not count, by their absolute paths: reasons of whoever asks, beside those that are kept
-        in the runs.
-    """
+    """How to gather."""
 
     executor: ExecutorOptions = ExecutorOptions()
     save: bool = False
+    """Keep new results in their runs."""
     request: AnalysisRequest = AnalysisRequest(classical=False)
+    """How to analyse runs whose result does not stand."""
     excluded: dict[str, str] = {}
+    """Why runs do not count, by their absolute paths: reasons of whoever asks, beside those that are kept in
+    the runs."""
 
 
 class FailedRun(msgspec.Struct, frozen=True):
@@ -60,32 +51,21 @@ class FailedRun(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CollectedRuns:
-    """Runs with their results.
-
-    Attributes
-    ----------
-    runs : tuple of RunResult
-        In the order given, those of a folder by name; `name` is the absolute path.
-    failures : tuple of Failure
-    cautions : tuple of Caution
-        What must be known of the runs together, and what to do.
-    facts : dict of RunFacts
-        By the names of the runs.
-    stands : dict of Stand
-        By `RunFacts.stand`.
-    gauges : dict of Gauges
-        By `RunFacts.calibration`.
-    left_out : tuple of Excluded
-        Runs without a result that do not count anyway, and why.
-    """
+    """Runs with their results."""
 
     runs: tuple[RunResult, ...]
+    """In the order given, those of a folder by name; `name` is the absolute path."""
     failures: tuple[FailedRun, ...]
     warnings: tuple[ResultWarning, ...]
+    """What must be known of the runs together."""
     details: dict[str, RunDetails]
+    """By the names of the runs."""
     stands: dict[str, Stand]
+    """By `RunFacts.stand`."""
     gauges: dict[str, Gauges]
+    """By `RunFacts.calibration`."""
     excluded: tuple[Excluded, ...] = ()
+    """Runs without a result that are excluded in any case, with reasons."""
 
     def campaign(self) -> Campaign:
         """Everything summed up; what does not count is listed, whether it has a result or not."""

@@ -44,32 +44,13 @@ class CollectTask(msgspec.Struct, frozen=True):
 
 
 class RunDetails(msgspec.Struct, frozen=True):
-    """What is known of a run beside its result.
-
-    Attributes
-    ----------
-    identifier : str
-        UUID given when it was recorded: the same under every name.
-    start_time : datetime
-    series, operator, note, source : str
-        "" where not known.
-    conditions : Conditions
-    table_mass_kg, plate_mass_kg : float
-    stand, calibration : str
-        Identities, see `Gathered.stands` and `Gathered.gauges`.
-    analysis : int or None
-        NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept.
-    stale : bool
-        A newer analysis is kept in the run that does not stand any more.
-    truth : dict
-        Of a simulated run.
-    excluded : str
-        Why the run does not count, as kept in it; "" for one that does.
-    """
+    """What is known of a run beside its result."""
 
     identifier: str
+    """UUID given when it was recorded: the same under every name."""
     start_time: datetime.datetime
     series: str
+    """"" where not known."""
     operator: str
     note: str
     source: str
@@ -77,11 +58,16 @@ class RunDetails(msgspec.Struct, frozen=True):
     table_mass_kg: float
     plate_mass_kg: float
     stand: str
+    """Identities, see `Gathered.stands` and `Gathered.gauges`."""
     calibration: str
     analysis: int | None = None
+    """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
     stale: bool = False
+    """A newer analysis is kept in the run that does not stand any more."""
     truth: dict[str, float | int | str] = {}
+    """Of a simulated run."""
     excluded: str = ""
+    """Why the run does not count, as kept in it; "" for one that does."""
 
 
 class CollectedRun(msgspec.Struct, frozen=True):

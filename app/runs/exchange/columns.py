@@ -13,23 +13,16 @@ from messages.message import Message, message
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ForeignColumns:
-    """What was asked of a foreign file.
-
-    Attributes
-    ----------
-    path : Path
-    values : (n, 2 or 3) float64
-        Time, table and, if asked for, the second gauge, as written; NaN where a reading is absent.
-    names : list of str
-        The columns, as named in messages.
-    place : callable
-        Names a row of `values` as the file counts it: `line 4`.
-    """
+    """What was asked of a foreign file."""
 
     path: Path
     values: NDArray[np.float64]
+    """(n, 2 or 3) float64: time, table and, if asked for, the second gauge, as written; NaN where a reading
+    is absent."""
     names: list[str]
+    """The columns, as named in messages."""
     row_label: Callable[[int], str]
+    """Names a row of `values` as the file counts it: `line 4`."""
 
     def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
         """Error that names file, row, and column."""

@@ -21,39 +21,25 @@ COEFFICIENT_COLUMNS = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SampleColumn:
-    """Samples of one kind.
-
-    Attributes
-    ----------
-    name : str
-        With the unit: `table_displacement_m`.
-    values : (n,) float64, int32 or uint8
-        NaN where a reading is absent.
-    unit : str
-        "1" for flags, "count" for readings as received.
-    """
+    """Samples of one kind."""
 
     name: str
+    """With the unit: `table_displacement_m`."""
     values: NDArray[Any]
+    """(n,) float64, int32 or uint8; NaN where a reading is absent."""
     unit: str
+    """"1" for flags, "count" for readings as received."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ExportedRun:
-    """A run and what was found in it.
-
-    Attributes
-    ----------
-    run : Run
-    analysis : dict or None
-        As `analyze --json` gives it; None leaves the coefficients out.
-    samples : tuple of Column
-        Time, readings, status, counts; empty where samples are left out.
-    """
+    """A run and what was found in it."""
 
     run: Run
     analysis: Document | None
+    """As `analyze --json` gives it; None leaves the coefficients out."""
     samples: tuple[SampleColumn, ...] = field(default=())
+    """Time, readings, status, counts; empty where samples are left out."""
 
     @property
     def name(self) -> str:

@@ -49,29 +49,19 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class CsvText:
-    """A CSV file taken apart as far as its header.
-
-    Attributes
-    ----------
-    path : Path
-    text : str
-        The whole file, its lines ended by single newlines.
-    data : Line
-        First line of data.
-    delimiter, decimal : str
-    names : list of str
-        Column names; empty without a header.
-    columns : list of int
-        Positions of time, table and, if asked for, the second gauge.
-    """
+    """A CSV file taken apart as far as its header."""
 
     path: Path
     text: str
+    """The whole file, its lines ended by single newlines."""
     data: Line
+    """First line of data."""
     delimiter: str
     decimal: Literal[".", ","]
     names: list[str]
+    """Column names; empty without a header."""
     columns: list[int]
+    """Positions of time, table and, if asked for, the second gauge."""
 
     def column_name(self, position: int) -> str:
         """How to name a column in a message."""
@@ -81,12 +71,8 @@ class CsvText:
 def open_csv(path: Path, layout: CsvOptions) -> CsvText:
     """Read a CSV file as far as its header, and find the columns.
 
-    Lines that are blank or begin with `#` are left out; where no header stands above the numbers,
-    the last `#` line before them is taken for it if it has as many cells.
-
-    Raises
-    ------
-    ImportFileError
+    Lines that are blank or begin with `#` are left out; where no header stands above the numbers, the last
+    `#` line before them is taken for it if it has as many cells. Raises ImportFileError.
     """
     source = survey_csv(path, layout)
     width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
@@ -257,10 +243,7 @@ def _header(
 def read_columns(path: Path, layout: CsvOptions) -> ForeignColumns:
     """Read time and gauges from a CSV file.
 
-    Raises
-    ------
-    ImportFileError
-        Names the line and column of a cell that is not a number, or a cut line.
+    Raises ImportFileError, which names the line and column of a cell that is not a number, or a cut line.
     """
     source = open_csv(path, layout)
     values = _quick(source)

@@ -32,21 +32,13 @@ WriteCoefficients = Callable[..., None]
 
 @dataclass(frozen=True, slots=True)
 class ExportFormat:
-    """How a format is written.
-
-    Attributes
-    ----------
-    suffix : str
-    write_run : callable
-        Takes an `Exported`, a path and `replace`.
-    write_coefficients : callable or None
-        Takes several `Exported`, a path and `replace`; None where the format holds samples alone.
-    holds_samples : bool
-    """
+    """How a format is written."""
 
     suffix: str
     write_run: WriteRun
+    """Takes an `Exported`, a path and `replace`."""
     write_coefficients: WriteCoefficients | None
+    """Takes several `Exported`, a path and `replace`; None where the format holds samples alone."""
     holds_samples: bool = True
 
 

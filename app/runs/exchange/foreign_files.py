@@ -25,11 +25,7 @@ _LARGEST_BYTES = 4 << 30
 def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
     """Read the columns of `layout` from a .mat, .xlsx or .parquet file; any other ending is read as CSV.
 
-    Raises
-    ------
-    ImportFileError
-        Names file, row or column, and remedy.
-    ExtraMissingError
+    Raises ExtraMissingError, and ImportFileError, which names file, row or column, and remedy.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
@@ -43,9 +39,7 @@ def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
 def list_columns(path: Path, layout: CsvOptions) -> list[str]:
     """Names of the columns of a .mat, .xlsx or .parquet file, empty where a column has none.
 
-    Raises
-    ------
-    ImportFileError, ExtraMissingError
+    Raises ImportFileError, ExtraMissingError.
     """
     return _reading(path, lambda: _LISTERS[path.suffix.lower()](path, layout))
 

@@ -111,9 +111,7 @@ def import_csv(
 def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
     """Read a foreign file as it would be imported: calibration, its own time of the first row (s), samples.
 
-    Raises
-    ------
-    ImportFileError
+    Raises ImportFileError.
     """
     gauge = _gauge(plan)
     columns = read_foreign(path, plan.layout)
@@ -305,45 +303,29 @@ class ParseOptions(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class FilePreview:
-    """What is in a file.
-
-    Attributes
-    ----------
-    columns : tuple of str
-        As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice.
-    titles : tuple of str
-        The same for people.
-    rows : tuple of tuple of str
-        Cells of the first lines of a text; none of other files.
-    told : Told
-        How the lines are read, found out or told.
-    time, table, second : str
-        Which columns they are likely to be; `second` is empty where there is none.
-    measures : str
-        What `second` is likely to be: `relative` or `plate`.
-    time_unit, unit : str
-        As the names of the columns say; empty where they do not.
-    """
+    """What is in a file."""
 
     columns: tuple[str, ...]
+    """As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice."""
     titles: tuple[str, ...]
+    """The same for people."""
     rows: tuple[tuple[str, ...], ...]
+    """Cells of the first lines of a text; none of other files."""
     options: ParseOptions
+    """How the lines are read, as detected or given."""
     time: str = ""
+    """Which columns they are likely to be; `second` is empty where there is none."""
     table: str = ""
     second: str = ""
     measures: str = "relative"
+    """What `second` is likely to be: `relative` or `plate`."""
     time_unit: str = ""
+    """As the names of the columns say; empty where they do not."""
     unit: str = ""
 
 
 def preview_file(path: Path, told: ParseOptions | None = None) -> FilePreview:
-    """Look into a file that `import_csv` can read.
-
-    Raises
-    ------
-    ImportFileError, ExtraMissingError
-    """
+    """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
     told = told or ParseOptions()
     if is_csv(path):
         return _survey_text(path, told)

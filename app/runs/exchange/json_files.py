@@ -17,9 +17,7 @@ COEFFICIENTS_SCHEMA = "slipstand-coefficients/1"
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a run; numbers that are absent or not finite are null.
 
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    Raises RunExistsError, DiskFullError, WriteError.
     """
     samples = {
         column.name: {"unit": column.unit, "values": json_value(column.values.tolist())}

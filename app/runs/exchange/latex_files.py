@@ -25,11 +25,7 @@ _ESCAPES = {
 def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write one table, a row a run: value and standard uncertainty of each coefficient, a dash where absent.
 
-    A run whose model does not fit bears a dagger.
-
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    A run whose model does not fit bears a dagger. Raises RunExistsError, DiskFullError, WriteError.
     """
     header = " & ".join(("Run", "Series", *(column.latex_heading(Place.TERMINAL) for column in _COLUMNS)))
     lines = [
@@ -49,9 +45,7 @@ def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write the coefficients of one run; a record of samples is nothing to print.
 
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    Raises RunExistsError, DiskFullError, WriteError.
     """
     write_coefficients([exported], path, replace=replace)
 

@@ -14,11 +14,8 @@ _NAME_LENGTH = 63
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a version 5 MAT file: a column vector a channel, and the structs `units`, `run`, `coefficients`.
 
-    `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array.
-
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array. Raises
+    RunExistsError, DiskFullError, WriteError.
     """
     named = {_field_name(column.name): column for column in exported.samples}
     variables: dict[str, Any] = {name: column.values for name, column in named.items()}
@@ -33,9 +30,7 @@ def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> No
 def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write the struct array `coefficients`, one element a quantity of a run.
 
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    Raises RunExistsError, DiskFullError, WriteError.
     """
     rows = [_plain(row) for row in coefficient_documents(runs)]
     _write({"coefficients": rows}, path, replace)

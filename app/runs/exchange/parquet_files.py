@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a run; absent readings are null. The facts are JSON under `slipstand` in the metadata.
 
-    Raises
-    ------
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError.
     """
     pa = import_optional("pyarrow", "Parquet")
     facts = run_metadata_document(exported.run) | {"analysis": exported.analysis}
@@ -38,12 +36,7 @@ def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> No
 
 
 def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
-    """Write a row a quantity.
-
-    Raises
-    ------
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
-    """
+    """Write a row a quantity. Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError."""
     pa = import_optional("pyarrow", "Parquet")
     rows = coefficient_documents(runs)
     kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string())

@@ -24,9 +24,7 @@ _DATA_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12}
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a dataset a gauge, in the unit of the run; absent readings are NaN.
 
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
+    Raises RunExistsError, DiskFullError, WriteError.
     """
     time, *others = exported.samples
     channels = [column for column in others if column.unit == exported.run.metadata.unit]

@@ -55,9 +55,7 @@ def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> No
 def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write a workbook with a row a quantity.
 
-    Raises
-    ------
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError.
     """
     rows = (row for exported in runs for row in coefficient_rows(exported))
     write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path, replace)
@@ -66,9 +64,7 @@ def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool
 def write_sheets(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None:
     """Write sheet after sheet, row after row: header and rows by the name of the sheet.
 
-    Raises
-    ------
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    Raises ExtraMissingError, RunExistsError, DiskFullError, WriteError.
     """
     openpyxl = import_optional("openpyxl", "Excel")
     cell_type = import_optional("openpyxl.cell", "Excel").WriteOnlyCell
