@@ -26,16 +26,9 @@ CLOCK_TOLERANCE = 1e-3
 def to_record(run: "Run", *, metres_only: bool = True) -> Record:
     """Readings, masses and calibration of a run as a record; absent samples are NaN.
 
-    Parameters
-    ----------
-    metres_only : bool
-        Refuse readings that are not displacements in metres. An analysis of free decay alone takes
-        any unit; its results are then in `run.metadata.unit`.
-
-    Raises
-    ------
-    UnsuitableRunError
-        The run holds no samples, or readings of another kind.
+    `metres_only` refuses readings that are not displacements in metres. An analysis of free decay alone takes
+    any unit; its results are then in `run.metadata.unit`. Raises UnsuitableRunError (the run holds no
+    samples, or readings of another kind).
     """
     if not len(run):
         raise UnsuitableRunError("{path} holds no samples. Record the run again", path=run.path)

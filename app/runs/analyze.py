@@ -82,21 +82,10 @@ def analyze_run(
 ) -> Analysis:
     """Identify one run, and keep the result in it with `save`.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Called with the share done (0 to 1) and what is being done.
-    validator : Validator, optional
-        Looks the file over first; give one for many runs. A process of its own is started otherwise.
-    trusted : bool
-        The caller has had the file examined.
-
-    Raises
-    ------
-    RunError
-        The run cannot be read, or not be written.
-    AnalysisError
-        It cannot be identified.
+    `progress` is called with the share done (0 to 1) and what is being done. `validator` is to be given
+    for many runs, else one is started. `trusted`: the caller has validated the file.
+    Raises RunError (the run cannot be read or written), AnalysisError (it cannot
+    be identified).
     """
     run = open_run(path, validator=validator, trusted=trusted)
     record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
@@ -161,12 +150,7 @@ def _with_masses(record: Record, request: AnalysisRequest) -> Record:
 def repeat_saved_analysis(path: Path, validator: Validator | None = None) -> Analysis:
     """Identify a run in the way of its newest analysis that still stands, else in the usual way.
 
-    Raises
-    ------
-    RunError
-        The run cannot be read.
-    AnalysisError
-        It cannot be identified.
+    Raises RunError (the run cannot be read), AnalysisError (it cannot be identified).
     """
     run = open_run(path, validator=validator)
     in_metres = run.metadata.unit == "m" and run.metadata.quantity == "displacement"

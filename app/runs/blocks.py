@@ -107,7 +107,6 @@ class CalibratedBlock:
 
     @property
     def end_index(self) -> int:
-        """Index of the row after the last."""
         return self.first_index + len(self)
 
     @property

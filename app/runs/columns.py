@@ -70,10 +70,7 @@ def store_checksum(file: h5py.File, column: str, value: int) -> None:
 def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:
     """Read rows of a column; all rows of a finished run are checked against the stored checksum.
 
-    Raises
-    ------
-    DamagedRunError
-        The checksums differ.
+    Raises DamagedRunError (the checksums differ).
     """
     values: NDArray[Any] = dataset[rows]
     if len(values) == len(dataset) and is_finished(dataset.file):
@@ -84,12 +81,8 @@ def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:
 def check_column(dataset: h5py.Dataset, value: int, run: Path | str) -> None:
     """Compare the checksum `value` of a column of a finished run with the stored one.
 
-    `run` names the file in the message. Runs from before there were checksums pass.
-
-    Raises
-    ------
-    DamagedRunError
-        The checksums differ.
+    `run` names the file in the message. Runs from before there were checksums pass. Raises DamagedRunError
+    (the checksums differ).
     """
     stored = read_number(dataset.file, schema.checksum_path(dataset.name.lstrip("/")))
     if stored is not None and stored != value:

@@ -49,11 +49,8 @@ _METADATA_CACHED_BYTES = 1 << 16
 def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "") -> h5py.File:
     """Create a run file without samples and leave it open.
 
-    Raises
-    ------
-    OSError, RuntimeError
-        From HDF5, FileExistsError among them.
-    MetadataError, DiskFullError, WriteError
+    Raises OSError and RuntimeError of HDF5, MetadataError, DiskFullError,
+    WriteError.
     """
     if path.exists():
         raise FileExistsError(str(path))

@@ -45,18 +45,8 @@ def open_decimated(
 ) -> DecimatedRun:
     """Read a run as it is drawn small.
 
-    Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
-
-    Parameters
-    ----------
-    path
-        Of the run file.
-    spans : int
-        Equal spans of rows that it is condensed to, about.
-    before_release_s : float
-        Leave out what came earlier than so long before the release, where that is known.
-    validator
-        As in `app.runs.reader.open_run`.
+    `spans` is the number of equal spans of rows, about. Rows earlier than `before_release_s` before a known
+    release are left out. Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
     """
     return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
 

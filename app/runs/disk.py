@@ -134,12 +134,8 @@ def sync_folder(folder: Path) -> None:
 def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
     """Yield a temporary path beside `path`; the file written there becomes `path` at the end.
 
-    Raises
-    ------
-    RunExistsError
-        `path` exists, and `replace` is False.
-    DiskFullError, WriteError
-        Nothing is left behind.
+    Raises RunExistsError (`path` exists, and `replace` is False), DiskFullError, WriteError (nothing is left
+    behind).
     """
     temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
     claimed = False

@@ -40,10 +40,7 @@ _ROWS_AT_ONCE = 1 << 20
 def copy_run_into(path: Path, folder: Path) -> Path:
     """Copy a run into a folder under its own name, or the next that is free. Returns the new path.
 
-    Raises
-    ------
-    RunError
-        The file is not a readable run, is in that folder already, or cannot be written there.
+    Raises RunError (the file is not a readable run, is in that folder already, or cannot be written there).
     """
     path = path.absolute()
     check_openable(path)
@@ -65,11 +62,8 @@ def copy_run_into(path: Path, folder: Path) -> Path:
 def move_to_trash(path: Path) -> Path:
     """Move a run to the trash of its folder. Returns the new path.
 
-    Raises
-    ------
-    RunNotFoundError, BeingRecordedError, WriteError
-    UnsuitableRunError
-        It is in the trash already, is a link, or does not have the suffix of a run.
+    Raises RunNotFoundError, BeingRecordedError, WriteError, UnsuitableRunError (it is in the trash already,
+    is a link, or does not have the suffix of a run).
     """
     path = path.absolute()
     if path.parent.name == TRASH:
@@ -94,11 +88,7 @@ def move_to_trash(path: Path) -> Path:
 def restore_from_trash(path: Path) -> Path:
     """Move a run from the trash back to its folder. Returns the new path.
 
-    Raises
-    ------
-    RunNotFoundError, WriteError
-    UnsuitableRunError
-        It is not in a trash folder.
+    Raises RunNotFoundError, WriteError, UnsuitableRunError (it is not in a trash folder).
     """
     path = path.absolute()
     if path.parent.name != TRASH:
@@ -112,10 +102,7 @@ def restore_from_trash(path: Path) -> Path:
 def list_trash(folder: Path) -> list[Path]:
     """Runs in the trash of a folder and of those below it, the last one moved there first.
 
-    Raises
-    ------
-    RunNotFoundError
-        There is no such folder.
+    Raises RunNotFoundError (there is no such folder).
     """
     check_folder_exists(folder)
     found = [path.absolute() for path in folder.rglob(f"{TRASH}/*{schema.SUFFIX}")]
@@ -197,15 +184,8 @@ def move_to_free_name(rebuilt: Path, target: Path) -> Path:
 def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
     """Replace an earlier file by a recovered one.
 
-    Parameters
-    ----------
-    keep : bool
-        Move the earlier file aside first; its new path is returned.
-
-    Raises
-    ------
-    RunError
-        Both files are where they were, or the earlier one is aside.
+    `keep` moves the earlier file aside first and returns its new path. Raises RunError (both files are where
+    they were, or the earlier one is aside).
     """
     aside = _aside_name(target) if keep else None
     try:

@@ -73,12 +73,7 @@ def encode_record(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WI
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
     """Records of a journal from byte `start` (0: its beginning) to its end or first torn record.
 
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    ValueError
-        It is not a journal.
+    Raises OSError (the file cannot be read), ValueError (it is not a journal).
     """
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:

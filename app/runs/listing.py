@@ -78,12 +78,10 @@ class SummaryCache:
             self._database.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", rows)
 
     def remove(self, paths: Iterable[str]) -> None:
-        """Drop what is there no more."""
         with contextlib.suppress(sqlite3.DatabaseError), self._database:
             self._database.executemany("DELETE FROM runs WHERE path = ?", [(path,) for path in paths])
 
     def close(self) -> None:
-        """Close the file."""
         self._database.close()
 
     def __enter__(self) -> Self:
@@ -159,7 +157,6 @@ class RunFilter(msgspec.Struct, frozen=True):
     """Whose newest analysis is stale, or is not."""
 
     def matches(self, run: RunSummary) -> bool:
-        """Tell whether a run is to be shown."""
         return (
             (self.series is None or self.series.strip().upper() in _series(run))
             and (self.since is None or _day(run) >= self.since)
@@ -175,21 +172,9 @@ def list_runs(
 ) -> list[RunSummary]:
     """Summaries of all runs in a folder and those below it, oldest first, files with a fault last.
 
-    What has not changed since the last time comes from an index (`app.runs.listing`).
-
-    Parameters
-    ----------
-    folder
-        By default the recordings folder, which counts as empty while it does not exist.
-    wanted
-        Which to keep.
-    progress
-        Called with the number of new files examined, and of all of them.
-
-    Raises
-    ------
-    RunNotFoundError
-        There is no such folder.
+    What has not changed since the last time comes from an index. `folder` is by default the recordings
+    folder, which counts as empty while it does not exist. `progress` is called with the number
+    of new files examined, and of all of them. Raises RunNotFoundError (there is no such folder).
     """
     if folder is not None:
         check_folder_exists(folder)
@@ -201,10 +186,7 @@ def list_runs(
 def resolve_run_files(given: Iterable[Path]) -> list[Path]:
     """Run files in the order given, each once; of a folder those in it and below, by name.
 
-    Raises
-    ------
-    RunNotFoundError
-        There are none.
+    Raises RunNotFoundError (there are none).
     """
     paths = [path.expanduser().absolute() for path in given]
     found = [file for path in paths for file in (sorted(find_run_files(path)) if path.is_dir() else [path])]

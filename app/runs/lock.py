@@ -6,7 +6,6 @@ import os
 import sys
 import time
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Self
 
 RECORDING_SUFFIX = ".recording"
@@ -58,9 +57,7 @@ class FileLock:
     def __enter__(self) -> Self:
         return self.acquire()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
 
@@ -81,7 +78,7 @@ def is_held(path: Path) -> bool:
             return not _try_lock(file, shared=True)
     except (FileNotFoundError, IsADirectoryError, ValueError):  # the last: a name that no file can have
         return False
-    except PermissionError:  # another user's: whether it lives cannot be told, so it is believed
+    except PermissionError:  # of another user: its state is unknown, so it counts as alive
         return True
 
 

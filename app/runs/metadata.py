@@ -95,10 +95,8 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
     def parse(cls, facts: dict[str, str]) -> "Conditions":
         """Sort `name: text` pairs into typed conditions; names not known go to `other`.
 
-        Raises
-        ------
-        MetadataError
-            A temperature, humidity or run-in number that is not a number; a name that cannot be one.
+        Raises MetadataError (a temperature, humidity or run-in number that is not a number; a name that
+        cannot be one).
         """
         known: dict[str, Any] = {}
         for name, text in facts.items():
@@ -217,15 +215,9 @@ def create_metadata(
 ) -> RunMetadata:
     """Combine stand, series code and what overrides them into the metadata of one run.
 
-    A series code brings pullback and plate mass; without one the plate carries no added mass.
-    `facts` are the remaining fields of `RunMetadata`.
-
-    Raises
-    ------
-    SeriesError
-        The series code is not one of the stand.
-    MetadataError
-        A value that cannot be.
+    A series code brings pullback and plate mass; without one the plate carries no added mass. `facts` are the
+    remaining fields of `RunMetadata`. Raises SeriesError (the series code is not one of the stand),
+    MetadataError (a value that cannot be).
     """
     of_series = stand.series(series) if series else None
     if of_series:

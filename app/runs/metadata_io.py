@@ -70,10 +70,7 @@ def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "")
 def read_metadata(file: h5py.File) -> RunMetadata:
     """Read the metadata of a run with all edits applied.
 
-    Raises
-    ------
-    DamagedRunError
-        A field is missing or of the wrong kind.
+    Raises DamagedRunError (a field is missing or of the wrong kind).
     """
     try:
         metadata = read_recorded_metadata(file)
@@ -155,7 +152,6 @@ def read_changes(file: h5py.File) -> list[Change]:
 
 
 def _write_open_groups(file: h5py.File, metadata: RunMetadata) -> None:
-    """Write the groups whose fields the user names."""
     if metadata.conditions.other:
         others = make_group(file, schema.OTHER_CONDITIONS, "NXcollection")
         for name, text in metadata.conditions.other.items():

@@ -37,17 +37,13 @@ class NextTests(msgspec.Struct, frozen=True):
     conditions: Conditions = Conditions()
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with changes."""
         return msgspec.structs.replace(self, **changes)
 
 
 def load_next_tests(folder: Path) -> NextTests:
     """Read what was kept of a folder; nothing is planned where nothing was.
 
-    Raises
-    ------
-    MetadataError
-        The file cannot be read, or holds something else.
+    Raises MetadataError (the file cannot be read, or holds something else).
     """
     path = folder / FILE_NAME
     try:

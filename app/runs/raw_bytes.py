@@ -36,15 +36,7 @@ class RawBytes:
 def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
     """Append the raw bytes of a journal to an open run file.
 
-    Returns
-    -------
-    int
-        CRC-32 of the bytes.
-
-    Raises
-    ------
-    UnreadableJournalError
-        The file then holds no raw bytes.
+    Returns the CRC-32 of the bytes. Raises UnreadableJournalError (the file then holds no raw bytes).
     """
     checksum = 0
     try:

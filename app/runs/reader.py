@@ -71,7 +71,6 @@ class Run:
 
     @property
     def events(self) -> Events:
-        """Times of the events that the file holds."""
         return self.end.events if self.end else Events()
 
 
@@ -92,15 +91,8 @@ class Fingerprint(msgspec.Struct, frozen=True):
 def open_run(path: Path | str, *, validator: Validator | None = None, trusted: bool = False) -> Run:
     """Read a run. Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
 
-    Parameters
-    ----------
-    path
-        Run file.
-    validator
-        Validates the file first, in its own process; one is started when none is given. Share one to open
-        many runs.
-    trusted
-        The caller wrote and checked the file itself: read it without validation.
+    `validator` validates the file first, in its own process; share one to open many runs, else one is
+    started. A `trusted` file, which the caller wrote or checked, is read without validation.
     """
     return validate_and_read(path, _read, validator=validator, trusted=trusted)
 

@@ -82,26 +82,9 @@ def latest_valid(analyses: tuple[SavedAnalysis, ...], record: Record) -> SavedAn
 def save_analysis(path: Path, document: Document, inputs: str, settings: dict[str, Any] | None = None) -> int:
     """Keep an analysis in its run, beside earlier ones.
 
-    Parameters
-    ----------
-    path
-        The run.
-    document
-        From `analysis_document`.
-    inputs
-        From `inputs_hash` of the record that was analysed.
-    settings
-        How it was analysed: model asked for, overridden masses, ...
-
-    Returns
-    -------
-    int
-        NNN of `/entry/analysis_NNN`.
-
-    Raises
-    ------
-    RunError
-        The run is then as it was.
+    Returns the NNN of `/entry/analysis_NNN`. `inputs` is the `inputs_hash` of the analysed record; `settings`
+    say how it was analysed: model asked for, overridden masses, ... Raises RunError (the run is then as it
+    was).
     """
     number = 0
 
@@ -222,16 +205,8 @@ def _or_none(value: float) -> float | None:
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples, which never change.
 
-    Raises DamagedRunError.
-
-    Parameters
-    ----------
-    file
-        An open run.
-    metadata
-        What `read_metadata` gives of it, where that has been read already.
-    masses_kg
-        `table_mass_kg`, `plate_mass_kg`: what stood for the run's own in the analysis.
+    `metadata` spares reading it again. `masses_kg` are `table_mass_kg` and `plate_mass_kg` that replaced
+    those of the run in the analysis. Raises DamagedRunError.
     """
     metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}

@@ -32,12 +32,8 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 def validate_file(file: h5py.File) -> None:
     """Check the structure of an open file.
 
-    Raises
-    ------
-    NotARunError
-        It is not a run, or a run of a later program.
-    DamagedRunError
-        It states that it is a run, but cannot be trusted.
+    Raises NotARunError (it is not a run, or a run of a later program), DamagedRunError (it states that it is
+    a run, but cannot be trusted).
     """
     _check_schema(file)
     for dataset in _walk(file):

@@ -8,7 +8,6 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Literal, Self
 
 import h5py
@@ -66,7 +65,6 @@ class Validator:
 
     @classmethod
     def start(cls) -> Self:
-        """Start the process now; otherwise the first file starts it."""
         validator = cls()
         validator._child = _Child()
         return validator
@@ -74,11 +72,8 @@ class Validator:
     def validate(self, path: Path) -> RunSummary:
         """Validate a file as `app.runs.validation` says, and return its summary.
 
-        Raises
-        ------
-        NotARunError, BeingRecordedError, DamagedRunError
-        ValidationTimeoutError
-            No answer came in time. The file may be sound.
+        Raises NotARunError, BeingRecordedError, DamagedRunError, ValidationTimeoutError (no answer came in
+        time; the file may be sound).
         """
         with self._turn:
             self._child = self._child or _Child()
@@ -104,11 +99,9 @@ class Validator:
 
     @property
     def pid(self) -> int | None:
-        """Process number while there is a process."""
         return self._child.pid if self._child else None
 
     def stop(self) -> None:
-        """End the process."""
         if self._child:
             self._child.stop()
             self._child = None
@@ -116,9 +109,7 @@ class Validator:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
 

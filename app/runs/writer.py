@@ -77,18 +77,9 @@ def create_run(
 ) -> "RunWriter":
     """Create a run file with everything that is known before the first sample.
 
-    Raises RunExistsError, MetadataError, DiskFullError, WriteError.
-
-    Parameters
-    ----------
-    path
-        Final name; must not exist.
-    metadata, layout
-        Metadata of the run, and the columns of its blocks.
-    journal
-        Its raw bytes are copied into the file at the end.
-    identifier
-        UUID of the run; a new one if empty.
+    `path` is the final name and must not exist. The raw bytes of `journal` are copied into the file at the
+    end. `identifier` is the UUID of the run, a new one if empty. Raises RunExistsError, MetadataError,
+    DiskFullError, WriteError.
     """
     path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
@@ -161,14 +152,8 @@ class RunWriter:
     def append(self, block: RunBlock) -> None:
         """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
 
-        Raises
-        ------
-        DiskFullError
-            There is no room for the rows. While the writer is `usable` the run can be closed without them.
-        WriteError
-            HDF5 failed.
-        ValueError
-            The block does not fit the layout of the run.
+        Raises DiskFullError (no room for the rows; while the writer is `usable` the run can be closed without
+        them), WriteError (HDF5 failed), ValueError (the block does not fit the layout of the run).
         """
         columns = block.columns(self._layout)
         pending_bytes = self._pending_bytes + sum(column.nbytes for column in columns)
@@ -199,10 +184,7 @@ class RunWriter:
     def close(self, end: EndMetadata) -> StoredRun:
         """Complete the file, verify it by reading it again, and bring it to disk.
 
-        Raises
-        ------
-        WriteError
-            The file could not be completed, or does not read back: keep the journal.
+        Raises WriteError (the file could not be completed, or does not read back: keep the journal).
         """
         try:
             raw_bytes_stored = self._copy_raw_bytes()
@@ -230,7 +212,6 @@ class RunWriter:
         return self.close(EndMetadata(ended=ended, end_time=now, losses=self.losses, message=message))
 
     def discard(self) -> None:
-        """Remove the file."""
         self._file.close()
         self.path.unlink()
         self._lock.release()

@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import msgspec
@@ -199,7 +198,6 @@ class WriterClient:
 
     @property
     def pid(self) -> int:
-        """Process number of the writer."""
         return self._child.pid
 
     @property
@@ -214,14 +212,8 @@ class WriterClient:
     def append(self, block: RunBlock) -> None:
         """Hand rows over.
 
-        Raises
-        ------
-        WriterBehindError
-            The queue is full; the run can still be closed.
-        DiskFullError, WriteError
-            The writer failed earlier.
-        ValueError
-            The block does not fit the layout of the run.
+        Raises WriterBehindError (the queue is full; the run can still be closed), DiskFullError, WriteError
+        (the writer failed earlier), ValueError (the block does not fit the layout of the run).
         """
         if self._failure:
             raise self._failure
@@ -246,9 +238,7 @@ class WriterClient:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _ask(self, command: OpenRun | EndMetadata, waiting: "deque[Future[T]]") -> "Future[T]":

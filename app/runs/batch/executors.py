@@ -42,8 +42,7 @@ class Executor(Protocol):
     """Runs work, some items at once. Use it in the `with` statement of `open_executor`."""
 
     @property
-    def workers(self) -> int:
-        """Number of items that are worked on at once."""
+    def workers(self) -> int: ...
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
         """Hand over one item; both arguments must be picklable, `work` by its name.
@@ -51,8 +50,7 @@ class Executor(Protocol):
         The future fails with `concurrent.futures.BrokenExecutor` where a worker died.
         """
 
-    def renew(self) -> None:
-        """Replace the workers after one died."""
+    def renew(self) -> None: ...
 
     def close(self, *, now: bool) -> None:
         """End when the work under way is done, or `now`."""
@@ -102,13 +100,6 @@ def ordered_map(
 
     When a worker dies, the guilty item is unknown: everything under way is done again, one at a time. An item
     that kills its worker again is a `FailedItem`.
-
-    Parameters
-    ----------
-    work
-        Function of a module.
-    items
-        Taken as needed; any number.
     """
     source = iter(items)
     queued: deque[tuple[Item, Future[Answer]]] = deque()
@@ -156,13 +147,8 @@ class SerialExecutor:
 class ProcessExecutor:
     """Worker processes on this computer, started with the first item. None outlives this process.
 
-    Parameters
-    ----------
-    workers : int
-        Largest number of processes.
-    prepare : callable
-        Called by each process before its first item, one process after another: at the very first start one
-        compiles, and the others load the result.
+    `prepare` is called by each process before its first item, one process after another: at the very first
+    start one compiles, and the others load the result.
     """
 
     def __init__(self, workers: int, prepare: Callable[[], None]) -> None:
@@ -177,12 +163,10 @@ class ProcessExecutor:
             return self._started().submit(work, item)
 
     def renew(self) -> None:
-        """Start new processes after one died."""
         _log.warning("a worker process died; the workers are replaced")
         self.close(now=True)
 
     def close(self, *, now: bool) -> None:
-        """End the processes when their work is done, or `now`."""
         if self._executor is None:
             return
         if not now:
@@ -208,17 +192,8 @@ class ProcessExecutor:
 class DaskExecutor:
     """Workers of a Dask cluster, on computers that see the same run files.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, for example `tcp://lab-server:8786`.
-
-    Raises
-    ------
-    ExtraMissingError
-        Dask's `distributed` is not installed.
-    ClusterError
-        The scheduler does not answer, has no workers, or they have another version of Slipstand.
+    Raises ExtraMissingError (dask's `distributed` is not installed), ClusterError (the scheduler does not
+    answer, has no workers, or they have another version of Slipstand).
     """
 
     def __init__(self, address: str) -> None:
@@ -358,7 +333,6 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
-    """Begin a worker process."""
     exit_with_parent(lifeline)
     with one_at_a_time:
         prepare()

@@ -138,14 +138,10 @@ Task = TypeVar("Task", bound=_OfRun)
 def analyze_runs(
     tasks: Sequence[AnalysisTask], executor: Executor, progress: Progress = lambda _share, _what: None
 ) -> Iterator[AnalysisOutcome]:
-    """Analyse runs; one that fails is told by its outcome and does not stop the rest.
+    """Analyse runs; one that fails has its error as outcome and does not stop the rest.
 
-    Parameters
-    ----------
-    tasks, crew
-        Stop asking for outcomes to cancel: what is in flight is given up when the crew is closed.
-    progress
-        Called with the share done (0 to 1) and what is being done.
+    A caller cancels by asking for no more outcomes and closing the executor. `progress` is called with the
+    share done (0 to 1) and what is being done.
     """
     for outcome in map_runs(tasks, analyze_one, executor, progress):
         yield (
@@ -161,7 +157,7 @@ def map_runs(
     executor: Executor,
     progress: Progress,
 ) -> Iterator[Outcome | FailedItem[Task]]:
-    """Do `work(task)` on runs by a crew; in this process `work(task, progress)`, to tell how far it is."""
+    """Do `work(task)` on runs by an executor; in this process `work(task, progress)`."""
     done = 0
 
     def within(share: float, what: str) -> None:

@@ -1,4 +1,4 @@
-"""Runs gathered from files and folders, with what must be known of them together."""
+"""Results of many runs from files and folders, with warnings of them together."""
 
 import sys
 from collections import Counter, defaultdict
@@ -25,7 +25,7 @@ Progress = Callable[[float, str], None]
 
 
 class CollectOptions(msgspec.Struct, frozen=True):
-    """How to gather."""
+    """How to collect runs."""
 
     executor: ExecutorOptions = ExecutorOptions()
     save: bool = False
@@ -61,14 +61,14 @@ class CollectedRuns:
     details: dict[str, RunDetails]
     """By the names of the runs."""
     stands: dict[str, Stand]
-    """By `RunFacts.stand`."""
+    """By `RunDetails.stand`."""
     gauges: dict[str, Gauges]
-    """By `RunFacts.calibration`."""
+    """By `RunDetails.calibration`."""
     excluded: tuple[Excluded, ...] = ()
     """Runs without a result that are excluded in any case, with reasons."""
 
     def campaign(self) -> Campaign:
-        """Everything summed up; what does not count is listed, whether it has a result or not."""
+        """The campaign; excluded runs are listed, with a result or without."""
         contacts = dict.fromkeys(code for stand in self.stands.values() for code in stand.contacts)
         campaign = summarize(self.runs, known_contacts=tuple(contacts))
         return replace(campaign, excluded=(*campaign.excluded, *self.excluded))
@@ -79,30 +79,18 @@ def collect_runs(
     options: CollectOptions | None = None,
     progress: Progress = lambda _share, _what: None,
 ) -> CollectedRuns:
-    """Gather runs: the newest result of each that still stands, else a new one.
+    """Collect runs: the newest result of each that still stands, else a new one.
 
-    Parameters
-    ----------
-    paths
-        Run files, and folders with runs in them and below; what is in the trash is left out.
-    options
-        By default as many processes as there are processors, and nothing is kept.
-    progress
-        Called with the share done (0 to 1) and what is being done.
-
-    Raises
-    ------
-    RunNotFoundError
-        There are no runs there.
-    ExtraMissingError, ClusterError
-        The cluster that was asked for cannot do it.
+    `paths` are run files, and folders with runs in them and below, except in the trash. `progress` is called
+    with the share done (0 to 1) and what is being done. Raises RunNotFoundError (there are no runs there),
+    ExtraMissingError, ClusterError.
     """
     options = options or CollectOptions()
     given = [path.expanduser().absolute() for path in paths]
-    accounts = RunCollection()
-    for account in iter_collected(resolve_run_files(given), options, progress):
-        accounts.update(account)
-    return accounts.collected_runs([path for path in given if path.is_dir()], options)
+    collection = RunCollection()
+    for collected in iter_collected(resolve_run_files(given), options, progress):
+        collection.update(collected)
+    return collection.collected_runs([path for path in given if path.is_dir()], options)
 
 
 def iter_collected(
@@ -110,65 +98,69 @@ def iter_collected(
 ) -> Iterator[CollectedRun]:
     """Take what a campaign needs of each run, in the order given. Raises ExtraMissingError, ClusterError."""
     tasks = [CollectTask(str(path), options.request, options.save) for path in files]
-    with open_executor(options.executor, len(tasks)) as crew:
-        for came in map_runs(tasks, collect_run, crew, progress):
+    with open_executor(options.executor, len(tasks)) as executor:
+        for came in map_runs(tasks, collect_run, executor, progress):
             yield CollectedRun(came.item.path, came.message) if isinstance(came, FailedItem) else came
 
 
 class RunCollection:
-    """What came of runs, by path, with what many of them have in common held once."""
+    """Collected runs by path; stands, calibrations and names that many share are held once."""
 
     def __init__(self) -> None:
-        self._accounts: dict[str, CollectedRun] = {}
+        self._collected: dict[str, CollectedRun] = {}
         self._stands: dict[str, Stand] = {}
         self._gauges: dict[str, Gauges] = {}
 
-    def update(self, account: CollectedRun) -> None:
-        """Take in what came of a run; it stands for what came of it before."""
-        result, facts, stand, gauges = account.result, account.details, account.stand, account.gauges
-        if result is not None and facts is not None and stand is not None and gauges is not None:
-            self._stands.setdefault(facts.stand, stand)
-            self._gauges.setdefault(facts.calibration, gauges)
+    def update(self, collected: CollectedRun) -> None:
+        """Take the result of a run in place of its earlier one."""
+        result, details, stand, gauges = (
+            collected.result,
+            collected.details,
+            collected.stand,
+            collected.gauges,
+        )
+        if result is not None and details is not None and stand is not None and gauges is not None:
+            self._stands.setdefault(details.stand, stand)
+            self._gauges.setdefault(details.calibration, gauges)
             result = replace(result, budget=tuple(map(_shared, result.budget)))
-            account = CollectedRun(account.path, result=result, details=facts)
-        self._accounts[account.path] = account
+            collected = CollectedRun(collected.path, result=result, details=details)
+        self._collected[collected.path] = collected
 
     def exclude(self, path: str, reason: str) -> None:
         """Note why a run does not count any more; "" for one that does again."""
-        account = self._accounts[path]
-        facts = account.details and msgspec.structs.replace(account.details, excluded=reason)
-        excluded = "" if facts else reason
-        self._accounts[path] = msgspec.structs.replace(account, details=facts, excluded=excluded)
+        collected = self._collected[path]
+        details = collected.details and msgspec.structs.replace(collected.details, excluded=reason)
+        excluded = "" if details else reason
+        self._collected[path] = msgspec.structs.replace(collected, details=details, excluded=excluded)
 
     def keep_only(self, paths: Iterable[str]) -> None:
         """Forget other runs, and take these in this order."""
-        self._accounts = {path: self._accounts[path] for path in paths}
+        self._collected = {path: self._collected[path] for path in paths}
 
     def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
-        """Everything, with what is to be said of it, and which runs do not count for what reason."""
-        pairs = [(a.result, a.details) for a in self._accounts.values() if a.result and a.details]
+        pairs = [(a.result, a.details) for a in self._collected.values() if a.result and a.details]
         runs = tuple(_with_reasons(pairs, options.excluded))
-        facts = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
-        stands = {its.stand: self._stands[its.stand] for its in facts.values()}
-        gauges = {its.calibration: self._gauges[its.calibration] for its in facts.values()}
+        details = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
+        stands = {its.stand: self._stands[its.stand] for its in details.values()}
+        gauges = {its.calibration: self._gauges[its.calibration] for its in details.values()}
         counted = [run for run in runs if not run.excluded]
-        cautions = campaign_warnings(counted, facts, stands, folders, saved=options.save)
-        failures, left_out = self._without_result(options.excluded)
-        return CollectedRuns(runs, failures, cautions, facts, stands, gauges, left_out)
+        warnings = campaign_warnings(counted, details, stands, folders, saved=options.save)
+        failures, excluded_runs = self._without_result(options.excluded)
+        return CollectedRuns(runs, failures, warnings, details, stands, gauges, excluded_runs)
 
     def _without_result(
         self, reasons: Mapping[str, str]
     ) -> tuple[tuple[FailedRun, ...], tuple[Excluded, ...]]:
         """Runs that gave no result: those that should have, and those that do not count anyway."""
-        failures, left_out = [], []
-        for account in self._accounts.values():
-            if account.result is not None:
+        failures, excluded_runs = [], []
+        for collected in self._collected.values():
+            if collected.result is not None:
                 continue
-            if reason := reasons.get(account.path) or account.excluded:
-                left_out.append(Excluded(account.path, reason))
+            if reason := reasons.get(collected.path) or collected.excluded:
+                excluded_runs.append(Excluded(collected.path, reason))
             else:
-                failures.append(FailedRun(account.path, account.error))
-        return tuple(failures), tuple(left_out)
+                failures.append(FailedRun(collected.path, collected.error))
+        return tuple(failures), tuple(excluded_runs)
 
 
 def _with_reasons(
@@ -176,9 +168,9 @@ def _with_reasons(
 ) -> Iterator[RunResult]:
     """Runs with why they do not count; of the files of one recording the first that was not left out does."""
     first: dict[str, str] = {}
-    for result, facts in pairs:
-        reason = reasons.get(result.name) or facts.excluded
-        if not reason and (other := first.setdefault(facts.identifier, result.name)) != result.name:
+    for result, details in pairs:
+        reason = reasons.get(result.name) or details.excluded
+        if not reason and (other := first.setdefault(details.identifier, result.name)) != result.name:
             reason = f"the same recording as {other}: leave one of the files out"
         yield replace(result, excluded=reason) if reason else result
 
@@ -194,53 +186,43 @@ _NAMED = 3
 
 def campaign_warnings(
     runs: Sequence[RunResult],
-    facts: Mapping[str, RunDetails],
+    details: Mapping[str, RunDetails],
     stands: Mapping[str, Stand],
     folders: Sequence[Path],
     *,
     saved: bool,
 ) -> tuple[ResultWarning, ...]:
-    """Everything that is to be said of runs together.
-
-    Parameters
-    ----------
-    runs, facts, stands
-        As in `app.runs.campaign.collect.Gathered`.
-    folders
-        Folders that were looked through.
-    saved
-        Whether new results were kept.
-    """
+    """Warnings of runs together; `folders` are those that were searched."""
     return (
-        *_different_stands(runs, facts, stands),
-        *_contradictory_masses(runs, facts, stands),
-        *_stale(runs, facts, saved=saved),
-        *_series_without_runs(runs, facts, stands),
+        *_different_stands(runs, details, stands),
+        *_contradictory_masses(runs, details, stands),
+        *_stale(runs, details, saved=saved),
+        *_series_without_runs(runs, details, stands),
         *_left_out(folders),
     )
 
 
 def _different_stands(
-    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     by_name: dict[str, list[str]] = defaultdict(list)
     for run in runs:
-        by_name[stands[facts[run.name].stand].name].append(run.name)
+        by_name[stands[details[run.name].stand].name].append(run.name)
     if len(by_name) > 1:
-        said = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
+        listed = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
         yield ResultWarning(
             "different-stands",
             message(
                 "these runs are of {count} stands ({said}). Give the runs of one stand at a time,"
                 " each in a folder of its own.",
                 count=len(by_name),
-                said=said,
+                said=listed,
             ),
         )
 
 
 def _contradictory_masses(
-    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     """Series whose runs say different masses, and runs whose plate has not the mass of their series."""
     by_series: dict[str, dict[tuple[float, float], list[str]]] = defaultdict(lambda: defaultdict(list))
@@ -248,11 +230,11 @@ def _contradictory_masses(
         if run.series.code:
             key = run.series
             by_series[key.code][key.table_mass_kg, key.plate_mass_kg].append(run.name)
-    remedy = "Correct the wrong ones: slipstand edit RUN --plate-mass KG --table-mass KG."
+    remedy = message("Correct the wrong ones: slipstand edit RUN --plate-mass KG --table-mass KG.")
     for code, masses in by_series.items():
-        stand = stands[facts[next(iter(masses.values()))[0]].stand]
+        stand = stands[details[next(iter(masses.values()))[0]].stand]
         if len(masses) > 1:
-            said = "; ".join(
+            listed = "; ".join(
                 f"m1 = {table_kg:g} kg and m2 = {plate_kg:g} kg: {_listed(of_them)}"
                 for (table_kg, plate_kg), of_them in masses.items()
             )
@@ -261,7 +243,7 @@ def _contradictory_masses(
                 message(
                     "the runs of {code} say different masses ({said}). {remedy}",
                     code=code,
-                    said=said,
+                    said=listed,
                     remedy=remedy,
                 ),
             )
@@ -289,11 +271,11 @@ def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
 
 
 def _stale(
-    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], *, saved: bool
+    runs: Sequence[RunResult], details: Mapping[str, RunDetails], *, saved: bool
 ) -> Iterator[ResultWarning]:
-    stale = [run.name for run in runs if facts[run.name].stale]
+    stale = [run.name for run in runs if details[run.name].stale]
     if stale:
-        kept = "the new results are kept" if saved else "keep the new results with --save"
+        kept = message("the new results are kept") if saved else message("keep the new results with --save")
         yield ResultWarning(
             "results-stale",
             message(
@@ -306,11 +288,11 @@ def _stale(
 
 
 def _series_without_runs(
-    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     """Series between those that have runs; a single series is no campaign that could lack any."""
     codes = Counter(run.series.code for run in runs if run.series.code and not run.excluded)
-    names = {facts[run.name].stand for run in runs}
+    names = {details[run.name].stand for run in runs}
     if len(codes) < 2 or len(names) != 1:
         return
     stand = stands[names.pop()]

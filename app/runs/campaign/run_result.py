@@ -58,7 +58,7 @@ class RunDetails(msgspec.Struct, frozen=True):
     table_mass_kg: float
     plate_mass_kg: float
     stand: str
-    """Identities, see `Gathered.stands` and `Gathered.gauges`."""
+    """Identities, see `CollectedRuns.stands` and `CollectedRuns.gauges`."""
     calibration: str
     analysis: int | None = None
     """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
@@ -73,7 +73,7 @@ class RunDetails(msgspec.Struct, frozen=True):
 class CollectedRun(msgspec.Struct, frozen=True):
     """What came of one run: its result with all that goes with it, or why there is none.
 
-    `excluded` is said of a run without a result that does not count anyway.
+    `excluded` is the reason of a run without a result that is excluded in any case.
     """
 
     path: str

@@ -1,1 +1,1 @@
-"""Runs for other programs: one module a format, all of them on `Exported`, chosen in `formats`."""
+"""Runs for other programs: one module a format, all of them on `ExportedRun`, chosen in `formats`."""

@@ -25,7 +25,6 @@ class ForeignColumns:
     """Names a row of `values` as the file counts it: `line 4`."""
 
     def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
-        """Error that names file, row, and column."""
         return ImportFileError(
             "{path}, {row_label}, column {names}: {fault}",
             path=self.path,
@@ -52,10 +51,7 @@ _OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
 def find_columns(path: Path, wanted: list[str], names: list[str], width: int) -> list[int]:
     """Positions of the columns of time, gauge 1 and perhaps gauge 2, all different.
 
-    Raises
-    ------
-    ImportFileError
-        There is no such column, or one is wanted for two.
+    Raises ImportFileError (there is no such column, or one is wanted for two).
     """
     found: list[int] = []
     for one, name in zip(_OF_TIME_AND_GAUGES, wanted, strict=False):

@@ -1,4 +1,4 @@
-"""How a CSV file is laid out: its encoding, header and delimiter, found out or told."""
+"""Layout of a CSV file: encoding, header and delimiter, detected or given; and its columns of numbers."""
 
 import codecs
 import csv
@@ -64,7 +64,6 @@ class CsvText:
     """Positions of time, table and, if asked for, the second gauge."""
 
     def column_name(self, position: int) -> str:
-        """How to name a column in a message."""
         return repr(self.names[position]) if position < len(self.names) else str(position)
 
 

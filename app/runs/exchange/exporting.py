@@ -36,9 +36,9 @@ class ExportFormat:
 
     suffix: str
     write_run: WriteRun
-    """Takes an `Exported`, a path and `replace`."""
+    """Takes an `ExportedRun`, a path and `replace`."""
     write_coefficients: WriteCoefficients | None
-    """Takes several `Exported`, a path and `replace`; None where the format holds samples alone."""
+    """Takes several `ExportedRun`, a path and `replace`; None where the format holds samples alone."""
     holds_samples: bool = True
 
 
@@ -98,7 +98,6 @@ class ExportRequest(msgspec.Struct, frozen=True):
 
     @property
     def writer(self) -> ExportFormat:
-        """Of this format."""
         return formats()[self.format]
 
     @property
@@ -120,16 +119,8 @@ class ExportOutcome(msgspec.Struct, frozen=True):
 def load_exported_run(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, str]:
     """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
 
-    Returns
-    -------
-    Exported, str
-        And why there are no coefficients, where they were wanted beside samples.
-
-    Raises
-    ------
-    RunError
-    AnalysisError
-        Coefficients alone are wanted, and there are none.
+    Returns the run, and why there are no coefficients where they were wanted beside samples. Raises
+    RunError, AnalysisError (coefficients alone are wanted, and there are none).
     """
     run = open_run(path, validator=validator)
     samples = () if content == "coefficients" else sample_columns(run)
@@ -150,23 +141,11 @@ def export_runs(
     *,
     progress: Callable[[int, str], None] = lambda _done, _name: None,
 ) -> list[ExportOutcome]:
-    """Export runs, in the order given; one that fails is told and does not stop the rest.
+    """Export runs, in the order given; one that fails is reported and does not stop the rest.
 
-    Parameters
-    ----------
-    paths
-        Run files.
-    output
-        The file to write; a folder, made if absent, for the samples of several runs.
-    request
-        Format and content.
-    progress
-        Called with the number done and the name of the next run.
-
-    Raises
-    ------
-    RunError
-        Nothing can be written at all: no such format content, output in the way.
+    `output` is the file to write, or a folder, made if absent, for the samples of several runs. `progress` is
+    called with the number done and the name of the next run. Raises RunError (nothing can be written at all:
+    no such format content, output in the way).
     """
     if request.content == "coefficients" and request.writer.write_coefficients is None:
         raise UnsuitableRunError(

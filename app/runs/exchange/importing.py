@@ -73,25 +73,8 @@ def import_csv(
 ) -> StoredRun:
     """Make a run of a CSV file.
 
-    Parameters
-    ----------
-    path, plan
-        The file, and how to read it.
-    output
-        Run file to write.
-    stand
-        Whose masses and series the record belongs to.
-    replace
-        Overwrite `output` where it exists.
-    facts
-        As for `describe_run`: series, pullback_m, table_mass_kg, plate_mass_kg, operator, note, ...
-
-    Raises
-    ------
-    ImportFileError
-        Names file, line or column, and remedy.
-    RunError, ConfigError
-        The run cannot be described or written.
+    `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ... Raises
+    ImportFileError, which names file, line or column, and remedy; RunError, ConfigError.
     """
     gauge, start_s, block = read_record(path, plan)
     metadata = create_metadata(
@@ -168,7 +151,6 @@ def _gauge(plan: CsvImport) -> Gauge:
 
 
 def _impossible(gain: float, plan: CsvImport) -> Message:
-    """Say which number of a calibration cannot be."""
     if not math.isfinite(gain) or gain == 0.0:
         return message(
             "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge",
@@ -324,25 +306,25 @@ class FilePreview:
     unit: str = ""
 
 
-def preview_file(path: Path, told: ParseOptions | None = None) -> FilePreview:
+def preview_file(path: Path, given: ParseOptions | None = None) -> FilePreview:
     """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
-    told = told or ParseOptions()
+    given = given or ParseOptions()
     if is_csv(path):
-        return _survey_text(path, told)
-    has_header = told.header is not False
-    names = list_columns(path, CsvOptions("", "", skip=told.skip, header=has_header))
-    return _recognise(names, (), ParseOptions(skip=told.skip, header=has_header))
+        return _survey_text(path, given)
+    has_header = given.header is not False
+    names = list_columns(path, CsvOptions("", "", skip=given.skip, header=has_header))
+    return _recognise(names, (), ParseOptions(skip=given.skip, header=has_header))
 
 
-def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
-    """Read with what was told, and else in the usual way that makes the most of the cells numbers."""
+def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
+    """Read with the given options, and else in the usual way that makes the most of the cells numbers."""
     found: list[tuple[float, CsvText]] = []
     faults = []
-    for header in (True, False) if told.header is None else (told.header,):
-        for decimal in _DECIMALS if told.decimal is None else (told.decimal,):
+    for header in (True, False) if given.header is None else (given.header,):
+        for decimal in _DECIMALS if given.decimal is None else (given.decimal,):
             try:
                 source = survey_csv(
-                    path, CsvOptions("", "", None, told.delimiter, decimal, told.skip, header)
+                    path, CsvOptions("", "", None, given.delimiter, decimal, given.skip, header)
                 )
                 found.append((_numeric_share(source), source))
             except ImportFileError as error:
@@ -362,7 +344,7 @@ def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
     width = max(len(source.names), *(len(row) for row in rows))
     names = [*source.names, *[""] * (width - len(source.names))]
     return _recognise(
-        names, rows, ParseOptions(source.delimiter, source.decimal, told.skip, bool(source.names))
+        names, rows, ParseOptions(source.delimiter, source.decimal, given.skip, bool(source.names))
     )
 
 
@@ -377,7 +359,7 @@ def _first_rows(source: CsvText) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(split_line(text, source.delimiter)) for text in islice(filter(is_data, lines), _LINES))
 
 
-def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], told: ParseOptions) -> FilePreview:
+def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], given: ParseOptions) -> FilePreview:
     """Say which column is likely what; a file without names has time first, then table, then relative."""
     columns = tuple(
         name if name and names.count(name) == 1 else str(number) for number, name in enumerate(names)
@@ -395,7 +377,7 @@ def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], told: Pa
     if second is None and rest and not any(names):
         second = rest[0]
     return FilePreview(
-        columns, titles, rows, told,
+        columns, titles, rows, given,
         time=_at(columns, time), table=_at(columns, table), second=_at(columns, second),
         measures="relative" if plate is None else "plate",
         time_unit=_unit(names, time, _TIMES), unit=_unit(names, table, _LENGTHS),

@@ -31,11 +31,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a workbook with the sheets Coefficients, Samples and Run.
 
-    Raises
-    ------
-    UnsuitableRunError
-        More samples than a sheet holds.
-    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    Raises UnsuitableRunError (more samples than a sheet holds), ExtraMissingError, RunExistsError,
+    DiskFullError, WriteError.
     """
     if len(exported.run) >= _SHEET_ROWS and exported.samples:
         raise UnsuitableRunError(
