@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QFileDialog, QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.settings_screen import (
@@ -18,7 +18,7 @@ from app.presenters.settings_screen import (
     SettingsState,
 )
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox, show_texts
+from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_choice, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -89,11 +89,8 @@ class SettingsScreen(QWidget):
             self._files.addWidget(button, row, 2)
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, gettext("Folder of the runs"), self._state.recordings)
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(lambda path: self._presenter.change(recordings=path))
-        dialog.open()
+        title, start = gettext("Folder of the runs"), self._state.recordings
+        ask_for_folder(self, title, start, lambda path: self._presenter.change(recordings=path))
 
     def _write_folder(self) -> None:
         """Apply the typed folder; the field gets its old text back if it cannot be used."""
@@ -160,9 +157,7 @@ def _card(title: str, hint: str, *parts: Item) -> QFrame:
 
 def _choice(presenter: SettingsPresenter, name: str, items: Mapping[Any, str]) -> ComboBox:
     """Make a combo box that changes the setting `name`; `items` are its values and their texts."""
-    made = ComboBox()
-    for value, words in items.items():
-        made.addItem(gettext(words), value)
+    made = make_choice(items)
     made.setMinimumWidth(200)
     made.activated.connect(lambda _: presenter.change(**{name: made.currentData()}))
     return made

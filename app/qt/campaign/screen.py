@@ -1,5 +1,6 @@
 """The Campaign screen: Table 1 as it fills, Fig. 2 below it, what all runs say at the right."""
 
+from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import Qt
@@ -8,7 +9,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QMenu,
-    QProgressBar,
     QPushButton,
     QStackedWidget,
     QVBoxLayout,
@@ -22,7 +22,8 @@ from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections, SelectedRuns
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
+from app.qt.widgets.inputs import ProgressBar, ask_for_folder, make_button
+from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import N_, gettext, ngettext
@@ -101,23 +102,20 @@ class CampaignScreen(QWidget):
         show_chip(self._message, state.message)
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, gettext("Gather the runs of a folder"), self._start_folder())
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._presenter.choose_folder)
-        dialog.open()
+        title = gettext("Gather the runs of a folder")
+        ask_for_folder(self, title, self._start_folder(), self._presenter.choose_folder)
 
     def _ask_for_target(self, product: Product) -> None:
         kinds, name = _TARGETS[product]
-        dialog = QFileDialog(self, gettext("Export"), self._start_folder())
+        export = partial(self._presenter.export, product)
+        if not kinds:
+            ask_for_folder(self, gettext("Export"), self._start_folder(), export)
+            return
+        dialog = QFileDialog(self, gettext("Export"), self._start_folder(), gettext(kinds))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        if kinds:
-            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-            dialog.setNameFilter(gettext(kinds))
-            dialog.selectFile(name)
-        else:
-            dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.fileSelected.connect(partial(self._presenter.export, product))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.selectFile(name)
+        dialog.fileSelected.connect(export)
         dialog.open()
 
     def _start_folder(self) -> str:
@@ -153,13 +151,12 @@ class CampaignScreen(QWidget):
         make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
 
     def _filled(self) -> QWidget:
-        page, left = QWidget(), QVBoxLayout()
-        left.setSpacing(8)
-        left.addWidget(_card(self._table), _TABLE_SHARE)
-        left.addWidget(_card(self._plot), _FIGURE_SHARE)
+        page = QWidget()
+        tables, figures = (make_frame(self._table), _TABLE_SHARE), (make_frame(self._plot), _FIGURE_SHARE)
+        left = make_column(tables, figures, spacing=8)
         content = QWidget()
         make_column(self._chosen, (self._sections, 1), of=content)
-        side = _card(make_scroll_area(content))
+        side = make_frame(make_scroll_area(content))
         side.setFixedWidth(_COLUMN_WIDTH)
         make_row((left, 1), side, spacing=8, of=page)
         return page
@@ -171,30 +168,26 @@ class _Working(QWidget):
     def __init__(self, presenter: CampaignPresenter) -> None:
         super().__init__()
         self._words = label(muted=True)
-        self._bar = QProgressBar()
-        self._bar.setTextVisible(False)
+        self._bar = ProgressBar()
         self._bar.setMaximumWidth(200)
-        self._cancel = QPushButton(gettext("Cancel"))
-        self._cancel.clicked.connect(presenter.cancel)
-        self._parts = (self._words, self._bar, self._cancel)
+        self._cancel = make_button(gettext("Cancel"), presenter.cancel)
         layout = make_row(self._words, (self._bar, 1), self._cancel, spacing=12, margins=(12, 0), of=self)
         layout.addStretch(0)
 
     def show_progress(self, progress: Progress | None) -> None:
-        for part in self._parts:
+        self._bar.show_progress(progress)
+        for part in (self._words, self._cancel):
             part.setVisible(progress is not None)
         if progress is not None:
             metrics, middle = self._words.fontMetrics(), Qt.TextElideMode.ElideMiddle
             self._words.setText(metrics.elidedText(progress.text, middle, _WORDS_WIDTH))
             self._words.setToolTip(progress.text)
-            self._bar.setRange(0, 0 if progress.fraction is None else 1000)
-            self._bar.setValue(round(1000 * (progress.fraction or 0.0)))
 
 
 class _Empty(QFrame):
     """In place of the table: what will be here, and how to get it."""
 
-    def __init__(self, presenter: CampaignPresenter, choose_folder: object) -> None:
+    def __init__(self, presenter: CampaignPresenter, choose_folder: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._presenter = presenter
@@ -202,15 +195,13 @@ class _Empty(QFrame):
         self._where = label(muted=True, wrap=True)
         for words in (self._words, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        record = QPushButton(gettext("Record"))
-        record.clicked.connect(presenter.navigator.show_record)
-        synthetic = QPushButton(gettext("Make the synthetic campaign"))
-        synthetic.setToolTip(gettext("Simulate 36 series, three tests each, into a new folder: some minutes"))
-        synthetic.clicked.connect(self._make)
-        folder = QPushButton(gettext("Choose another folder"))
-        folder.clicked.connect(choose_folder)
+        hint = gettext("Simulate 36 series, three tests each, into a new folder: some minutes")
         self._folder = ""
-        self._buttons = (record, folder, synthetic)
+        self._buttons = (
+            make_button(gettext("Record"), presenter.navigator.show_record),
+            make_button(gettext("Choose another folder"), choose_folder),
+            make_button(gettext("Make the synthetic campaign"), self._make, hint),
+        )
         layout = make_column(STRETCH, self._words, self._where, spacing=16, margins=(24, 24), of=self)
         for button in self._buttons:
             layout.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
@@ -235,13 +226,6 @@ def _where(state: CampaignState) -> str:
     if state.is_gathered:
         return N_("There are no runs in {folder} yet.")
     return N_("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
-
-
-def _card(*parts: QWidget) -> QFrame:
-    card = QFrame()
-    card.setProperty("role", "card")
-    make_column(*parts, margins=(1, 1), of=card)
-    return card
 
 
 def _section_parts(state: CampaignState) -> tuple[object, ...]:

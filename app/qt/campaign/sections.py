@@ -1,13 +1,16 @@
 """The right column of Campaign: runs of a series, next test, effects, repeatability, exclusions, warnings."""
 
+from functools import partial
+
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from analysis.formatting import THIN_SPACE
 from app.presenters.base import Chip, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, NextTest, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
+from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -41,9 +44,8 @@ class Sections(QWidget):
         for text in test.expectations:
             layout.addWidget(label(text, muted=True, wrap=True))
         if test.series:
-            record = QPushButton(gettext("Record"))
-            record.setToolTip(gettext("Go to Record"))
-            record.clicked.connect(self._presenter.navigator.show_record)
+            show_record = self._presenter.navigator.show_record
+            record = make_button(gettext("Record"), show_record, gettext("Go to Record"))
             layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
 
     def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
@@ -93,9 +95,8 @@ class Sections(QWidget):
             row = QHBoxLayout()
             row.addWidget(label(f"{line.name}: {line.reason}", wrap=True), 1)
             if line.can_return:
-                back = QPushButton(gettext("Take in"))
+                back = make_button(gettext("Take in"), partial(self._presenter.include_run, line.path))
                 back.setAccessibleName(gettext("Let {run} count again", run=line.name))
-                back.clicked.connect(lambda _=False, path=line.path: self._presenter.include_run(path))
                 row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
             layout.addLayout(row)
 
@@ -157,16 +158,16 @@ class SelectedRuns(QWidget):
 
     def _line(self, run: RunRow) -> QWidget:
         made = QWidget()
-        name = QPushButton(run.name)
+        open_run = partial(self._presenter.navigator.open_run, run.path)
+        name = make_button(run.name, open_run, gettext("Show this run on Identify"))
         name.setProperty("role", "row")
-        name.setToolTip(gettext("Show this run on Identify"))
-        name.clicked.connect(lambda: self._presenter.navigator.open_run(run.path))
-        out = QPushButton(gettext("Leave out"))
+        out = make_button(
+            gettext("Leave out"),
+            lambda: self._presenter.exclude_run(run.path, self._reason.text()),
+            gettext("Leave this run out, for the reason below"),
+        )
         out.setAccessibleName(gettext("Leave {run} out", run=run.name))
-        out.setToolTip(gettext("Leave this run out, for the reason below"))
-        out.clicked.connect(lambda: self._presenter.exclude_run(run.path, self._reason.text()))
-        chip = label()
-        show_chip(chip, run.status)
+        chip = _chip(run.status)
         below = make_row(
             label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}"),
             chip,

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHeaderView,
     QLineEdit,
-    QPushButton,
     QScrollArea,
     QTableWidget,
     QTableWidgetItem,
@@ -31,11 +30,11 @@ from app.presenters.gauges.state import (
 )
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, colour
-from app.qt.widgets.inputs import CheckBox, ComboBox
-from app.qt.widgets.layouts import STRETCH, make_column, make_row
+from app.qt.widgets.inputs import CheckBox, ComboBox, make_button, show_texts
+from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
@@ -68,29 +67,26 @@ class CalibratePanel(QScrollArea):
         self._degree.addItems([gettext(name) for name in _DEGREES])
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._use = CheckBox(gettext("Take it for all runs from now on"))
-        self._save = QPushButton(gettext("Save calibration"))
-        self._again = QPushButton(gettext("Connect again"))
-        self._again.setToolTip(gettext("The device is still read by the calibration before"))
+        self._save = make_button(gettext("Save calibration"), presenter.save)
+        hint = gettext("The device is still read by the calibration before")
+        self._again = make_button(gettext("Connect again"), reconnect, hint)
         self._shown: CalibrationFit | None = None
         self._lay_out()
-        self._connect(reconnect)
+        self._connect()
 
     def show_state(self, state: CalibrationState) -> None:
         self._form = state.form
         self._readings.show_state(state)
         self._degree.setCurrentIndex(state.form.degree - 1)
         self._use.setChecked(state.form.use)
-        for name, field in self._fields.items():
-            if field.text() != getattr(state.form, name):
-                field.setText(getattr(state.form, name))
+        show_texts(self._fields, state.form)
         self._save.setEnabled(state.can_save)
         self._again.setVisible(state.offers_reconnect)
         if state.fit is not self._shown:
             self._shown = state.fit
             self._plot.show_fit(state.fit)
             self._merits.show_values(state.fit.values if state.fit else ())
-            self._cautions.setText("\n".join(state.fit.warnings) if state.fit else "")
-            self._cautions.setVisible(bool(state.fit and state.fit.warnings))
+            set_text_or_hide(self._cautions, "\n".join(state.fit.warnings) if state.fit else "")
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
@@ -106,13 +102,11 @@ class CalibratePanel(QScrollArea):
             filled = replace(filled, **{name: field.text()})  # type: ignore[arg-type]  # all of them are texts
         self._presenter.set_form(filled)
 
-    def _connect(self, reconnect: Callable[[], None]) -> None:
+    def _connect(self) -> None:
         self._degree.activated.connect(lambda _: self._fill())
         self._use.clicked.connect(lambda _: self._fill())
         for field in self._fields.values():
             field.textEdited.connect(lambda _: self._fill())
-        self._save.clicked.connect(lambda _: self._presenter.save())
-        self._again.clicked.connect(lambda _: reconnect())
 
     def _lay_out(self) -> None:
         inside = QWidget()
@@ -136,15 +130,10 @@ class CalibratePanel(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def _form_grid(self) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(8)
-        _add_field(grid, 0, gettext("Curve"), self._degree)
-        for row, (name, field) in enumerate(self._fields.items(), start=1):
-            title, hint = (gettext(words) for words in _FIELDS[name])
-            field.setPlaceholderText(hint)
-            _add_field(grid, row, title, field)
-        return grid
+        for name, field in self._fields.items():
+            field.setPlaceholderText(gettext(_FIELDS[name][1]))
+        fields = ((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
+        return make_form_grid(((gettext("Curve"), self._degree), *fields))
 
 
 class _ReadingColumn(QWidget):
@@ -166,14 +155,12 @@ class _ReadingColumn(QWidget):
         self._dial.setAccessibleName(gettext("Dial reading in millimetres"))
         self._dial.setToolTip(gettext("Enter averages the counts and takes the reading"))
         self._waiting = label(wrap=True)
-        self._undo = QPushButton(gettext("Undo"))
-        self._restart = QPushButton(gettext("Start over"))
-        self._restart.setToolTip(gettext("Begin another calibration; the readings stay in their file"))
+        self._undo = make_button(gettext("Undo"), presenter.undo)
+        hint = gettext("Begin another calibration; the readings stay in their file")
+        self._restart = make_button(gettext("Start over"), presenter.restart, hint)
         self._table = _ReadingsTable()
         self._gauge.activated.connect(choose)
         self._dial.returnPressed.connect(self._take)
-        self._undo.clicked.connect(lambda _: presenter.undo())
-        self._restart.clicked.connect(lambda _: presenter.restart())
         self._lay_out()
 
     def show_state(self, state: CalibrationState) -> None:
@@ -182,8 +169,7 @@ class _ReadingColumn(QWidget):
         self._live.setText(state.live_value or "–")
         self._spread.setText(state.live_note)
         show_chip(self._message, state.message)
-        self._waiting.setText(state.reading_status)
-        self._waiting.setVisible(bool(state.reading_status))
+        set_text_or_hide(self._waiting, state.reading_status)
         self._undo.setEnabled(bool(state.points or state.reading_status))
         self._restart.setEnabled(bool(state.points))
         self._table.show_readings(state.points, state.fit)
@@ -246,15 +232,6 @@ class _ReadingsTable(QTableWidget):
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(row, column, item)
         self.scrollToBottom()
-
-
-def _add_field(grid: QGridLayout, row: int, name: str, field: QWidget) -> None:
-    title = label(name)
-    title.setBuddy(field)
-    field.setAccessibleName(name)
-    grid.addWidget(title, row, 0)
-    grid.addWidget(field, row, 1)
-    grid.setColumnStretch(1, 1)
 
 
 _TITLE = N_("dial − calibration, µm &nbsp; ▲ up &nbsp; ▼ down")

@@ -2,16 +2,16 @@
 
 from dataclasses import replace
 
-from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.state import NAMES, CheckForm, CheckKind, CheckState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.inputs import ComboBox, make_button, make_choice, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _HOW = N_(
@@ -37,15 +37,13 @@ class CheckPanel(QWidget):
         self._form = CheckForm()
         self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
-        self._kind = ComboBox()
-        for kind in CheckKind:
-            self._kind.addItem(gettext(kind.value), kind)
+        self._kind = make_choice({kind: kind.value for kind in CheckKind})
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._instruction = label(role=TextRole.HEADING, wrap=True)
         self._waiting = label(wrap=True)
         self._message = label(wrap=True)
-        self._advance = QPushButton()
-        self._cancel = QPushButton(gettext("Break off"))
+        self._advance = make_button("", presenter.advance)
+        self._cancel = make_button(gettext("Break off"), presenter.cancel)
         self._verdict = label(role=TextRole.HEADING, wrap=True)
         self._values = ValueGrid()
         self._warnings = label(muted=True, wrap=True)
@@ -56,14 +54,11 @@ class CheckPanel(QWidget):
         self._form = state.form
         self._gauge.setCurrentIndex(state.form.gauge)
         self._kind.setCurrentIndex(list(CheckKind).index(state.form.kind))
-        for name, field in self._fields.items():
-            if field.text() != getattr(state.form, name):
-                field.setText(getattr(state.form, name))
+        show_texts(self._fields, state.form)
         for part in (self._gauge, self._kind, *self._fields.values()):
             part.setEnabled(not state.is_started)
-        for shown, text in ((self._instruction, state.instruction), (self._waiting, state.reading_status)):
-            shown.setText(text)
-            shown.setVisible(bool(text))
+        set_text_or_hide(self._instruction, state.instruction)
+        set_text_or_hide(self._waiting, state.reading_status)
         self._advance.setText(gettext(_STARTED if state.is_started else _NOT_STARTED))
         is_due = bool(state.instruction) or not state.is_started
         self._advance.setEnabled(is_due and not state.reading_status)
@@ -71,8 +66,7 @@ class CheckPanel(QWidget):
         show_chip(self._message, state.message)
         show_chip(self._verdict, state.outcome)
         self._values.show_values(state.values)
-        self._warnings.setText("\n".join(state.warnings))
-        self._warnings.setVisible(bool(state.warnings))
+        set_text_or_hide(self._warnings, "\n".join(state.warnings))
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
@@ -89,8 +83,6 @@ class CheckPanel(QWidget):
         for field in self._fields.values():
             field.textEdited.connect(lambda _: self._fill())
             field.returnPressed.connect(self._advance.click)
-        self._advance.clicked.connect(lambda _checked: self._presenter.advance())
-        self._cancel.clicked.connect(lambda _checked: self._presenter.cancel())
 
     def _lay_out(self) -> None:
         page = QWidget()

@@ -1,14 +1,16 @@
 """Tab Ports and devices: serial ports, the devices recognised on them, buttons to connect."""
 
+from functools import partial
+
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.ports import PortsPresenter
 from app.presenters.gauges.state import PortCard, PortsState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox
+from app.qt.widgets.inputs import CheckBox, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _EMPTY = N_("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
@@ -22,8 +24,8 @@ class PortsPanel(QWidget):
         super().__init__()
         self._presenter = presenter
         self._shown: tuple[PortCard, ...] | None = None
-        self._look = QPushButton(gettext("Look at the ports"))
-        self._stop = QPushButton(gettext("Stop looking"))
+        self._look = make_button(gettext("Look at the ports"), presenter.probe)
+        self._stop = make_button(gettext("Stop looking"), presenter.cancel)
         self._query_silent = CheckBox(gettext("Ask silent devices, too"))
         self._query_silent.setToolTip(
             gettext("Sends each silent device questions that only read. Without it nothing is sent to any.")
@@ -31,8 +33,6 @@ class PortsPanel(QWidget):
         self._progress = label(muted=True, wrap=True)
         self._message = label(wrap=True)
         self._list = make_scroll_area(name=gettext("Ports of this computer"))
-        self._look.clicked.connect(lambda _checked: presenter.probe())
-        self._stop.clicked.connect(lambda _checked: presenter.cancel())
         self._query_silent.clicked.connect(presenter.set_query_silent)
         self._lay_out()
 
@@ -40,8 +40,7 @@ class PortsPanel(QWidget):
         self._look.setEnabled(not state.progress)
         self._stop.setEnabled(bool(state.progress))
         self._query_silent.setChecked(state.query_silent)
-        self._progress.setText(state.progress)
-        self._progress.setVisible(bool(state.progress))
+        set_text_or_hide(self._progress, state.progress)
         show_chip(self._message, state.message)
         if state.ports != self._shown:
             self._shown = state.ports
@@ -81,25 +80,17 @@ class PortsPanel(QWidget):
         layout.setContentsMargins(12, 12, 12, 12)
         layout.addLayout(words, 1)
         if card.suggested_form is not None:
-            use = QPushButton(gettext("Use this port"))
-            use.setToolTip(gettext("Fill in the start page for {url}", url=card.url))
+            hint = gettext("Fill in the start page for {url}", url=card.url)
+            use = make_button(gettext("Use this port"), partial(self._presenter.fill_port, card.url), hint)
             use.setAccessibleName(gettext("Use {url}", url=card.url))
-            use.clicked.connect(lambda _checked: self._presenter.fill_port(card.url))
-            buttons = QVBoxLayout()
-            buttons.addWidget(use)
-            if is_pair:
-                buttons.addWidget(self._second_button(card.url))
-            buttons.addStretch(1)
-            layout.addLayout(buttons)
+            second = [self._second_button(card.url)] if is_pair else []
+            layout.addLayout(make_column(use, *second, STRETCH, spacing=6))
         return row
 
     def _second_button(self, url: str) -> QPushButton:
-        second = QPushButton(gettext("Use for gauge 2"))
-        second.setToolTip(
-            gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
-        )
+        hint = gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
+        second = make_button(gettext("Use for gauge 2"), partial(self._presenter.fill_second_port, url), hint)
         second.setAccessibleName(gettext("Use {url} for gauge 2", url=url))
-        second.clicked.connect(lambda _checked: self._presenter.fill_second_port(url))
         return second
 
     def _lay_out(self) -> None:

@@ -14,7 +14,7 @@ from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_column
+from app.qt.widgets.layouts import make_column, make_frame
 from app.qt.widgets.shortcuts import add_shortcut
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
@@ -72,10 +72,7 @@ class GaugesScreen(QWidget):
         self._check.add_keys(self)
 
     def _lay_out(self) -> None:
-        card = QFrame()
-        card.setProperty("role", "card")
-        inside = QVBoxLayout(card)
-        inside.setContentsMargins(1, 1, 1, 1)
+        card = make_frame(self._tabs, (self._pages, 1), spacing=6)
         for index, (tab, key) in enumerate(_KEYS.items()):
             self._tabs.addTab(gettext(tab.value))
             self._tabs.setTabToolTip(index, f"{gettext(tab.value)} ({key})")
@@ -84,8 +81,6 @@ class GaugesScreen(QWidget):
         self._tabs.setAccessibleName(gettext("What is shown of the gauges"))
         for panel in (self._health, self._ports, self._calibrate, self._check):
             self._pages.addWidget(panel)
-        inside.addWidget(self._tabs)
-        inside.addWidget(self._pages, 1)
         layout = QHBoxLayout(self)
         beside = QVBoxLayout()
         beside.setContentsMargins(0, FOCUS_RING, 0, FOCUS_RING)  # edges in line with those of the cards

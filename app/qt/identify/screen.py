@@ -6,12 +6,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QProgressBar,
     QPushButton,
     QSplitter,
     QStackedWidget,
     QTabBar,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -23,9 +21,10 @@ from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import STRETCH, make_column, make_scroll_area
+from app.qt.widgets.inputs import ProgressBar, make_button
+from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from app.qt.window_geometry import persist_layout
 from messages.i18n import N_, gettext
 
@@ -42,8 +41,7 @@ class IdentifyScreen(QWidget):
         super().__init__()
         self._title = label(role=TextRole.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._open = QPushButton(gettext("Open another recording"))
-        self._open.clicked.connect(ask_for_run)
+        self._open = make_button(gettext("Open another recording"), ask_for_run)
         self._kind = QPushButton()
         self._kind.clicked.connect(presenter.analyse_as_alternative)
         self._cursors = QPushButton(gettext("Cursors"))
@@ -104,8 +102,7 @@ class IdentifyScreen(QWidget):
         if state.motion is not None:
             self._sides.motions.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
-        self._no_scan.setText(state.no_scan_reason)
-        self._no_scan.setVisible(bool(state.no_scan_reason))
+        set_text_or_hide(self._no_scan, state.no_scan_reason)
         self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
 
     def _show_side_of(self, state: IdentifyState) -> None:
@@ -141,22 +138,14 @@ class IdentifyScreen(QWidget):
         self._scan.reset_requested.connect(presenter.reset_friction)
 
     def _filled(self) -> QWidget:
-        card, side, page = QFrame(), QFrame(), QSplitter(Qt.Orientation.Horizontal)
+        page = QSplitter(Qt.Orientation.Horizontal)
         for title in PlotTab:
             self._tabs.addTab(gettext(title.value))
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName(gettext("What is drawn"))
-        left, right = (
-            (self._tabs, self._no_motion, self._readings, self._sides),
-            (self._scan, self._no_scan, self._column),
-        )
-        for frame, parts in ((card, left), (side, right)):
-            frame.setProperty("role", "card")
-            inside = QVBoxLayout(frame)
-            inside.setContentsMargins(1, 1, 1, 1)
-            for part in parts:
-                inside.addWidget(part)
+        card = make_frame(self._tabs, self._no_motion, self._readings, self._sides, spacing=6)
+        side = make_frame(self._scan, self._no_scan, self._column, spacing=6)
         side.setMinimumWidth(_COLUMN_WIDTH)
         side.setMaximumWidth(_WIDEST_COLUMN)
         page.setChildrenCollapsible(False)
@@ -187,15 +176,12 @@ class _Waiting(QFrame):
         self.setProperty("role", "card")
         self._words = label(role=TextRole.HEADING, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._bar = QProgressBar()
-        self._bar.setTextVisible(False)
+        self._bar = ProgressBar()
         self._bar.setFixedWidth(320)
-        self._cancel = QPushButton(gettext("Cancel"))
-        self._cancel.clicked.connect(presenter.cancel)
+        self._cancel = make_button(gettext("Cancel"), presenter.cancel)
         self._kind = QPushButton()
         self._kind.clicked.connect(presenter.analyse_as_alternative)
-        self._open = QPushButton(gettext("Open a recording"))
-        self._open.clicked.connect(ask_for_run)
+        self._open = make_button(gettext("Open a recording"), ask_for_run)
         layout = make_column(STRETCH, self._words, spacing=16, margins=(24, 24), of=self)
         for widget in (self._bar, self._cancel, self._kind, self._open):
             layout.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
@@ -207,11 +193,8 @@ class _Waiting(QFrame):
         self._open.setVisible(progress is None)
         self._kind.setVisible(progress is None and state.alternative_kind is not None)
         self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
-        self._bar.setVisible(progress is not None)
+        self._bar.show_progress(progress)
         self._cancel.setVisible(progress is not None)
-        if progress is not None:
-            self._bar.setRange(0, 0 if progress.fraction is None else 100)
-            self._bar.setValue(round(100 * (progress.fraction or 0.0)))
 
 
 def _words(state: IdentifyState) -> Chip:

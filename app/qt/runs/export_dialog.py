@@ -8,10 +8,8 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QGridLayout,
-    QHBoxLayout,
     QLineEdit,
     QPlainTextEdit,
-    QProgressBar,
     QPushButton,
     QWidget,
 )
@@ -19,9 +17,9 @@ from PySide6.QtWidgets import (
 from app.presenters.base import Chip
 from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportPresenter, ExportState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox
-from app.qt.widgets.layouts import make_column, make_row
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.inputs import CheckBox, ComboBox, ProgressBar, ask_for_folder, make_choice
+from app.qt.widgets.layouts import make_column, make_form_grid, make_row
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import gettext, ngettext
 
 
@@ -33,13 +31,13 @@ class ExportDialog(QDialog):
         self._presenter = presenter
         self._shown = ExportState()
         self._title = label(role=TextRole.HEADING)
-        self._format = ComboBox()
+        self._format = make_choice(FORMATS)
         self._content = ComboBox()
         self._output = QLineEdit()
         self._browse = QPushButton(gettext("Browse…"))
         self._replace = CheckBox(gettext("Replace existing files"))
         self._preview = QPlainTextEdit()
-        self._bar = QProgressBar()
+        self._bar = ProgressBar()
         self._message = label(wrap=True)
         self._details = label(muted=True, wrap=True)
         self._export = QPushButton(gettext("Export"))
@@ -68,22 +66,18 @@ class ExportDialog(QDialog):
         self._show_work(state)
 
     def _show_work(self, state: ExportState) -> None:
-        self._bar.setVisible(state.progress is not None)
-        if state.progress is not None:
-            self._bar.setRange(0, 0 if state.progress.fraction is None else 100)
-            self._bar.setValue(round(100 * (state.progress.fraction or 0.0)))
+        self._bar.show_progress(state.progress)
         show_chip(self._message, Chip(state.progress.text) if state.progress is not None else state.message)
-        self._details.setText("\n".join(state.details))
-        self._details.setVisible(bool(state.details))
+        set_text_or_hide(self._details, "\n".join(state.details))
         self._export.setEnabled(state.progress is None)
 
     def _choose_output(self) -> None:
-        dialog = QFileDialog(self, gettext("Export to"), self._shown.output)
         if self._shown.is_folder:
-            dialog.setFileMode(QFileDialog.FileMode.Directory)
-        else:
-            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-            dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the box below says whether
+            ask_for_folder(self, gettext("Export to"), self._shown.output, self._presenter.set_output)
+            return
+        dialog = QFileDialog(self, gettext("Export to"), self._shown.output)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the box below says whether
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._presenter.set_output)
         dialog.open()
@@ -101,12 +95,8 @@ class ExportDialog(QDialog):
         self.setWindowTitle(gettext("Export"))
         self.resize(720, 560)
         self._set_up_fields()
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
-        buttons.addWidget(self._bar, 1)
-        buttons.addStretch(0)
-        buttons.addWidget(self._export)
-        buttons.addWidget(self._close)
+        buttons = make_row((self._bar, 1), self._export, self._close, spacing=8)
+        buttons.insertStretch(1, 0)
         make_column(
             self._title,
             self._form(),
@@ -121,35 +111,20 @@ class ExportDialog(QDialog):
         )
 
     def _set_up_fields(self) -> None:
-        for name, title in FORMATS.items():
-            self._format.addItem(gettext(title), name)
         self._preview.setReadOnly(True)
         self._preview.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self._preview.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self._preview.setTabChangesFocus(True)
-        self._bar.setTextVisible(False)
         self._export.setDefault(True)
         self._export.setProperty("primary", "true")
         self._preview.setAccessibleName(gettext("Preview"))
 
     def _form(self) -> QGridLayout:
-        place = make_row((self._output, 1), self._browse, spacing=8)
-        form = QGridLayout()
-        form.setHorizontalSpacing(12)
-        form.setVerticalSpacing(8)
-        form.setColumnStretch(1, 1)
-        fields: dict[str, QWidget] = {
-            gettext("Format"): self._format,
-            gettext("Content"): self._content,
-            gettext("To"): self._output,
-        }
-        for line, (name, field) in enumerate(fields.items()):
-            title = label(name)
-            title.setBuddy(field)
-            field.setAccessibleName(name)
-            form.addWidget(title, line, 0)
-        form.addWidget(self._format, 0, 1)
-        form.addWidget(self._content, 1, 1)
-        form.addLayout(place, 2, 1)
-        form.addWidget(self._replace, 3, 1)
+        place = QWidget()
+        make_row((self._output, 1), self._browse, spacing=8, of=place)
+        place.setFocusProxy(self._output)
+        fields = ((gettext("Format"), self._format), (gettext("Content"), self._content))
+        form = make_form_grid((*fields, (gettext("To"), place)))
+        self._output.setAccessibleName(gettext("To"))
+        form.addWidget(self._replace, form.rowCount(), 1)
         return form

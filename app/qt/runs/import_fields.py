@@ -10,7 +10,7 @@ from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES
 from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat
 from app.presenters.runs.import_presenter import ImportState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.inputs import ComboBox, make_choice
 from app.qt.widgets.layouts import make_form_grid
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -101,8 +101,8 @@ class ImportFields(QWidget):
         super().__init__()
         self._shown = ImportState()
         self._columns = {name: ComboBox() for name in _COLUMNS}
-        self._choices = {name: _choice(items) for name, items in _CHOICES.items()}
-        self._of_reading = {name: _choice(items) for name, items in _OF_READING.items()}
+        self._choices = {name: make_choice(items) for name, items in _CHOICES.items()}
+        self._of_reading = {name: make_choice(items) for name, items in _OF_READING.items()}
         self._texts = {name: QLineEdit() for name in _TEXTS}
         self._faults = {name: label(role=TextRole.LABEL, wrap=True) for name in (*_TITLES, *_TEXTS)}
         self._fold = QToolButton()
@@ -198,10 +198,3 @@ class ImportFields(QWidget):
 
     def _title(self, name: str) -> str:
         return gettext(_TITLES[name] if name in _TITLES else _TEXTS[name][0])
-
-
-def _choice(items: dict[str, str]) -> ComboBox:
-    made = ComboBox()
-    for value, words in items.items():
-        made.addItem(gettext(words), value)
-    return made

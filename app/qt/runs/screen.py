@@ -14,8 +14,8 @@ from app.qt.runs.preview import RunsPreview
 from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.inputs import ComboBox
-from app.qt.widgets.layouts import make_column, make_row
+from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_choice
+from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext, ngettext
@@ -38,7 +38,7 @@ class RunsScreen(QWidget):
         self._shown: RunsState | None = None
         self._text = QLineEdit()
         self._series = ComboBox()
-        self._status = ComboBox()
+        self._status = make_choice({status: status.value for status in StatusFilter})
         self._count = label(muted=True)
         self._import = QPushButton(gettext("Import…"))
         self._folder = QPushButton(gettext("Folder…"))
@@ -131,13 +131,8 @@ class RunsScreen(QWidget):
         )
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(
-            self, gettext("Show the runs of a folder"), self._shown.folder if self._shown else ""
-        )
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._presenter.choose_folder)
-        dialog.open()
+        folder = self._shown.folder if self._shown else ""
+        ask_for_folder(self, gettext("Show the runs of a folder"), folder, self._presenter.choose_folder)
 
     def _connect(self) -> None:
         self._text.textChanged.connect(lambda _: self._apply_filter())
@@ -161,27 +156,18 @@ class RunsScreen(QWidget):
         self._text.setAccessibleName(gettext("Search"))
         self._series.setAccessibleName(gettext("Series"))
         self._status.setAccessibleName(gettext("Which runs"))
-        for status in StatusFilter:
-            self._status.addItem(gettext(status.value), status)
         top = make_row(
             (self._text, 1), self._series, self._status, self._count, self._import, self._folder, spacing=8
         )
         self._middle.addWidget(self._table)
         self._middle.addWidget(_centred(self._empty))
-        middle = make_row((_card(self._middle), 1), self._side, spacing=8)
+        middle = make_row((make_frame(self._middle), 1), self._side, spacing=8)
         make_column(top, (middle, 1), self._actions, spacing=8, margins=(8, 8), of=self)
 
     def _make_side(self) -> QFrame:
         content = QWidget()
         make_column((self._preview, 1), self._metadata, spacing=6, of=content)
-        return _card(content)
-
-
-def _card(content: QWidget) -> QFrame:
-    card = QFrame()
-    card.setProperty("role", "card")
-    make_column(content, margins=(1, 1), of=card)
-    return card
+        return make_frame(content)
 
 
 def _centred(words: QLabel) -> QWidget:

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QProgressBar, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QLineEdit, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import MetadataForm, RunsState
-from app.qt.widgets.layouts import make_column, make_row
+from app.qt.widgets.inputs import ProgressBar, make_button
+from app.qt.widgets.layouts import make_column, make_form_grid, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -29,8 +30,7 @@ class ActionBar(QFrame):
         self._undo = _button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._details = _button(gettext("Details"), self._fold)
-        self._bar = QProgressBar()
-        self._bar.setTextVisible(False)
+        self._bar = ProgressBar()
         self._bar.setFixedWidth(160)
         self._cancel = _button(gettext("Cancel"), presenter.cancel)
         self._cancel.setToolTip(gettext("Give up the work; what is done stays"))
@@ -79,11 +79,8 @@ class ActionBar(QFrame):
             message = Chip(". ".join(filter(None, (progress.text, message.text))), tone)
         show_chip(self._message, message)
         self._message.show()  # an empty one still keeps the buttons at the left
-        for widget in (self._bar, self._cancel):
-            widget.setVisible(progress is not None)
-        if progress is not None:
-            self._bar.setRange(0, 0 if progress.fraction is None else 100)
-            self._bar.setValue(round(100 * (progress.fraction or 0.0)))
+        self._bar.show_progress(progress)
+        self._cancel.setVisible(progress is not None)
 
     def _fold(self) -> None:
         self._list.setVisible(not self._list.isVisible())
@@ -96,9 +93,8 @@ class ActionBar(QFrame):
 
 
 def _button(text: str, act: Callable[[], None]) -> QPushButton:
-    button = QPushButton(text)
+    button = make_button(text, act)
     button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-    button.clicked.connect(lambda _checked: act())
     return button
 
 
@@ -119,19 +115,12 @@ class MetadataEditor(QWidget):
         super().__init__()
         self._metadata: MetadataForm | None = None
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        grid = QGridLayout(self)
+        grid = make_form_grid((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
         grid.setContentsMargins(12, 4, 12, 12)
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(8)
-        grid.setColumnStretch(1, 1)
-        for line, (name, field) in enumerate(self._fields.items()):
-            title = label(gettext(_FIELDS[name][0]))
-            title.setBuddy(field)
-            field.setAccessibleName(gettext(_FIELDS[name][0]))
+        self.setLayout(grid)
+        for name, field in self._fields.items():
             field.setToolTip(gettext(_FIELDS[name][1]))
             field.editingFinished.connect(lambda name=name: self._on_edited(name))
-            grid.addWidget(title, line, 0)
-            grid.addWidget(field, line, 1)
 
     def show_metadata(self, metadata: MetadataForm | None) -> None:
         self._metadata = metadata

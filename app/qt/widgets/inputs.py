@@ -1,10 +1,24 @@
 """Check box, combo box and line edit. Their marks are drawn: a style sheet takes them only from files."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
 
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QStyle, QStyleOptionButton
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFileDialog,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QStyle,
+    QStyleOptionButton,
+    QWidget,
+)
+
+from app.presenters.base import Progress
+from messages.i18n import gettext
 
 _MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))
 """Corners of the mark, in parts of the box."""
@@ -42,6 +56,45 @@ class ComboBox(QComboBox):
         x, y = self.width() - 16.0, self.height() / 2.0
         painter.drawPolyline([QPointF(x - 4.0, y - 2.0), QPointF(x, y + 2.0), QPointF(x + 4.0, y - 2.0)])
         painter.end()
+
+
+class ProgressBar(QProgressBar):
+    """Bar without text; hidden while nothing goes on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setTextVisible(False)
+
+    def show_progress(self, progress: Progress | None) -> None:
+        self.setVisible(progress is not None)
+        if progress is not None:
+            self.setRange(0, 0 if progress.fraction is None else 1000)
+            self.setValue(round(1000 * (progress.fraction or 0.0)))
+
+
+def make_button(text: str, act: Callable[[], object], hint: str = "") -> QPushButton:
+    """Make a button that calls `act`."""
+    button = QPushButton(text)
+    button.setToolTip(hint)
+    button.clicked.connect(lambda _checked: act())
+    return button
+
+
+def make_choice(items: Mapping[Any, str]) -> ComboBox:
+    """Make a combo box of values (its data) and their titles, which are translated."""
+    box = ComboBox()
+    for value, title in items.items():
+        box.addItem(gettext(title), value)
+    return box
+
+
+def ask_for_folder(parent: QWidget, title: str, start: str, choose: Callable[[str], object]) -> None:
+    """Let the operator choose a folder; nothing waits for the dialog."""
+    dialog = QFileDialog(parent, title, start)
+    dialog.setFileMode(QFileDialog.FileMode.Directory)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.fileSelected.connect(choose)
+    dialog.open()
 
 
 ESCAPE = frozenset({Qt.Key.Key_Escape})

@@ -89,6 +89,14 @@ def make_card(title: str, text: str = "", *parts: Item) -> tuple[QFrame, QVBoxLa
     return card, make_column(heading, *texts, *parts, spacing=12, margins=(16, 16), of=card)
 
 
+def make_frame(*items: Item, spacing: int = 0) -> QFrame:
+    """Make a card whose items reach its border."""
+    card = QFrame()
+    card.setProperty("role", "card")
+    make_column(*items, spacing=spacing, margins=(1, 1), of=card)
+    return card
+
+
 def make_scroll_area(
     content: QWidget | None = None, *, is_column: bool = True, name: str = ""
 ) -> QScrollArea:
