@@ -111,16 +111,9 @@ def spawn(
 class ChildProcess(Generic[Command, Event]):
     """Parent's side of a child process. `send` never waits for the child, unless asked to.
 
-    Parameters
-    ----------
-    process : subprocess.Popen
-        With pipes for stdin and stdout, as `spawn` starts it. Belongs to this object from now on.
-    encode, decode : callable
-        Encodes a command; decodes an event from one line. Undecodable lines are skipped.
-    on_event, on_exit : callable
-        Receive each event, and after the last one the exit code, in the reading thread.
-    queue_size : int
-        Commands that may wait until the child takes them.
+    `spawn` starts the process. `on_event` receives each event and `on_exit` the exit code after the last one,
+    in the reading thread. Lines that `decode` refuses are skipped. `queue_size` commands may wait until the
+    child takes them.
     """
 
     def __init__(
@@ -227,17 +220,10 @@ class ChildProcess(Generic[Command, Event]):
 class CommandReader(Generic[Command]):
     """Child's side: reads commands from a pipe in a thread of its own.
 
-    Parameters
-    ----------
-    descriptor : int
-        Read end of the pipe. It is not read through a buffered file: its lock would be held by the thread for
-        ever, and the interpreter could not finish.
-    decoder : StreamDecoder
-        An error of it closes the reader like the end of the pipe.
-    on_closed : callable, optional
-        Called in the reading thread when the pipe has ended.
-    queue_size : int
-        Commands that may wait. More of them wait in the pipe, and then at the parent.
+    The pipe is not read through a buffered file: its lock would be held by the thread for ever, and the
+    interpreter could not finish. An error of the decoder closes the reader like the end of the pipe;
+    `on_closed` is then called in the thread. Commands beyond `queue_size` wait in the pipe, and then at the
+    parent.
     """
 
     def __init__(

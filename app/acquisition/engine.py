@@ -110,21 +110,7 @@ class PollSchedule:
 
 
 class Engine:
-    """A connected device, and the runs recorded from it, one after another.
-
-    Parameters
-    ----------
-    port : PortSettings
-        As connected.
-    stand, gauges
-        Settings in use.
-    stream, ring
-        Open; closed by the caller.
-    commands, events
-        The pipes to the owner.
-    low_latency : bool
-        Somebody looks at the samples while they come.
-    """
+    """A connected device, and the runs recorded from it, one after another."""
 
     def __init__(
         self,

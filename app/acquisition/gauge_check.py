@@ -113,12 +113,7 @@ def collect_samples(
 ) -> tuple[GaugeSamples, GaugeSamples]:
     """Collect samples of both gauges from now on; whatever else the stream brings is dropped.
 
-    Raises
-    ------
-    NoSamplesError
-        Too few come.
-    AcquisitionError, DriverError
-        The stream has ended.
+    Raises NoSamplesError if too few come, or AcquisitionError or DriverError if the stream has ended.
     """
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
     ends_s = time.monotonic() + seconds + TIMEOUT_S

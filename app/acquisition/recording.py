@@ -69,22 +69,7 @@ class RecordingContext:
 
 
 class Recording:
-    """A run that was asked for.
-
-    Parameters
-    ----------
-    settings : RunSettings
-        Checked.
-    metadata : RunMetadata
-        With its rate, and the time of arming for the start.
-    rate_hz : float
-        Nominal samples a second.
-    journal : Journal
-        Empty but for its header.
-    context : RecordingContext
-    last_slip : ObservedSlip, optional
-        How far the plate went in the run before.
-    """
+    """A requested run. Its `settings` are checked, its journal has nothing but the header."""
 
     def __init__(
         self,

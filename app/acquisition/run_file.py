@@ -66,13 +66,7 @@ class SampleStatistics:
 
 
 class UncommittedRows:
-    """Rows of a run that its journal may not have yet: if that fails, only the run file has them.
-
-    Parameters
-    ----------
-    journaled_index : callable
-        Returns the sample before which the journal has everything.
-    """
+    """Rows of a run that its journal may not have yet: if that fails, only the run file has them."""
 
     def __init__(self, journaled_index: Callable[[], int]) -> None:
         self._journaled_index = journaled_index
@@ -109,22 +103,7 @@ class CloseResult:
 
 
 class RunFile:
-    """The file of a run from its first stored sample on.
-
-    Parameters
-    ----------
-    writer : WriterClient
-    request : OpenRun
-        What the file is to be.
-    journal : Journal
-        Open; closed here, and removed once the run is safe.
-    start_index : int
-        Sample that is stored first.
-    rate_hz : float
-        Nominal samples a second.
-    tap : JournalTap
-        Knows how much of what was decoded the journal has.
-    """
+    """The file of a run from its first stored sample on. The journal is removed once the run is safe."""
 
     def __init__(
         self,

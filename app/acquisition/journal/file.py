@@ -71,18 +71,8 @@ class JournalFile:
 
     When the disk is full, the network share gone, or the folder read-only, all that was written moves to the
     first of the fallback folders that takes it, and the rest is appended there. What can no longer be read
-    stays where it is; the new file then begins with the first record, which identifies the run.
-
-    Parameters
-    ----------
-    file
-        Unbuffered, at its end; written by nobody else.
-    first : bytes
-        Its content: the magic and the first record.
-    lock : FileLock
-        Held for the file.
-    fallback_folders : sequence of Path
-        Folders to move to; they need not exist.
+    stays where it is; the new file then begins with `first`, the magic and the record that identifies the
+    run.
     """
 
     def __init__(

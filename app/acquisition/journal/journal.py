@@ -26,15 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class Journal:
-    """An open journal, see `create_journal`. Any thread appends; `close` waits for the disk.
-
-    Parameters
-    ----------
-    file : JournalFile
-        Open, with its first record. `remove` and `release` release its lock.
-    identifier : str
-        Of the run.
-    """
+    """An open journal, see `create_journal`. Any thread appends; `close` waits for the disk."""
 
     _QUEUE_RECORDS = 4096
     _SYNC_S = 0.1
@@ -79,14 +71,9 @@ class Journal:
         )
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
-        """Hand a record over and return the byte of the journal at which it begins. Does not wait.
+        """Append a record without waiting; return the byte of the journal at which it begins.
 
-        Raises
-        ------
-        JournalFullError
-            No space is left on the disk.
-        JournalError
-            The disk failed, or is too slow: thousands of records wait.
+        Raises JournalFullError, or JournalError if the disk failed or thousands of records wait.
         """
         self._check()
         if self._records.qsize() >= self._QUEUE_RECORDS:

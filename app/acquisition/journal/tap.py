@@ -66,17 +66,7 @@ class JournalTap:
 
 
 class CheckpointWriter:
-    """Notes what is known whenever that has changed, and once a second.
-
-    Parameters
-    ----------
-    armed_index : int
-        Sample from which on a release is waited for.
-    rate_hz : float
-        Nominal samples a second.
-    time_base : callable
-        Gives the time base of the samples from one index to another.
-    """
+    """Writes a checkpoint whenever the measurement has changed, and once a second."""
 
     def __init__(
         self, journal: Journal, armed_index: int, rate_hz: float, time_base: Callable[[int, int], TimeBase]

@@ -92,17 +92,7 @@ class StationaryLevel:
 
 
 class SlidingWindow:
-    """The latest readings of one gauge.
-
-    Parameters
-    ----------
-    span_s : float
-        How far back they are kept.
-    spacing : float
-        Sample indices from one reading to the next, at least.
-    rate_hz : float
-        Sample indices a second.
-    """
+    """Readings of one gauge of the last `span_s`, one for each `spacing` indices at most."""
 
     def __init__(self, span_s: float, spacing: float, rate_hz: float = 1.0) -> None:
         self._rate_hz = rate_hz

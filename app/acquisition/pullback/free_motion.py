@@ -64,16 +64,8 @@ class HoldReference:
 class Hold:
     """A hold of the table, from when it stood still; `detect_release` sees its end.
 
-    Parameters
-    ----------
-    level : StationaryLevel
-        Of the table when it was found still.
-    side : float
-        1 or -1: to which side it is pulled.
-    pulled_m : float
-        How far, without sign (m).
-    bins_to_release : int
-        So many short averages in a row must be beyond the limit.
+    `side` is 1 or -1, `pulled_m` has no sign. A release is `bins_to_release` averages in a row beyond the
+    limit.
     """
 
     def __init__(self, level: StationaryLevel, side: float, pulled_m: float, bins_to_release: int) -> None:
@@ -115,21 +107,9 @@ class Hold:
 
 
 class FreeMotion:
-    """Follows one release.
+    """Follows one release, noticed at sample `noticed_at`; `measurement` receives what it finds.
 
-    Parameters
-    ----------
-    plan : PullbackPlan
-    readings : RecentAverages
-        Holds each short average before `update` receives it.
-    measurement : PullbackMeasurement
-        Receives what is found.
-    hold : Hold
-        From which it was released.
-    noticed_at : float
-        Sample at which the release was noticed.
-    remark : Message
-        On this release, once it is confirmed.
+    `readings` hold each average before `update` receives it; `remark` is shown once the release is confirmed.
     """
 
     def __init__(

@@ -86,13 +86,8 @@ def create_source(
 ) -> SampleSource:
     """Create the source of the device, or of both devices. Raises SettingsError.
 
-    Parameters
-    ----------
-    settings : PortSettings
-    rate_hz : float or None
-        Rows a second, asked for or of an earlier recording.
-    facts : mapping, optional
-        Device settings noted by an earlier recording; they hold the rates of two devices.
+    `rate_hz` is the rate asked for, or that of an earlier recording. `facts` are device settings that an
+    earlier recording noted; they hold the rates of two devices.
     """
     protocol = find_driver(settings.protocol)
     if settings.relative_url:
@@ -139,19 +134,7 @@ class PortOpener:
 
 
 class Connection:
-    """A device that is being read, until its reader ends.
-
-    Parameters
-    ----------
-    port : OpenPort
-        Open; closed here.
-    source : SampleSource
-        Of the device, started.
-    first : bytes
-        Part of the stream that was read already.
-    read_queue : ReadQueue
-        Receives that, and everything that is read.
-    """
+    """A device that is being read. `first` is the part of its stream that was read before."""
 
     def __init__(self, port: OpenPort, source: SampleSource, first: bytes, read_queue: ReadQueue) -> None:
         self.port = port
@@ -199,14 +182,8 @@ _UNWATCHED_S = 1.0
 class Reconnection:
     """A search for a lost device, in a thread of its own.
 
-    Parameters
-    ----------
-    open_port : callable
-        Opens the port of the device, wherever it is now. Raises DriverError while it is not there.
-    source : SampleSource
-        Of the device; nobody else uses it meanwhile.
-    read_queue : ReadQueue
-        Receives a read of no bytes, which marks the broken link, and then those of the new connection.
+    `open_port` opens the port of the device, wherever it is now. A read of no bytes in the queue marks the
+    broken link; those of the new connection follow.
     """
 
     def __init__(

@@ -130,19 +130,8 @@ class StreamFault:
 class LiveStream:
     """A device that sends; make it with `open_stream`, use it with `with` or `close`.
 
-    When the device is lost, or sends nothing intelligible for a while, it is looked for until it is back.
-    `take_events` reports it, and `fault` tells whether a run should still wait.
-
-    Parameters
-    ----------
-    connection : Connection
-        Puts its reads into `read_queue`.
-    source : SampleSource
-        Started.
-    read_queue : ReadQueue
-    gauges : Gauges
-    reopen : callable
-        Opens the port of the same device again. Raises DriverError while it is not there.
+    When the device is lost, or sends nothing intelligible for a while, it is looked for until it is back:
+    `reopen` opens its port. `take_events` reports it, and `fault` tells whether a run should still wait.
     """
 
     def __init__(
