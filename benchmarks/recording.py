@@ -154,7 +154,7 @@ def until(engine: EngineClient, kind: type, patience_s: float = 600.0):
 def cost(engine: EngineClient, stand: SimulatedStand) -> Cost:
     """Processor time of each process until now; writer and live identification are the engine's children."""
     writer, live = (
-        sum(map(processor_s, named_children(engine, name))) for name in ("runs.writer", "live.process")
+        sum(map(processor_s, named_children(engine, name))) for name in ("runs.writer", "live_client")
     )
     return Cost(processor_s(engine.process_id), writer, live, processor_s(stand.process_id))
 

@@ -1,6 +1,14 @@
-"""The engine's side of the live identification. If that fails, a run goes on without it."""
+"""The live identification: the engine's client, and its process `python -m app.acquisition.live_client`.
+
+It computes apart from the engine, so that neither compiled code nor a held interpreter lock can delay a read
+of the port. What computes is imported when the pipes are open and the priority is lowered, since that takes
+seconds. When stdin ends, the process ends at once: it holds nothing worth keeping. If it fails, a run goes on
+without it.
+"""
 
 import contextlib
+import importlib
+import os
 import subprocess
 from collections.abc import Callable
 from typing import Self
@@ -13,8 +21,19 @@ from app.acquisition.messages import (
     LiveCommand,
     LiveResult,
     decode_live_answer,
+    decode_live_command,
 )
-from app.child_process import ChildProcess, encode_line, spawn
+from app.child_process import (
+    ChildProcess,
+    CommandReader,
+    EventSender,
+    LineDecoder,
+    encode_line,
+    ignore_session_signals,
+    reserve_stdout,
+    spawn,
+)
+from app.log import start_log
 from app.runs.metadata import RunMetadata
 from drivers.clock import TimeBase
 from messages.message import message
@@ -43,7 +62,7 @@ class LiveClient:
     @classmethod
     def start(cls) -> Self:
         """Start the process, which is ready some seconds later. Raises OSError."""
-        return cls(spawn("app.acquisition.live_process", is_background=True, discard_stderr=True))
+        return cls(spawn("app.acquisition.live_client", is_background=True, discard_stderr=True))
 
     @property
     def has_ended(self) -> bool:
@@ -129,3 +148,26 @@ class LiveIdentifier:
         if self._client is not None:
             self._client.stop()
         self._client, self._first_row = None, None
+
+
+_NICE = 5
+"""The engine, at 0, gets about three times the processor time of this process where both want it (Linux)."""
+
+
+def main() -> None:
+    """Run until stdin ends."""
+    start_log("live")
+    ignore_session_signals()
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    events: EventSender[LiveAnswer] = EventSender(reserve_stdout(), is_transient=lambda _: True)
+    commands: CommandReader[LiveCommand] = CommandReader(
+        0, LineDecoder(decode_live_command), on_closed=lambda: os._exit(0)
+    )
+    follower = importlib.import_module("app.acquisition.live_follower")
+    follower.warm_up()
+    follower.serve(commands, events)
+
+
+if __name__ == "__main__":
+    main()

@@ -8,9 +8,8 @@ from enum import Enum, auto
 import msgspec
 
 from app.acquisition.errors import JournalError
-from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.journal import CheckpointWriter, Journal, JournalTap
 from app.acquisition.journal.records import Known, Mark, end_metadata
-from app.acquisition.journal.tap import CheckpointWriter, JournalTap
 from app.acquisition.messages import (
     EndReason,
     Event,

@@ -15,9 +15,8 @@ import numpy as np
 
 from app.acquisition.disk_space import ROW_BYTES
 from app.acquisition.errors import JournalError, JournalFullError
-from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.journal import Journal, JournalTap
 from app.acquisition.journal.records import Ended, Named, Opened
-from app.acquisition.journal.tap import JournalTap
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.live_stream import DecodedRead
 from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun, count_flags

@@ -16,7 +16,7 @@ from tests.drills.processes import descendants_of, is_alive
 ROLES = {
     "engine": "app.acquisition.engine",
     "writer": "app.runs.writer",
-    "live": "app.acquisition.live_process",
+    "live": "app.acquisition.live_client",
     "stand": "app.simulated_stand",
 }
 """Modules that processes run as, by what they are called here."""

@@ -26,7 +26,7 @@ def live_process_of(engine_pid, patience_s=20.0):
                 command = (folder / "cmdline").read_bytes()
             except OSError:
                 continue
-            if parent == engine_pid and b"app.acquisition.live_process" in command:
+            if parent == engine_pid and b"app.acquisition.live_client" in command:
                 return int(folder.name)
         time.sleep(0.05)
     raise AssertionError("no live identification runs")

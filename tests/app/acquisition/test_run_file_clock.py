@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.acquisition import run_file
-from app.acquisition.journal.tap import JournalTap
+from app.acquisition.journal.journal import JournalTap
 from app.acquisition.run_file import RunFile
 from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalSpan
