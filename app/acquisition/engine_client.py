@@ -148,18 +148,6 @@ class EngineClient:
         )
 
 
-def record_run(
-    port: PortSettings,
-    run: RunSettings,
-    stand_file: str,
-    gauges_file: str,
-    on_event: Callable[[Event], None] | None = None,
-) -> RunEnded:
-    """Record one run and wait for its end, like `record_runs`."""
-    with contextlib.closing(record_runs(port, run, stand_file, gauges_file, on_event)) as runs:
-        return next(runs)
-
-
 def record_runs(
     port: PortSettings,
     run: RunSettings,

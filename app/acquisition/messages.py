@@ -12,11 +12,11 @@ from drivers.clock import TimeBase
 from messages.message import EMPTY, Message
 
 _GUESS = 0.2
-"""Relative standard uncertainty above which a number tells an operator nothing."""
+"""Relative standard uncertainty above which a number is of no use to an operator."""
 
 
 class PullbackState(StrEnum):
-    """Where a pullback test stands; each is a sentence to the operator in `app.presenters`."""
+    """State of a pullback test; `guidance` has an instruction to the operator for each."""
 
     CONNECTING = "connecting"
     IDLE = "idle"
@@ -24,13 +24,13 @@ class PullbackState(StrEnum):
     RECENTRE = "recentre"
     """The plate stands where its next slip would leave the range of gauge 2."""
     ZERO = "zero"
-    """The rest before the pull is being measured, whose mean is the zero."""
+    """The rest before the pull is being measured; its mean is the zero."""
     PULLING = "pulling"
     """The zero is known: the table is to be pulled back, or is on its way."""
     HELD = "held"
-    """Pulled back as far as wanted: it is being watched for drift."""
+    """Pulled back as far as wanted: it is checked for drift."""
     ARMED = "armed"
-    """Held steadily: release is awaited. One from another state is taken too, and remarked upon."""
+    """Held steadily: the release is awaited. One from another state is recorded too, with a remark."""
     RELEASED = "released"
     SLIPPING = "slipping"
     NO_SLIP = "no-slip"
@@ -64,7 +64,7 @@ class EndReason(StrEnum):
 
 
 class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which wire to read."""
+    """The port to read, and the device at it."""
 
     url: str
     protocol: str
@@ -108,11 +108,11 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
     stand_file: str
     gauges_file: str
     low_latency: bool = False
-    """Somebody looks at the ring all the time: samples come sooner, at more cost."""
+    """Samples reach the ring sooner, at more cost, because somebody watches them."""
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
-    """Record `count` runs, one after another. While one is recorded, this changes nothing but is remarked on.
+    """Record `count` runs, one after another; while one is recorded, this only causes a remark.
 
     Only a run that came to its end by itself (rest, enough, duration) is followed by the next.
     """
@@ -148,10 +148,7 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
 
 
 class StandPosition(msgspec.Struct, frozen=True):
-    """What the sentence of a state is made of: where table and plate stand, and where they should (m).
-
-    As the gauges read; None where not known, or nothing is wanted.
-    """
+    """Where table and plate stand, and where they should (m, as the gauges read); None where not known."""
 
     pullback_m: float | None = None
     """Wanted, from the zero, without sign."""
@@ -161,9 +158,9 @@ class StandPosition(msgspec.Struct, frozen=True):
     held_m: float | None = None
     """Where the table was held last."""
     side: int = 0
-    """To which side the table is pulled: 1 or -1 by the sign of gauge 1, 0 as long as nobody knows."""
+    """Side to which the table is pulled: 1 or -1 by the sign of gauge 1, 0 while unknown."""
     plate_m: float | None = None
-    """Where gauge 2 saw the plate before the pull."""
+    """Reading of gauge 2 before the pull."""
     plate_wanted_m: float | None = None
     """Where the plate must be put, while it stands where its next slip does not fit."""
 
@@ -174,12 +171,12 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
     state: PullbackState
     since_s: float
     note: Message = EMPTY
-    """What the operator must know, where something did not go as it should."""
+    """What did not go as it should."""
     position: StandPosition = StandPosition()
 
 
 class Reconnecting(msgspec.Struct, frozen=True, tag=True):
-    """The device is gone or says nothing intelligible, and is looked for; said again with new reasons."""
+    """The device is lost or sends nothing intelligible, and is looked for; sent again for each new reason."""
 
     message: Message
 
@@ -211,14 +208,14 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     release_s: float | None = None
     """On the run's time axis."""
     message: Message = EMPTY
-    """What went wrong in a sentence, where something did."""
+    """What went wrong, if anything did."""
     time_base: TimeBase = TimeBase()
     remaining: int = 0
-    """Runs that follow without being asked for."""
+    """Runs that follow by themselves."""
 
 
 class Health(msgspec.Struct, frozen=True, tag=True):
-    """Twice a second: how the stream does."""
+    """State of the stream, sent twice a second."""
 
     rate_hz: float
     samples: int

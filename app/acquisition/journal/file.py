@@ -150,21 +150,13 @@ class JournalFile:
         raise error
 
     def _move_to(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock = recording_lock(path).acquire()
-        try:
-            file = path.open("xb", buffering=0)
-        except OSError:
-            lock.release()
-            raise
-        try:
-            copied = self._copy_to(file)
-        except OSError:
-            file.close()
-            path.unlink()
-            lock.release()
-            raise
-        self._leave_old(copied)
+        with _new_file(path) as (file, lock):
+            is_copied = self._copy_to(file)
+        with contextlib.suppress(OSError):
+            self._file.close()
+        if is_copied:  # its run file may need the space
+            self.remove()
+        self.release()
         self._syncer.stop(wait=False)  # a sync of the old file that fails now does not concern the new one
         self._syncer = Syncer()
         self.path, self._file, self._lock = path, file, lock
@@ -200,14 +192,6 @@ class JournalFile:
         except OSError:
             raise _UnreadableError from None
 
-    def _leave_old(self, copied: bool) -> None:
-        """Remove the old file if everything was copied: its run file may need the space."""
-        with contextlib.suppress(OSError):
-            self._file.close()
-        if copied:
-            self.remove()
-        self.release()
-
 
 class _UnreadableError(Exception):
     """What was written can no longer be read."""
@@ -220,22 +204,25 @@ def create_journal_file(
 
     Raises OSError (FileExistsError: nothing is overwritten), or LockHeldError if another program writes it.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    lock, first = recording_lock(path).acquire(), MAGIC + first_record
-    try:
-        file = path.open("xb", buffering=0)
-    except OSError:
-        lock.release()
-        raise
-    try:
+    first = MAGIC + first_record
+    with _new_file(path) as (file, lock):
         _write_all(file, first)
         sync_folder(path.parent)
-    except OSError:
-        file.close()
-        path.unlink()
-        lock.release()
-        raise
     return JournalFile(path, file, first, lock, fallback_folders)
+
+
+@contextlib.contextmanager
+def _new_file(path: Path) -> Iterator[tuple[IO[bytes], FileLock]]:
+    """Create a file, its lock and its folder; the file and the lock go if the body fails."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock = recording_lock(path).acquire()
+    with contextlib.ExitStack() as undo:
+        undo.callback(lock.release)
+        file = path.open("xb", buffering=0)
+        undo.callback(path.unlink)
+        undo.callback(file.close)
+        yield file, lock
+        undo.pop_all()
 
 
 def _write_all(file: IO[bytes], data: bytes) -> None:

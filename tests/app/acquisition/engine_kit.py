@@ -1,16 +1,18 @@
 """What the tests of the engine share: a stand, a connection, and patience."""
 
+import contextlib
 import os
 import time
 from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.engine_client import EngineClient
+from app.acquisition.engine_client import EngineClient, record_runs
 from app.acquisition.messages import (
     Connected,
     Failed,
     PortSettings,
+    RunEnded,
     RunSettings,
 )
 from app.runs.reader import Run, load_counts, open_run
@@ -76,6 +78,14 @@ def lost_within(truth: Truth, first: int, end: int) -> int:
     """Samples that the truth calls damaged or lost, between two device samples."""
     lost = {d.first_index + k for d in truth.wire.damage for k in range(d.samples)}
     return sum(first <= index < end for index in lost)
+
+
+def record_run(
+    port: PortSettings, run: RunSettings, stand_file: str, gauges_file: str, on_event=None
+) -> RunEnded:
+    """Record one run and wait for its end."""
+    with contextlib.closing(record_runs(port, run, stand_file, gauges_file, on_event)) as runs:
+        return next(runs)
 
 
 def gone(process_id: int, patience_s: float = 20.0) -> bool:

@@ -13,13 +13,13 @@ from engine_kit import (
     index_of_first,
     lost_within,
     port_of,
+    record_run,
     run_in,
     stand,
     until,
 )
 
 from app.acquisition.disk_space import ROW_BYTES
-from app.acquisition.engine_client import record_run
 from app.acquisition.errors import EngineFailedError
 from app.acquisition.messages import (
     Arm,

@@ -151,12 +151,12 @@ def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, share
 
 RECORDER = """
 import sys
-from app.acquisition.engine_client import record_run
+from app.acquisition.engine_client import record_runs
 from app.acquisition.messages import PortSettings, RunSettings
 url, folder, stand, gauges = sys.argv[1:]
 run = RunSettings(directory=folder, series="1FFM0", duration_s=60.0)
 port = PortSettings(url=url, protocol="slipstand-binary")
-ended = record_run(port, run, stand, gauges, lambda event: print(type(event).__name__, flush=True))
+ended = next(record_runs(port, run, stand, gauges, lambda event: print(type(event).__name__, flush=True)))
 print(ended.ended, ended.samples, flush=True)
 """
 

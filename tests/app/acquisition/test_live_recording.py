@@ -7,9 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from engine_kit import FILES, connect, gone, port_of, run_in, stand, until
+from engine_kit import FILES, connect, gone, port_of, record_run, run_in, stand, until
 
-from app.acquisition.engine_client import record_run
 from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
 
