@@ -196,7 +196,7 @@ class ChildProcess(Generic[Command, Event]):
         return True
 
     def _write(self) -> None:
-        """Write queued commands until told to end, or until nobody reads them."""
+        """Write queued commands until the end is queued, or the child has ended."""
         with contextlib.suppress(OSError), self._stdin:
             while (data := self._commands.get()) is not None:
                 self._stdin.write(data)
@@ -310,7 +310,7 @@ def reserve_stdout() -> int:
 
 
 def ignore_session_signals(*more: str) -> None:
-    """Ignore the signals that reach all processes of a terminal, and those named besides."""
+    """Ignore the signals that reach all processes of a terminal, and those in `more`."""
     for name in (*_SESSION_SIGNALS, *more):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

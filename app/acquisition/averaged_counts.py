@@ -65,7 +65,7 @@ class SampleStream(Protocol):
 
 
 class CountAverager:
-    """Reads a stream in a thread of its own, so that none of it is lost meanwhile; use it with `with`.
+    """Averages counts of a stream, which a thread reads so that none are lost; use it with `with`.
 
     The stream is open and is not closed here. Channel 0 is gauge 1, channel 1 is gauge 2.
     """

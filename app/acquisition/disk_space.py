@@ -15,12 +15,14 @@ ROW_BYTES = 41
 _RECORD_BYTES = 24.0
 """Header of a journal record; a read is one record."""
 _READS_PER_S = 250.0
+"""Upper bound: one read each 4 ms."""
 _LONGEST_S = 20.0
 """Longest time from release to end of a run that lasts until rest."""
 _CLOSING_BYTES = 4 * MARGIN_BYTES
 _CLOSING_S = 3.0
 """A run is ended while there is space for so many more seconds, and to close it regularly."""
 _WARN_S = 60.0
+"""The operator is warned while there is space for so many more seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ class DiskDemand:
         return _CLOSING_BYTES + length_s * self.bytes_per_s
 
     def of_waiting(self, run: RunSettings) -> float:
-        """Bytes that the journal takes besides if the release comes as late as it may."""
+        """Bytes of the journal until the latest possible release."""
         return self.journal_bytes_per_s * run.trigger_timeout_s if run.trigger == "pullback" else 0.0
 
 

@@ -77,12 +77,14 @@ _WAIT_S = 0.05
 _READS_PER_STEP = 64
 """Most reads taken before they are followed, should decoding fall behind: the history must reach back."""
 _HISTORY_S = 10.0
+"""Time of samples that are kept before a run."""
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is confirmed only after a while."""
 _CONNECT_S = 60.0
+"""The owner must send the first command within this time."""
 _HEALTH_PERIOD_S = 0.5
 _STEP_PERIOD_S = 0.1
-"""Between two steps that nobody waits for: each costs about the same, however much came meanwhile."""
+"""Between two steps that nobody waits for: a step costs about the same for few samples as for many."""
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
 _PAUSE_S = 0.04
@@ -290,7 +292,7 @@ class Engine:
             self._recording.end(reason, message, keep_rest=not self._sequence.is_repeat)
 
     def _continue_alone(self) -> None:
-        """The owner is gone: only a run that comes to its end by itself goes on."""
+        """The owner is gone: continue only a run that comes to its end by itself."""
         self._is_quitting = True
         self._sequence.stop()
         if self._recording is not None and not self._recording.is_unattended:
@@ -380,7 +382,7 @@ class Engine:
 
 
 def serve(commands: CommandReader[Command], events: EventSender[Event], folder: Path) -> None:
-    """Connect as the first command says, and work until the end; the ring is made in `folder`."""
+    """Execute the first command, `Connect`, and run the engine; the ring is made in `folder`."""
     connect = commands.take(timeout_s=_CONNECT_S)
     if not isinstance(connect, Connect):
         raise AcquisitionError("an engine is told what to connect to first: send Connect")

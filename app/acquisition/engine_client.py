@@ -193,7 +193,7 @@ def record_runs(
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Catch SIGINT and SIGTERM meanwhile, where this thread may: only the main one."""
+    """Catch SIGINT and SIGTERM, where this thread may: only the main one."""
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield interrupted

@@ -97,7 +97,7 @@ class LiveClient:
 
 
 class LiveIdentifier:
-    """Has one run after another identified while it goes on.
+    """Has runs identified while they are recorded.
 
     `time_base` gives the time base of the rows from a given one on; `start` starts the process.
     """

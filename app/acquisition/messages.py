@@ -182,7 +182,7 @@ class Reconnecting(msgspec.Struct, frozen=True, tag=True):
 
 
 class Reconnected(msgspec.Struct, frozen=True, tag=True):
-    """It is back. A run goes on, with rows for what is missing."""
+    """The device is back. A run continues, with rows for missing samples."""
 
     gap_s: float
     message: Message

@@ -41,7 +41,7 @@ _FOLLOW_S = 0.07
 
 
 class Latency(Enum):
-    """How soon what comes must be followed."""
+    """How soon new samples must be processed."""
 
     BATCHED = auto()
     """Nobody at the stand waits for it."""

@@ -34,7 +34,9 @@ _WORDS = 5
 _PAGE_BYTES = 4096
 _ROW_BYTES = 2 * 8 + 1
 _LAPPED_TRIES = 3
+"""A reader that the writer has overtaken so often returns what is left."""
 _HELD_S = 60.0
+"""Time that the ring should hold, within `_HELD_ROWS`."""
 _HELD_ROWS = (1 << 16, 1 << 21)
 
 

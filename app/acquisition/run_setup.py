@@ -29,7 +29,7 @@ PRETRIGGER_MAX_S = 60.0
 
 
 def complete_port_settings(port: PortSettings, device: Device) -> PortSettings:
-    """Port settings with what the calibration file says of the device, where both are of one protocol."""
+    """Port settings, completed by the calibration file where its device has the same protocol."""
     if device.protocol != port.protocol:
         return port
     return msgspec.structs.replace(
@@ -129,7 +129,7 @@ class RunSequence:
     def next_after(self, ended: RunEnded) -> tuple[RunEnded, RunSettings | None]:
         """Add to a run's end how many runs follow, and return the next one; None if there is none.
 
-        Only a run that came to its end by itself is followed: any other needs somebody to look.
+        Only a run that came to its end by itself is followed; any other needs attention.
         """
         if not ended.ended.is_normal or self._next is None or self._remaining == 0:
             self._remaining = self._done = 0

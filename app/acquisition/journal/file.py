@@ -35,7 +35,7 @@ class Syncer:
         return self._is_idle.is_set()
 
     def begin(self, descriptor: int) -> None:
-        """Sync what was written to a file until now; it may be closed meanwhile. Ask only when idle."""
+        """Begin to sync a file, which may be closed after this call. Only when idle."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="journal sync", daemon=True)
             self._thread.start()

@@ -128,7 +128,7 @@ class Journal:
             raise _error(self.path, self._failure)
 
     def _write(self) -> None:
-        """Thread: append what comes, sync each tenth of a second, until told to end."""
+        """Thread: append records and sync each tenth of a second, until the end is queued."""
         try:
             while self._write_for(self._SYNC_S):
                 pass
@@ -144,13 +144,13 @@ class Journal:
                 self._next()
 
     def _next(self, timeout_s: float | None = None) -> bytes | None:
-        """The next record, None when told to end. Raises queue.Empty."""
+        """The next record, None for the end. Raises queue.Empty."""
         record = self._records.get(timeout=timeout_s)
         self._is_ending = record is None
         return record
 
     def _write_for(self, duration_s: float) -> bool:
-        """Write for so long and sync; False when told to end."""
+        """Write for `duration_s` and sync; False at the end."""
         record = self._next()
         deadline = time.monotonic() + duration_s
         while record is not None:

@@ -57,7 +57,7 @@ class RecoveryState(StrEnum):
 
 
 class Recovery(msgspec.Struct, frozen=True):
-    """What became of one journal; it is gone unless `state` says being-recorded or failed."""
+    """Result for one journal; it is removed unless `state` is being-recorded or failed."""
 
     journal: str
     state: RecoveryState

@@ -36,7 +36,7 @@ class ReplayedReads:
 class Replay:
     """Decodes a journal by the code that decoded its bytes live. Iterate over it once.
 
-    A journal may begin amid a stream, so its samples are counted anew; the first checkpoint gives the offset.
+    A journal may begin within a stream: its samples count from 0, and the first checkpoint gives the offset.
     `differs` is set when a later one does not agree. A checkpoint stands behind the reads that it counts, and
     maybe behind some that came while those were decoded.
     """

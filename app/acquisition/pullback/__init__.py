@@ -1,1 +1,1 @@
-"""The pullback test as a state machine: what is waited for, seen, and said to the operator."""
+"""The pullback test: its plan, state machine, triggers and messages to the operator."""

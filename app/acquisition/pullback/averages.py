@@ -15,7 +15,9 @@ BIN_S = 0.002
 _KEPT_S = 1.6
 """A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
 _PARTS = 4
+"""A stretch is compared in quarters: their means differ if it moves."""
 _START_GRID = 200
+"""Trial beginnings of the parabola over the stretch."""
 _NORMAL_MEDIAN = 0.6744897501960817
 """Median of |x| for a standard normal x."""
 _RESOLUTION_M = 0.5e-6

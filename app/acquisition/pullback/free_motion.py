@@ -29,21 +29,28 @@ SILENT_PLATE_NOTE = message(
 )
 
 _RELEASE_NOISES = 6.0
+"""Standard deviations of the noise that a release must exceed: fewer would be noticed by chance."""
 _CREEP = 0.01
 """Fraction of the pullback that a release must exceed, and that a hold may move: less is creep."""
 _RELEASE_FIT_S = 0.04
+"""Readings before the notice to which the parabola of the release is fitted."""
 _PARABOLA_S = 0.01
 """Time after a release was noticed during which the table moves by the square of time."""
 _CONFIRM_S = 1.5
+"""A table that has not swung to the other side by then was let down."""
 _STUCK_S = 0.6
 """Longer than a period: within one, the plates stick and slip again."""
 _REST_S = 1.0
+"""Window over which rest is judged."""
 _OVERSHOOT = 0.05
 """Fraction of the pullback by which a released table swings to the other side, at least."""
 _REST_NOISES = 0.5
+"""At rest, the motion is less than this part of the noise of a sample, plus `_REST_M`."""
 _REST_M = 1e-6
 _STUCK_M = 5e-6
+"""Motion of the plate against the table that still counts as sticking."""
 _SLIP_NOISES = 6.0
+"""A slip must exceed so many standard deviations, and `_SLIP_M`, in `_BINS_TO_SLIP` averages in a row."""
 _SLIP_M = 20e-6
 _BINS_TO_SLIP = 2
 _UNDECIDED = (PullbackState.RELEASED, PullbackState.NO_SLIP)

@@ -75,6 +75,7 @@ def allowed_plate_range(range_m: float, expected: Excursion) -> AllowedPlateRang
 _USUAL_PULLBACK_M = 0.01
 _TOLERANCE = 0.02
 _TOLERANCE_MIN_M = 0.1e-3
+"""Of the pullback, where the plan gives none: 2 %, and 0.1 mm at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,7 @@ class PullbackPlan:
     pullback_m: float | None = None
     """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
     duration_s: float | None = None
-    """Time after release; None goes on until rest, or `enough_s`."""
+    """Time after release; None until rest, or `enough_s`."""
     trigger_timeout_s: float = math.inf
     """How long to wait for a release (s)."""
     enough_s: float = 20.0
@@ -134,14 +135,14 @@ class PullbackPlan:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """The test came to a new state at sample `index`, or has something to say in the one it is in."""
+    """The test came to a new state at sample `index`, or has a note on the present one."""
 
     state: PullbackState
     index: int
     note: Message = EMPTY
     """What the operator must know, where something did not go as it should."""
     is_stored: bool = False
-    """The note says something about the run itself, and belongs into its file."""
+    """The note is about the run itself, and is stored in its file."""
     end_reason: EndReason | None = None
 
 

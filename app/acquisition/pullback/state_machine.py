@@ -25,12 +25,16 @@ from messages.message import EMPTY, Message
 _TICK_S = 0.02
 """Interval of slow checks; the release is looked for at each bin."""
 _ZERO_S = 0.3
+"""Length of a rest level: a longer one has less noise, but needs a calmer stand."""
 _HOLD_S = 0.2
+"""Time in which the table must stand still to count as held."""
 _REFERENCE_S = 0.06
+"""Length of the reference before a release: the mean has less noise the longer it is, but more creep."""
 _STEADY_S = 0.3
 """The table must be held for so long, without drift, to be armed."""
 _DRIFT_S = 1.0
 _DRIFT_M_PER_S = 50e-6
+"""Fastest drift at which a zero is taken and a hold is armed."""
 _DRIFT_LEEWAY = 2.0
 """An armed hold may drift so much faster than one that is to be armed."""
 
@@ -38,11 +42,14 @@ _DRIFT_LEEWAY = 2.0
 _CREEP = 0.01
 """Moving less than this still counts as standing still."""
 _PULL_NOTICED = 0.02
+"""Shortest motion that is noticed as a pull, unless the noise needs more."""
 _PULLED = 0.5
+"""Above this the table counts as pulled back."""
 _BACK = 0.5
 """Fraction of what is noticed as a pull: within it, the table is where it was before."""
 
 _PULL_NOISES = 8.0
+"""Standard deviations of the noise that a pull must exceed to be noticed: rare in a wait of minutes."""
 _INSET = 0.02
 """Fraction of its allowed range by which the plate must be inside, once it had to be put back."""
 _LEEWAY = 1.25
@@ -50,6 +57,7 @@ _LEEWAY = 1.25
 _HINT_AFTER_S = 2.0
 """An operator who knows what to do is faster; a hint before that would flicker."""
 _WARNING_S = 60.0
+"""Time before the timeout at which the operator is warned; half of a short timeout."""
 _SILENT_S = 0.5
 """Longer than any gap between two samples, at the slowest rate of any driver."""
 
@@ -308,7 +316,7 @@ class PullbackStateMachine:
     # --- in any state ---
 
     def _keep_time(self, end_index: int) -> None:
-        """End the test at the sample at which a time is over; before that, say what it waits for."""
+        """End the test at the sample at which a time is over; before that, show what it waits for."""
         if self.measurement.release_confirmed and self.measurement.release_index is not None:
             wanted_s, reason = self._plan.duration_s, EndReason.DURATION
             if wanted_s is None:

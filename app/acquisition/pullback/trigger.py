@@ -11,6 +11,7 @@ from app.runs.blocks import CalibratedBlock
 from messages.message import EMPTY
 
 _CONTEXT_S = 1.0
+"""Time before arming in which a rest counts for the zero."""
 _SEEN_WITHOUT_TRIGGER = (
     PullbackState.RELEASED,
     PullbackState.SLIPPING,

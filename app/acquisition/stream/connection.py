@@ -105,7 +105,7 @@ def create_source(
 class PortOpener:
     """Opens the port of a device, or the ports of two; from the second time on, those of the same devices.
 
-    Raises SettingsError where both gauges are said to be at one port.
+    Raises SettingsError if both gauges have the same port.
     """
 
     def __init__(self, settings: PortSettings, source: SampleSource) -> None:
@@ -217,7 +217,7 @@ class Reconnection:
         return connection
 
     def stop(self) -> None:
-        """Give the search up, and a connection that nobody took."""
+        """End the search, and close a connection that was not taken."""
         self._stopping.set()
         self._thread.join()
         if self._connection is not None:

@@ -75,7 +75,7 @@ def merge_reads(reads: Sequence[DecodedRead]) -> DecodedRead:
 
 
 class ReadHistory:
-    """Reads of the last `span` samples, from which a run takes what came before its release."""
+    """Reads of the last `span` samples: those before its release belong to a run."""
 
     def __init__(self, span: int) -> None:
         self.span = span

@@ -20,6 +20,7 @@ _WRONG_ERRORS = 5.0
 
 _RECENT_S = 1.0
 _WINDOW_S = 4.0
+"""Window of the latest rate: a longer one is more certain, and reports a wrong rate later."""
 _HOLE_S = 1.0
 _HOLE_SAMPLES = 5.0
 """While nothing was read for so long, the host or the device stood still: the window around it is dropped."""
@@ -135,6 +136,7 @@ STALLED_S = 3.0
 
 _STALLED_SAMPLES = 5.0
 _KEPT_BYTES = 4096
+"""Part of unintelligible data that is kept for the message."""
 _UNWATCHED_S = 1.0
 _UNREAD_S = 2.0
 """A thread that has not checked, or not read, for so long got no processor time; one read of a polled device
