@@ -1,6 +1,7 @@
 """What leaves a driver: blocks of samples with their flags, and counts of what was lost."""
 
-from dataclasses import astuple, dataclass, field
+import operator
+from dataclasses import dataclass, field, fields
 from enum import IntFlag
 
 from drivers.arrays import Counts, Floats, UInt8s
@@ -77,10 +78,13 @@ class Losses:
     """How often the device reported dropped samples while its sequence shows no gap."""
 
     def __add__(self, other: "Losses") -> "Losses":
-        return Losses(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Losses(*map(operator.add, _counts(self), _counts(other)))
 
     def __sub__(self, other: "Losses") -> "Losses":
-        return Losses(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Losses(*map(operator.sub, _counts(self), _counts(other)))
+
+
+_counts = operator.attrgetter(*(one.name for one in fields(Losses)))  # `astuple` takes ten times as long
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.acquisition.errors import AcquisitionError
+from drivers.arrays import Floats
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
@@ -42,7 +42,7 @@ class AveragedCounts:
         return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
 
-def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
+def compute_average(counts: Floats) -> AveragedCounts:
     """Average of the samples (n,) of a window, n >= 2."""
     half = len(counts) // 2
     creep = float(counts[half:].mean() - counts[:half].mean())
@@ -75,7 +75,7 @@ class CountAverager:
         self._channel = channel
         self._flag = int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])
         self._changed = threading.Condition()
-        self._taken: list[NDArray[np.float64]] | None = None
+        self._taken: list[Floats] | None = None
         self._invalid = 0
         self._fault: Exception | None = None
         self._leaving = False

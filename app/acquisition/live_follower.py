@@ -14,7 +14,7 @@ from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCom
 from app.acquisition.ring import RingReader, RingRows, open_ring
 from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
-from app.runs.blocks import Floats
+from drivers.arrays import Floats
 from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 

@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.acquisition.errors import RingError
-from app.runs.blocks import CalibratedBlock, Counts, Floats, calibrate
+from app.runs.blocks import CalibratedBlock, calibrate
 from app.runs.lock import FileLock, is_held
 from config.schema import Gauges
+from drivers.arrays import Counts, Floats
 from drivers.samples import SampleBlock
 
 _MAGIC = np.uint64(0x32474E495250494C)  # "LIPRING2"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Gauges
+from drivers.arrays import Counts, Floats
 from drivers.samples import ABSENT_BY_GAUGE, INCOMPLETE, Losses, SampleBlock, SampleStatus
 
 Columns = list[NDArray[Any]]
@@ -81,10 +82,6 @@ def count_flags(status: NDArray[np.uint8]) -> Losses:
         damaged=int(np.count_nonzero(status & SampleStatus.DAMAGED)),
         overloaded=int(np.count_nonzero(status & overload)),
     )
-
-
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int32] | NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,13 +9,13 @@ import numpy as np
 from app.acquisition.messages import EndReason, PullbackState
 from app.acquisition.pullback.averages import (
     BinAverages,
-    Floats,
     RecentAverages,
     StationaryLevel,
     fit_parabola_start,
     noise_m,
 )
 from app.acquisition.pullback.plan import Excursion, PullbackMeasurement, PullbackPlan, Transition
+from drivers.arrays import Floats
 from messages.message import EMPTY, Message, message
 
 LET_DOWN_NOTE = message(

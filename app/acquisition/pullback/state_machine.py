@@ -11,7 +11,6 @@ from app.acquisition.pullback import operator_messages
 from app.acquisition.pullback.averages import (
     BinAverager,
     BinAverages,
-    Floats,
     RecentAverages,
     StationaryLevel,
     ZeroEstimator,
@@ -20,6 +19,7 @@ from app.acquisition.pullback.averages import (
 )
 from app.acquisition.pullback.free_motion import FreeMotion, Hold, HoldReference
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
+from drivers.arrays import Floats
 from messages.message import EMPTY, Message
 
 _TICK_S = 0.02
