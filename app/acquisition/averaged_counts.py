@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from drivers.arrays import Floats
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
-    from app.acquisition.stream.live_stream import DecodedRead
+    from app.acquisition.stream.live_stream import DecodedRead, LiveStream
 
 TIMEOUT_S = 5.0
 _STALE_S = 0.1
@@ -53,24 +53,13 @@ class NoAverageError(AcquisitionError):
     """A window without an average."""
 
 
-class SampleStream(Protocol):
-    """The part of a `LiveStream` that is needed here."""
-
-    @property
-    def rate_hz(self) -> float:
-        """Nominal samples a second."""
-
-    def next_read(self, timeout_s: float) -> "DecodedRead | None":
-        """What was read since the last call."""
-
-
 class CountAverager:
     """Averages counts of a stream, which a thread reads so that none are lost; use it with `with`.
 
     The stream is open and is not closed here. Channel 0 is gauge 1, channel 1 is gauge 2.
     """
 
-    def __init__(self, stream: SampleStream, channel: int) -> None:
+    def __init__(self, stream: "LiveStream", channel: int) -> None:
         self._stream = stream
         self._channel = channel
         self._flag = int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])

@@ -1,8 +1,6 @@
-"""Checks of a gauge before a test: samples at rest, a known displacement, and the entry that is kept."""
+"""Checks of a gauge before a test: a known displacement, and the entry that is kept."""
 
 import datetime
-import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,11 +13,8 @@ from analysis.calibration.known_displacement import (
     ReferenceDisplacement,
     check_displacement,
 )
-from analysis.gauge_health import GaugeSamples
-from app.acquisition.averaged_counts import OVERLOAD_FLAGS, TIMEOUT_S, AveragedCounts, SampleStream
-from app.acquisition.errors import AcquisitionError
-from app.runs.blocks import CalibratedBlock
-from config.schema import Gauge, GaugeCheck, Gauges
+from app.acquisition.averaged_counts import AveragedCounts
+from config.schema import Gauge, GaugeCheck
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,45 +97,3 @@ def _displacement_m(counts: float, gauge: Gauge) -> float:
 def _step_m(counts: float, step: float, gauge: Gauge) -> float:
     """Displacement (m) of a step of counts from the present reading."""
     return _displacement_m(counts + step, gauge) - _displacement_m(counts, gauge)
-
-
-class NoSamplesError(AcquisitionError):
-    """Too few samples came in time."""
-
-
-def collect_samples(
-    stream: SampleStream, seconds: float, gauges: Gauges
-) -> tuple[GaugeSamples, GaugeSamples]:
-    """Collect samples of both gauges from now on; whatever else the stream brings is dropped.
-
-    Raises NoSamplesError if too few come, or AcquisitionError or DriverError if the stream has ended.
-    """
-    wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
-    ends_s = time.monotonic() + seconds + TIMEOUT_S
-    while sum(map(len, taken)) < wanted:
-        if time.monotonic() > ends_s:
-            raise NoSamplesError(
-                "only {samples} of {wanted} samples came in {seconds:g} s. Check cable, power and rate"
-                " of the device",
-                samples=sum(map(len, taken)),
-                wanted=wanted,
-                seconds=seconds + TIMEOUT_S,
-            )
-        chunk = stream.next_read(0.1)
-        taken += chunk.rows if chunk is not None else ()
-    return gauge_samples(taken, stream.rate_hz, gauges)
-
-
-def gauge_samples(
-    rows: Sequence[CalibratedBlock], rate_hz: float, gauges: Gauges
-) -> tuple[GaugeSamples, GaugeSamples]:
-    """Samples of both gauges, each as it is mounted, from consecutive blocks."""
-    readings = np.concatenate([block.readings for block in rows])
-    status = np.concatenate([block.status for block in rows])
-    table, relative = (
-        GaugeSamples(readings[:, channel], (status & flag) != 0, rate_hz, gauge.range_m)
-        for channel, (flag, gauge) in enumerate(
-            zip(OVERLOAD_FLAGS, (gauges.table, gauges.relative), strict=True)
-        )
-    )
-    return table, relative

@@ -6,7 +6,7 @@ from typing import Any
 import typer
 
 from analysis.gauge_health import GaugeHealth, HealthGrade, measure_health
-from app.acquisition.gauge_check import collect_samples
+from app.acquisition.gauge_samples import collect_samples
 from app.acquisition.messages import PortSettings
 from app.acquisition.run_setup import complete_port_settings
 from app.acquisition.stream.live_stream import open_stream

@@ -11,7 +11,8 @@ from analysis.calibration.points import CalibrationPoints
 from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
-from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge, gauge_samples
+from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
+from app.acquisition.gauge_samples import gauge_samples
 from app.presenters.base import LabelledValue, ReportProgress
 from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
 from app.presenters.gauges.state import NAMES, CalibrationFit, CheckKind

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.acquisition import gauge_check
-from app.acquisition.gauge_check import NoSamplesError, collect_samples, gauge_samples
+from app.acquisition import gauge_samples as module
+from app.acquisition.gauge_samples import NoSamplesError, collect_samples, gauge_samples
 from app.acquisition.stream.live_stream import DecodedRead
 from app.runs.blocks import calibrate
 from config.files import load_gauges
@@ -45,7 +45,7 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gauge_check, "TIMEOUT_S", -0.95)
+    monkeypatch.setattr(module, "TIMEOUT_S", -0.95)
     with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
         collect_samples(FakeStream(10), 1.0, load_gauges())
 
