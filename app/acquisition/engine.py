@@ -396,6 +396,7 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
         engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_quit())
         device = stream.identity
+        _log.info("connected: %s %s, %g Hz", device.name, device.firmware, stream.rate_hz)
         events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
         events.send(StateChanged(PullbackState.IDLE, 0.0))
         engine.run()
