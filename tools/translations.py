@@ -20,7 +20,8 @@ from messages.i18n import DOMAIN, LOCALE
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = tuple(ROOT / name for name in ("analysis", "app", "config", "drivers", "messages"))
-ENGLISH_ONLY = ROOT / "app" / "cli"
+ENGLISH_ONLY = (ROOT / "app" / "cli", ROOT / "app" / "qt" / "screenshots.py")
+"""The command line, and a program for developers."""
 _FUNCTIONS = {"gettext", "N_", "message", "ngettext"}
 _SUFFIXES = ("Error", "Warning")
 _CODE_FIRST = {"ResultWarning"}
@@ -31,7 +32,7 @@ def extract(folders: Iterable[Path] = PACKAGES) -> Catalog:
     """Collect the texts of a source tree. Raises ValueError where a text is an f-string."""
     catalogue = Catalog()
     for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
-        if path.is_relative_to(ENGLISH_ONLY):
+        if any(path.is_relative_to(part) for part in ENGLISH_ONLY):
             continue
         name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
         for text, line in _texts(path):
@@ -64,13 +65,11 @@ def untranslated(catalogue: Catalog) -> list[str]:
 def _texts(path: Path) -> Iterator[tuple[str | tuple[str, str], int]]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and node.args and _carries_text(node.func):
-            # TODO: of errors too, when all of them carry templates
-            strict = isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
             plural = [keyword.value for keyword in node.keywords if keyword.arg == "plural"]
             if isinstance(node.func, ast.Name) and node.func.id == "ngettext":
                 plural = node.args[1:2]
-            many = [text for argument in plural for text in _constants(argument, path, strict)]
-            for text in _constants(node.args[0], path, strict):
+            many = [text for argument in plural for text in _constants(argument, path)]
+            for text in _constants(node.args[0], path):
                 yield ((text, many[0]) if many else text), node.lineno
 
 
@@ -87,18 +86,16 @@ def _carries_text(function: ast.expr) -> bool:
     return name.endswith(_SUFFIXES) and name not in _CODE_FIRST and not hasattr(builtins, name)
 
 
-def _constants(argument: ast.expr, path: Path, strict: bool) -> Iterator[str]:
+def _constants(argument: ast.expr, path: Path) -> Iterator[str]:
     """Yield the text of an argument; both texts of a conditional expression."""
     match argument:
         case ast.Constant(value=str(text)) if text:
             yield text
         case ast.IfExp(body=body, orelse=orelse):
-            yield from _constants(body, path, strict)
-            yield from _constants(orelse, path, strict)
-        case ast.JoinedStr() | ast.BinOp() if strict:
-            raise ValueError(
-                f"{path}, line {argument.lineno}: values belong into {{fields}}, not into the text"
-            )
+            yield from _constants(body, path)
+            yield from _constants(orelse, path)
+        case ast.JoinedStr() | ast.BinOp():
+            raise ValueError(f"{path}, line {argument.lineno}: put values into {{fields}} of the template")
 
 
 def main() -> int:

@@ -136,7 +136,9 @@ def fail(path, count, first):
     }
 
 
-@pytest.mark.parametrize("text", ['gettext(f"{x} runs")', 'message(f"{x} runs")', 'N_("a" + b)'])
+@pytest.mark.parametrize(
+    "text", ['gettext(f"{x} runs")', 'message(f"{x} runs")', 'N_("a" + b)', 'PortError(f"{x} runs")']
+)
 def test_values_are_not_built_into_texts(tmp_path: Path, text: str) -> None:
     (tmp_path / "wrong.py").write_text(f"{text}\n", encoding="utf-8")
     with pytest.raises(ValueError, match="fields"):
