@@ -177,9 +177,7 @@ def audit(
     `table_mass_kg` is m1, `gravity_m_per_s2` is g, `pullbacks_m` is u0 of each series code. Raises
     AuditError if a row describes no motion, or its pullback is not given.
     """
-    return AuditReport(
-        tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows),
-    )
+    return AuditReport(tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows))
 
 
 def _audit_row(

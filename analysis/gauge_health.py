@@ -113,8 +113,18 @@ def measure_health(gauge: GaugeSamples) -> GaugeHealth:
     Raises GaugeHealthError for under a second, or hardly any sample with a reading.
     """
     there = np.isfinite(gauge.displacement_m)
-    _check(gauge, int(there.sum()))
     places = np.flatnonzero(there)
+    seconds = len(there) / gauge.rate_hz
+    if seconds < SECONDS_MIN or len(places) < SAMPLES_MIN:
+        raise GaugeHealthError(
+            "{present} readings in {seconds} s are too few to judge a gauge by. Take"
+            " {samples_min} in {seconds_min:g} s at least, and look at cable and power if they"
+            " stay away",
+            present=len(places),
+            seconds=format_number(seconds, 2),
+            samples_min=SAMPLES_MIN,
+            seconds_min=SECONDS_MIN,
+        )
     x = gauge.displacement_m[there]
     whole = np.interp(np.arange(len(there)), places, x)
     slope, uncertainty, left = _drift(places / gauge.rate_hz, x)
@@ -125,7 +135,7 @@ def measure_health(gauge: GaugeSamples) -> GaugeHealth:
     is_fine = len(values) > _COARSE
     return GaugeHealth(
         samples=len(there),
-        duration_s=len(there) / gauge.rate_hz,
+        duration_s=seconds,
         mean_m=float(x.mean()),
         noise_rms_m=float(np.sqrt(max(float(np.mean(left**2)) - hums_m2, 0.0))),
         drift_m_per_min=60.0 * slope,
@@ -142,20 +152,6 @@ def measure_health(gauge: GaugeSamples) -> GaugeHealth:
         repeated_fraction=float(np.mean(np.diff(x) == 0.0)) if is_fine else 0.0,
         spectrum=spectrum,
     )
-
-
-def _check(gauge: GaugeSamples, present: int) -> None:
-    seconds = len(gauge.displacement_m) / gauge.rate_hz
-    if seconds < SECONDS_MIN or present < SAMPLES_MIN:
-        raise GaugeHealthError(
-            "{present} readings in {seconds} s are too few to judge a gauge by. Take"
-            " {samples_min} in {seconds_min:g} s at least, and look at cable and power if they"
-            " stay away",
-            present=present,
-            seconds=format_number(seconds, 2),
-            samples_min=SAMPLES_MIN,
-            seconds_min=SECONDS_MIN,
-        )
 
 
 def _drift(time_s: Floats, x: Floats) -> tuple[float, float, Floats]:

@@ -161,7 +161,11 @@ def plan(test: PlannedTest) -> Plan:
     """Plan a test. Raises AnalysisError for an impossible one."""
     motion = test.motion()
     table_use, relative_use = range_use(test, motion)
-    ledger = expected_budget(test)
+    budget = expected_budget(test)
+
+    def fits(tests: int) -> bool:
+        return relative_use.fits(tests * motion.residual_displacement_m)
+
     return Plan(
         law=test.law,
         motion=motion,
@@ -169,10 +173,10 @@ def plan(test: PlannedTest) -> Plan:
         rest_s=_rest_s(test),
         table_use=table_use,
         relative_use=relative_use,
-        tests_without_recentring=_tests_without_recentring(relative_use, motion.residual_displacement_m),
-        results=ledger.results,
-        budget=ledger.lines,
-        warnings=_warnings(test, motion, (table_use, relative_use), ledger),
+        tests_without_recentring=next((count for count in range(_TESTS_MAX) if not fits(count)), None),
+        results=budget.results,
+        budget=budget.lines,
+        warnings=_warnings(test, motion, (table_use, relative_use), budget),
     )
 
 
@@ -190,20 +194,20 @@ def range_use(test: PlannedTest, motion: Motion) -> tuple[RangeUse, RangeUse]:
 
 def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     """Friction with its expected uncertainty by source; empty where the test does not determine it."""
-    record, ledger = _record(test), UncertaintyBudget()
+    record, budget = _record(test), UncertaintyBudget()
     if test.motion().slip_end_s == 0.0:
-        return ledger
+        return budget
     problem = _problem(test, record)
     if problem is None:
-        return ledger
+        return budget
     fit = _fit(test, problem)
     fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
     for place, name in _FRICTIONS:
         if place in test.law.free_parameters and fit.determines(place):
             weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
-            ledger.add(name, fit.value(place), "1", fitted.contributions(weights))
-    return ledger
+            budget.add(name, fit.value(place), "1", fitted.contributions(weights))
+    return budget
 
 
 def smallest_pullback_m(parameters: TwoMassParameters) -> float:
@@ -298,15 +302,8 @@ def _rest_s(test: PlannedTest) -> float | None:
     return start_s + max(0.0, math.log(max(swing_m, 1e-12) / test.noise_m)) / n1
 
 
-def _tests_without_recentring(use: RangeUse, residual_m: float) -> int | None:
-    for count in range(_TESTS_MAX):
-        if not use.fits(count * residual_m):
-            return count
-    return None
-
-
 def _warnings(
-    test: PlannedTest, motion: Motion, uses: tuple[RangeUse, RangeUse], ledger: UncertaintyBudget
+    test: PlannedTest, motion: Motion, uses: tuple[RangeUse, RangeUse], budget: UncertaintyBudget
 ) -> list[ResultWarning]:
     found = [*_range_warnings(uses)]
     if motion.slip_end_s == 0.0:
@@ -327,7 +324,7 @@ def _warnings(
             needed_s=needed_s,
         )
         found.append(ResultWarning("tail-too-short", text))
-    if "friction_dynamic" not in ledger.results:
+    if "friction_dynamic" not in budget.results:
         text = message("the record will not tell f_d. Sample faster and longer, within the gauges' ranges.")
         found.append(ResultWarning("friction-undetermined", text))
     unstated = [

@@ -80,13 +80,9 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
     if "friction_dynamic" not in budget.results:
         return None
     lines = [line for line in budget.lines if line.contribution_to == "friction_dynamic"]
-    by_kind = {
-        is_noise: math.hypot(
-            *(line.standard_uncertainty for line in lines if (line.source is BudgetSource.NOISE) is is_noise)
-        )
-        for is_noise in (True, False)
-    }
-    return UncertaintyParts(by_kind[True], by_kind[False])
+    noise = [line.standard_uncertainty for line in lines if line.source is BudgetSource.NOISE]
+    stated = [line.standard_uncertainty for line in lines if line.source is not BudgetSource.NOISE]
+    return UncertaintyParts(math.hypot(*noise), math.hypot(*stated))
 
 
 def reduction_options(test: PlannedTest) -> list[ReductionOption]:

@@ -10,6 +10,7 @@ from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow, pool_rows
 from analysis.campaign.series import RunResult, campaign_warnings, group_into_series, run_names
 from analysis.catalogue import table_columns
 from analysis.quantities import ResultWarning
+from messages.i18n import N_
 from messages.message import Message, message
 
 
@@ -61,8 +62,8 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
 
 def _velocity(row: SeriesRow) -> float:
     """Largest velocity of the table (m/s)."""
-    found = row.quantities.get(TABLE_VELOCITY)
-    return 0.0 if found is None else found.quantity.value
+    velocity = row.quantities.get(TABLE_VELOCITY)
+    return 0.0 if velocity is None else velocity.quantity.value
 
 
 def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
@@ -79,11 +80,10 @@ def _combined(group: Sequence[tuple[RunResult, Message]]) -> Message:
     """Message of the first run of a group, with the names of all runs."""
     runs = {run.name: run for run, _ in group}
     names, first = run_names(list(runs.values())), group[0][1]
-    if all(other == first for _, other in group):
-        return message("{runs}: {warning}", runs=names, warning=first)
-    return message(
-        "{runs}: {warning} (of the first; of the others with other figures)", runs=names, warning=first
-    )
+    template = N_("{runs}: {warning}")
+    if any(other != first for _, other in group):
+        template = N_("{runs}: {warning} (of the first; of the others with other figures)")
+    return message(template, runs=names, warning=first)
 
 
 _UNITS_PRINTED = {"stiffness_n_per_m": KILOGRAM_FORCE_N}

@@ -34,14 +34,7 @@ class SeriesKey:
     def sort_key(self) -> tuple[bool, str, float, float, float, str]:
         """Order of the paper's table: contact, pullback from large to small, plate mass."""
         pullback = 0.0 if self.pullback_m is None else self.pullback_m
-        return (
-            not self.contact,
-            self.contact,
-            -pullback,
-            self.plate_mass_kg,
-            self.table_mass_kg,
-            self.code,
-        )
+        return (not self.contact, self.contact, -pullback, self.plate_mass_kg, self.table_mass_kg, self.code)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,10 +114,7 @@ def _same(one: SeriesKey, other: SeriesKey) -> bool:
     """Tell whether two runs of one label are the same test."""
     return (one.contact, one.pullback_m) == (other.contact, other.pullback_m) and all(
         abs(a - b) <= _SAME_MASS * abs(a)
-        for a, b in (
-            (one.plate_mass_kg, other.plate_mass_kg),
-            (one.table_mass_kg, other.table_mass_kg),
-        )
+        for a, b in ((one.plate_mass_kg, other.plate_mass_kg), (one.table_mass_kg, other.table_mass_kg))
     )
 
 

@@ -51,12 +51,7 @@ def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str
 
 
 def _bar(
-    axes: Axes,
-    place: float,
-    mean: Quantity | None,
-    series: Mapping[str, Quantity],
-    colour: str,
-    shade: float,
+    axes: Axes, place: float, mean: Quantity | None, series: Mapping[str, Quantity], colour: str, shade: float
 ) -> None:
     if mean is None:
         return

@@ -110,10 +110,7 @@ def _displacements(motion: Motion, since_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _readings(
-    record: Record,
-    found: Identification,
-    shown: NDArray[np.bool_],
-    motion_m: tuple[Floats, Floats] | None,
+    record: Record, found: Identification, shown: NDArray[np.bool_], motion_m: tuple[Floats, Floats] | None
 ) -> tuple[Floats, Floats | None]:
     """Simulated motion plus the residuals of the gauges."""
     gauges = [record.table_displacement_m, record.relative_displacement_m]

@@ -7,13 +7,7 @@ from typing import Final
 from matplotlib.figure import Figure
 
 from analysis.catalogue import ACCELERATION, KILOGRAM, MICROMETRE, MILLIMETRE, Unit
-from analysis.formatting import (
-    NO_BREAK_SPACE,
-    format_compact,
-    format_value,
-    format_with_prefix,
-    typeset,
-)
+from analysis.formatting import NO_BREAK_SPACE, format_compact, format_value, format_with_prefix, typeset
 from app.reports.figures.style import figure_svg
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.reader import Fingerprint
