@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from analysis.arrays import Floats
+from analysis.catalogue import MILLIMETRE
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit, build_problem_from_channels, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT, compared_law, default_point
@@ -307,7 +308,7 @@ def _warnings(
 ) -> list[ResultWarning]:
     found = [*_range_warnings(uses)]
     if motion.slip_end_s == 0.0:
-        needed_mm = smallest_pullback_m(test.parameters) * 1e3
+        needed_mm = MILLIMETRE.scale * smallest_pullback_m(test.parameters)
         text = message(
             "the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.",
             needed_mm=needed_mm,
@@ -345,13 +346,13 @@ def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
     found = []
     for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
         if use.range_m is not None and not use.fits():
-            read = f"{use.lowest_m * 1e3:.2f} to {use.highest_m * 1e3:.2f} mm"
+            read = f"{MILLIMETRE.number(use.lowest_m, 2)} to {MILLIMETRE.text(use.highest_m, 2)}"
             text = message(
                 "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
                 " readings are left out. {remedy}",
                 number=number,
                 read=read,
-                range_m=use.range_m * 1e3,
+                range_m=MILLIMETRE.scale * use.range_m,
                 remedy=remedy,
             )
             found.append(ResultWarning(f"gauge-{number}-range", text))

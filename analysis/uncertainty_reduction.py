@@ -12,6 +12,7 @@ from enum import Enum
 
 import numpy as np
 
+from analysis.catalogue import MILLIMETRE
 from analysis.formatting import format_number
 from analysis.plan import PlannedTest, expected_budget, range_use
 from analysis.quantities import BudgetSource
@@ -144,14 +145,16 @@ def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
         if parts is not None and parts.total < best:
             best, best_m = parts.total, longer.parameters.pullback_m
         if best <= 0.5 * now.total:
-            text = message("A pullback of {pullback_mm:.1f} mm halves it.", pullback_mm=abs(best_m) * 1e3)
+            text = message(
+                "A pullback of {pullback_mm:.1f} mm halves it.", pullback_mm=MILLIMETRE.scale * abs(best_m)
+            )
             return ReductionOption(Measure.PULLBACK, best_m, best, text)
     if best_m == planned_m:
         text = message("No longer pullback within the gauges' ranges makes it smaller.")
     else:
         text = message(
             "No longer pullback within the gauges' ranges halves it; {pullback_mm:.1f} mm gives {best}.",
-            pullback_mm=abs(best_m) * 1e3,
+            pullback_mm=MILLIMETRE.scale * abs(best_m),
             best=format_number(best, 2),
         )
     return ReductionOption(Measure.PULLBACK, None, best, text)

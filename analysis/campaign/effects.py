@@ -13,6 +13,7 @@ from analysis.arrays import Floats
 from analysis.campaign import linear_model
 from analysis.campaign.linear_model import DesignMatrix, LinearFit
 from analysis.campaign.rows import SeriesRow
+from analysis.catalogue import MILLIMETRE
 from analysis.formatting import format_signed, uncertainty_decimals
 from analysis.quantities import Quantity
 from messages.i18n import N_
@@ -268,7 +269,7 @@ def _mean_difference(laid: DesignMatrix, one: str, other: str) -> Floats:
 
 
 def _mm(length_m: float) -> str:
-    return f"{length_m * 1e3:g} mm"
+    return f"{MILLIMETRE.scale * length_m:g} {MILLIMETRE.symbol}"
 
 
 _QUESTIONS: Final = {

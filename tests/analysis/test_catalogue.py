@@ -12,6 +12,8 @@ from analysis import catalogue
 from analysis.campaign.campaign import summarize
 from analysis.catalogue import (
     CATALOGUE,
+    MICROMETRE,
+    MILLIMETRE,
     Place,
     QuantityDefinition,
     Symbol,
@@ -127,3 +129,10 @@ def test_a_row_without_a_column_leaves_the_table(monkeypatch, rows):
     assert "T s" not in table_headers()
     assert len(table_columns()) == 9
     assert "period_s" not in as_text(content, "csv", 80)
+
+
+def test_a_unit_writes_values_of_si_with_fixed_decimals() -> None:
+    assert MILLIMETRE.text(0.0123, 2) == "12.30 mm"
+    assert MICROMETRE.text(-0.01e-6, 1) == "0.0 µm"
+    assert MILLIMETRE.number(float("nan"), 2) == "–"
+    assert MICROMETRE.labelled("residual") == "residual (µm)"

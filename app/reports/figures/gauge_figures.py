@@ -63,5 +63,5 @@ def _draw_spectra(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str
     for frequency_hz in MAINS_HZ:
         axes.axvline(frequency_hz, color=MUTED, linewidth=0.8, linestyle=(0, (2, 3)))
     axes.set_xlabel("frequency (Hz); 50 and 60 Hz of the mains dotted")
-    axes.set_ylabel("noise (µm/√Hz)")
+    axes.set_ylabel(f"noise ({MICROMETRE.symbol}/√Hz)")
     axes.legend()
