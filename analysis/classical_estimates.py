@@ -29,16 +29,7 @@ _COMPARED = 1500
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClassicalEstimates:
-    """Estimates of one record; None where the record does not determine them.
-
-    Attributes
-    ----------
-    frictions_of_residual : tuple of float
-        Every f_d of the grid range whose simulated u_s is the measured one; empty where u_s is not known.
-    friction_of_paper : float or None
-        By the paper's procedure: f_d is lowered step by step until the motion simulated by the paper's
-        algorithm coincides best with the record.
-    """
+    """Estimates of one record; None where the record does not determine them."""
 
     period_s: float | None
     """From the turning points of the stick tail."""
@@ -49,16 +40,15 @@ class ClassicalEstimates:
     residual_displacement_m: Floats
     """u_s simulated at each of `SCANNED`, the other parameters as fitted."""
     friction_candidates: tuple[float, ...]
+    """Every f_d of the scanned range whose simulated u_s is the measured one; empty where that is unknown."""
     friction_by_paper_method: float | None
+    """f_d is lowered step by step until the motion by the paper's algorithm is nearest to the record."""
 
 
 def estimate_classically(record: Record, identification: Identification) -> ClassicalEstimates:
     """Estimate a two-mass record that was identified, by the paper's methods.
 
-    Raises
-    ------
-    RecordError
-        The identification holds no fitted motion.
+    Raises RecordError if the identification holds no fitted motion.
     """
     if "friction_dynamic" not in identification.parameters:
         raise RecordError("nothing slipped in this record: there is no friction to check.")

@@ -33,9 +33,10 @@ class Events:
     """Times in the base of `Record.time_s`; None where the record does not hold the event."""
 
     release_s: float | None = None
-    """The table let go, the end of the last slip, and the swing as small as the noise."""
     slip_end_s: float | None = None
+    """End of the last slip."""
     rest_s: float | None = None
+    """The swing is as small as the noise from here on."""
     release_uncertainty_s: float | None = None
     """Standard uncertainties from the readings; None where they are not known."""
     slip_end_uncertainty_s: float | None = None

@@ -42,10 +42,7 @@ class Refit:
 class Refitter:
     """A record made ready to be fitted again and again.
 
-    Raises
-    ------
-    RecordError
-        The record holds no free decay.
+    Raises RecordError if the record holds no free decay.
     """
 
     def __init__(self, record: Record) -> None:
@@ -69,10 +66,8 @@ class Refitter:
         steps_max : int
             Most evaluations.
 
-        Raises
-        ------
-        AnalysisError
-            An unknown model, a start without one of its parameters, or a parameter that cannot be held.
+        Raises AnalysisError if the model is unknown, `start` lacks one of its parameters, or a parameter
+        cannot be held.
         """
         law, point = law_by_name(model), self._point(start)
         held = None if hold is None else self._held(hold, law)

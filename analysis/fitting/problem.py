@@ -47,19 +47,14 @@ class QuadraticModel:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Minimum:
-    """Where the search ended.
-
-    Attributes
-    ----------
-    settled : bool
-        No step promised to win anything. Otherwise the steps ran out, or every one went up: at a jump.
-    """
+    """Where the search ended."""
 
     parameters: Floats
     quadratic: QuadraticModel
     steps: int
     """Evaluations."""
     converged: bool
+    """No step promised a lower chi-square. Otherwise the steps ran out, or all rose: at a jump."""
 
     @property
     def cost(self) -> float:
@@ -132,7 +127,7 @@ def levenberg_marquardt_step(normal: Floats, descent: Floats, damping: float) ->
     Parameters
     ----------
     normal, descent : (k, k) and (k,) float64
-        See `Quadratic`.
+        See `QuadraticModel`.
     damping : float
         Added to the diagonal of the normal matrix, scaled to ones.
 

@@ -56,21 +56,15 @@ falls with speed leaves 0.014 at most with a law of constant f_d."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
-    """A friction law fitted to a record.
-
-    Attributes
-    ----------
-    normal : (k, k) float64
-        (k, k) float64: gauss-Newton curvature of half of chi-square over the free parameters, priors
-        included.
-    """
+    """A friction law fitted to a record."""
 
     law: FrictionLaw
     parameters: Floats
-    """(16,) float64: by `Place`."""
+    """(16,) float64: by `Parameter`."""
     free: Indices
     """(k,) int: places that were free."""
     normal_matrix: Floats
+    """(k, k) Gauss-Newton curvature of half of chi-square over the free parameters, priors included."""
     chi_square: float
     """Of the readings alone."""
     bic: float
@@ -96,17 +90,12 @@ class Fit:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Search:
-    """Where to look for minima.
-
-    Attributes
-    ----------
-    guided : Problem
-        The same with prior knowledge from tail, hold and parabolas, for windows that hold too little.
-    """
+    """Where to look for minima."""
 
     problem: FitProblem
     """The whole record."""
     informed_problem: FitProblem
+    """The same with prior knowledge from tail, hold and parabolas, for windows that hold too little."""
     period_s: float
     slip_end_s: float
     """Most readings of a decimated problem lie before it."""
@@ -323,12 +312,9 @@ class PlatePathEstimate:
 def estimate_from_plate_path(
     table: Channel, relative: Channel, period_s: float, gravity_m_per_s2: float
 ) -> PlatePathEstimate | None:
-    """Fit parabolas to table + relative in every clear slip phase; None where there is none.
+    """Fit parabolas to table + relative, from release to end of slip, in every clear slip phase.
 
-    Parameters
-    ----------
-    table, relative : Channel
-        From release to the end of slip.
+    None where there is no such phase.
     """
     phases = _phases(relative, period_s)
     if not phases:
@@ -456,13 +442,9 @@ def range_m(value_m: Floats) -> float:
 
 
 def initial_guess(problem: FitProblem, decay: FreeDecay) -> tuple[Floats, FitProblem]:
-    """Parameters near the truth without a guess, from tail, hold and the plate's parabolas.
+    """Parameters (16,) near the truth without a guess, from tail, hold and the plate's parabolas.
 
-    Returns
-    -------
-    (16,) float64
-    Problem
-        `problem` with what those three know as prior knowledge.
+    With them comes `problem` with what those three know as prior knowledge.
     """
     start = problem.prior_mean.copy()
     _set_from_tail(start, decay)
@@ -564,7 +546,7 @@ def guess_release(
 
     Parameters
     ----------
-    guided : Problem
+    guided : FitProblem
         With prior knowledge of friction, tilt, stiffness and damping.
     start : (16,) float64
         Release and pullback in it are ignored.

@@ -59,10 +59,7 @@ def simulate(
 ) -> IntegratedMotion:
     """Motion from release to `duration_s` (s); f_s is the friction at standstill, f_d that at high speed.
 
-    Raises
-    ------
-    MotionError
-        A velocity or duration that is not positive and finite.
+    Raises MotionError if a velocity or the duration is not positive and finite.
     """
     if not 0.0 < stribeck_velocity_m_per_s < math.inf:
         raise MotionError(

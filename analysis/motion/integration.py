@@ -122,10 +122,7 @@ class IntegratedMotion(Motion):
 def simulate_integrated(kernels: IntegratedKernels, vector: Floats, duration_s: float) -> IntegratedMotion:
     """Motion from release to `duration_s` (s).
 
-    Raises
-    ------
-    MotionError
-        The duration is not positive and finite.
+    Raises MotionError if the duration is not positive and finite.
     """
     if not 0.0 < duration_s < math.inf:
         raise MotionError(

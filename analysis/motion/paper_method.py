@@ -56,11 +56,8 @@ def simulate(
 ) -> SteppedMotion:
     """Motion from release to `duration_s` by the paper's algorithm.
 
-    Raises
-    ------
-    MotionError
-        The algorithm knows no static friction and no tilt; duration or step impossible, or more than
-        ten million steps.
+    Raises MotionError if f_s differs from f_d or the plane is tilted, if duration or step are impossible, or
+    for more than ten million steps.
     """
     _check(parameters, duration_s, step_s)
     vector = parameters.vector()

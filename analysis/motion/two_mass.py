@@ -31,8 +31,9 @@ class MotionSamples:
     time_s: NDArray[np.float64]
     """As asked for, zero at release."""
     table_displacement_m: NDArray[np.float64]
-    """u1 from the rest position, and u2 - u1 since release (m)."""
+    """u1 from the rest position."""
     relative_displacement_m: NDArray[np.float64]
+    """u2 - u1 since release."""
     table_velocity_m_per_s: NDArray[np.float64]
     plate_velocity_m_per_s: NDArray[np.float64]
     table_acceleration_m_per_s2: NDArray[np.float64]
@@ -74,10 +75,7 @@ class Motion(ABC):
     def sample(self, times_s: ArrayLike) -> MotionSamples:
         """Motion at `times_s` (n,), in any order, seconds from release, negative before it.
 
-        Raises
-        ------
-        MotionError
-            A time is not a number, or later than `duration_s`.
+        Raises MotionError if a time is not a number, or later than `duration_s`.
         """
 
     @abstractmethod
@@ -131,15 +129,13 @@ def rising_times(
 class TwoMassParameters:
     """The stand, the contact and the pullback of one test.
 
-    Raises
-    ------
-    MotionError
-        A value outside these limits.
+    Raises MotionError if a value is outside these limits.
     """
 
     table_mass_kg: float
-    """m1, m2; positive."""
+    """m1; positive."""
     plate_mass_kg: float
+    """m2; positive."""
     stiffness_n_per_m: float
     """c; positive."""
     damping_coefficient_kg_per_s: float
@@ -206,10 +202,7 @@ class TwoMassParameters:
     def simulate(self, duration_s: float = 10.0) -> "TwoMassMotion":
         """Motion from release to `duration_s`.
 
-        Raises
-        ------
-        MotionError
-            The duration is not positive and finite.
+        Raises MotionError if the duration is not positive and finite.
         """
         if not 0.0 < duration_s < math.inf:
             raise MotionError(

@@ -29,11 +29,13 @@ class Parameters(NamedTuple):
     """Parameters of ``offset + d^r/dt^r free_decay``, r = 0, 1, 2 (displacement, velocity, acceleration)."""
 
     turning_s: float
-    """Time (s) and displacement of the last turning point before the fitted stretch."""
+    """Time (s) of the last turning point before the fitted stretch."""
     turning: float
+    """Displacement there."""
     omega_rad_per_s: float
-    """Damped frequency and viscous damping constant."""
+    """Damped frequency."""
     damping_n_per_s: float
+    """Viscous damping constant."""
     coulomb: float
     """x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left."""
     offset: float

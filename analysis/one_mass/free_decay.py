@@ -41,8 +41,9 @@ class SpectralLine:
     """A line that stands out of the spectrum of residuals."""
 
     frequency_hz: float
-    """By the median sampling interval; as a steady sine, in the unit of the residuals."""
+    """By the median sampling interval."""
     amplitude: float
+    """As a steady sine, in the unit of the residuals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +53,9 @@ class ResidualAssessment:
     adequate: bool
     """They are noise, or the rounding of the converter."""
     rms: float
-    """Their root mean square, and that of their part which neighbours do not share."""
+    """Their root mean square."""
     noise: float
+    """Root mean square of their part which neighbours do not share."""
     line: SpectralLine | None
     """The strongest line, if noise does not explain it."""
 

@@ -25,8 +25,8 @@ class TurningPoints:
     number: "np.ndarray[tuple[int], np.dtype[np.int64]]"
     """(k,) int64: half cycles since the first; increasing, not necessarily without gaps."""
     time_s: Floats
-    """(k,) float64: time (s) and reading there."""
     value: Floats
+    """(k,) float64: reading there."""
     side: Floats
     """(k,) float64: +1 for a maximum, -1 for a minimum."""
     noise_gain: Floats

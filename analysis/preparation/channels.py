@@ -46,8 +46,9 @@ class Channels:
     relative: Channel | None
     """Gauge 2 as it reads (against the table, or against the base where `Record` says so)."""
     origin_s: float
-    """Record time of the first sample; true seconds per second of the record."""
+    """Record time of the first sample."""
     clock_scale: float
+    """True seconds per second of the record."""
     interval_s: float
     """Median time between rows."""
     quantisation_m: tuple[float, float]

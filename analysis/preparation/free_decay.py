@@ -56,15 +56,10 @@ _MEANS = 60
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """How gauge 2 is mounted.
-
-    Attributes
-    ----------
-    absolute : bool
-        It measures the plate against the base.
-    """
+    """How gauge 2 is mounted."""
 
     measures_plate: bool
+    """Against the base, instead of against the table."""
     sign: int
     """What makes its readings positive where the plate lies ahead."""
     warnings: tuple[ResultWarning, ...] = ()
@@ -181,21 +176,41 @@ _NOISE_SHARE = 0.2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class FreeDecay:
-    """One free decay, turned so that the pullback is positive."""
+class _Stretch:
+    """Both gauges from the hold to the end of free motion, turned so that the pullback is positive."""
 
     channels: Channels
     """As read."""
     table: Channel
-    """From the hold to the end of free motion, times `sign`, without drift."""
+    """Gauge 1 times `sign`; in a `FreeDecay` without drift."""
     relative: Channel | None
     """Gauge 2 likewise, positive where the plate lies ahead of the table; against the base where
     `gauge_2_absolute`."""
     gauge_2_absolute: bool
     sign: int
-    """What the readings of gauge 1 and 2 were multiplied by."""
+    """What the readings of gauge 1 were multiplied by."""
     relative_sign: int
     release: Release
+
+    @property
+    def hold_end_s(self) -> float:
+        """A time shortly before the release."""
+        return _hold_end(self.release, self.channels)
+
+    @property
+    def plateau(self) -> tuple[float, float] | None:
+        """First and last time of the hold, where the record has it."""
+        return _plateau(self.release, self.channels)
+
+    def plateau_of(self, channel: Channel) -> Channel | None:
+        """Readings of the hold."""
+        return None if self.plateau is None else channel.between(*self.plateau)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FreeDecay(_Stretch):
+    """One free decay."""
+
     slip_end_s: float | None
     """None where slip lasts to the end or the readings do not tell."""
     slips: bool
@@ -209,23 +224,14 @@ class FreeDecay:
     """Numbers of readings that the noise was measured from."""
     warnings: tuple[ResultWarning, ...]
     drift_m_per_s: float = 0.0
-    """Steady drift of gauge 2 and 1 as turned, already subtracted; zero at the release."""
+    """Steady drift of gauge 2 as turned, already subtracted; zero at the release."""
     table_drift_m_per_s: float = 0.0
-
-    @property
-    def hold_end_s(self) -> float:
-        """A time shortly before the release."""
-        return _hold_end(self.release, self.channels)
+    """The same of gauge 1."""
 
     @property
     def dense_until_s(self) -> float:
         """Half a period after the last slip that gauge 2 shows."""
         return np.inf if self.slip_end_s is None else self.slip_end_s + 0.5 * self.period_s
-
-    @property
-    def plateau(self) -> tuple[float, float] | None:
-        """First and last time of the hold, where the record has it."""
-        return _plateau(self.release, self.channels)
 
     def with_tail_from(self, start_s: float | None) -> Self:
         """The same with the stick tail fitted from `start_s` on, or none."""
@@ -242,33 +248,10 @@ class _Slip(NamedTuple):
     period_s: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Stretch:
-    """Both gauges from the hold to the end of free motion, turned; attributes as in `FreeDecay`."""
-
-    channels: Channels
-    table: Channel
-    relative: Channel | None
-    gauge_2_absolute: bool
-    sign: int
-    relative_sign: int
-    release: Release
-
-    @property
-    def plateau(self) -> tuple[float, float] | None:
-        return _plateau(self.release, self.channels)
-
-    def plateau_of(self, channel: Channel) -> Channel | None:
-        return None if self.plateau is None else channel.between(*self.plateau)
-
-
 def prepare(record: Record) -> FreeDecay:
     """Find the free decay in `record`.
 
-    Raises
-    ------
-    RecordError
-        There is none.
+    Raises RecordError if there is none.
     """
     warnings: list[ResultWarning] = []
     channels = _valid_channels(record, warnings)

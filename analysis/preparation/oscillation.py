@@ -358,10 +358,7 @@ def check_rate(table: Channel) -> None:
 def estimate_period(table: Channel, release: Release) -> float:
     """Period of the swing after `release` (s), to some per cent.
 
-    Raises
-    ------
-    RecordError
-        The record ends within one and a quarter swings, or no stand has this period.
+    Raises RecordError if the record ends within one and a quarter swings, or no stand has this period.
     """
     swing = table.between(release.time_s, np.inf)
     try:
