@@ -136,7 +136,9 @@ def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float
             decay.relative_sign,
             relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute),
         )
-    moving = _thinned(channel.between(release_s, np.inf))
+    moving = channel.between(release_s, np.inf)
+    step = max(1, len(moving) // _COMPARED)
+    moving = Channel(moving.time_s[::step], moving.value_m[::step])
     since_s = moving.time_s - release_s
 
     def misfit(friction: float) -> float:
@@ -148,8 +150,3 @@ def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float
         return float(np.var(away))
 
     return misfit
-
-
-def _thinned(channel: Channel) -> Channel:
-    step = max(1, len(channel) // _COMPARED)
-    return Channel(channel.time_s[::step], channel.value_m[::step])

@@ -56,12 +56,13 @@ class MonteCarlo:
     """What drawing gives beside the budget."""
 
     draws: int
-    """Numbers of draws through the linearised fit and of full fits."""
+    """Through the linearised fit."""
     refits: int
+    """Full fits."""
     linear: dict[str, Quantity]
-    """By the names of INTERFACE; `full` is empty without refits. The standard uncertainty is the scatter, the
-    interval holds 95 % of the draws."""
+    """The standard uncertainty is the scatter, the interval holds 95 % of the draws."""
     full: dict[str, Quantity]
+    """The same of the refits; empty without them."""
     agrees: dict[str, bool]
     """Whether the ends of the interval of the budget are met by those drawn (by the refits where there are
     any), within the tolerance."""

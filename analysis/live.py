@@ -132,7 +132,13 @@ class LiveIdentification:
         known = _known(now_s, record, decay, problem, chosen, None)
         narrowing = _narrowing(known, problem)
         judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
-        return replace(known, state=_judged(known.state, narrowing, judged.adequate))
+        state = replace(
+            known.state,
+            narrowing=narrowing,
+            may_stop=judged.adequate and FRICTION not in narrowing,
+            is_enough=judged.adequate and not narrowing,
+        )
+        return replace(known, state=state)
 
     def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:
         """Refine every law; search again where there is none yet or none explains the readings."""
@@ -189,15 +195,6 @@ def _known(
         damping,
     )
     return _LiveFit(state, decay, fit, fitted, constants, now_s)
-
-
-def _judged(state: LiveState, narrowing: tuple[str, ...], is_adequate: bool) -> LiveState:
-    return replace(
-        state,
-        narrowing=narrowing,
-        may_stop=is_adequate and FRICTION not in narrowing,
-        is_enough=is_adequate and not narrowing,
-    )
 
 
 def _narrowing(known: _LiveFit, problem: FitProblem) -> tuple[str, ...]:

@@ -69,35 +69,6 @@ class OneMassMotion:
     """Time of the stop (s); None when the mass still moves at the last asked time."""
 
 
-def decay_from_state(
-    displacement_m: float,
-    velocity_m_per_s: float,
-    *,
-    period_s: float,
-    damping_n_per_s: float,
-    coulomb_displacement_m: float = 0.0,
-) -> OneMassDecay:
-    """Free decay that has this displacement (m) and velocity (m/s) at time 0.
-
-    A mass that moves at time 0 is given by the turning point it would have come from.
-    Raises DecayError for parameters that describe no free decay.
-    """
-    at_rest = OneMassDecay(period_s, damping_n_per_s, coulomb_displacement_m, 0.0, displacement_m)
-    _check("velocity_m_per_s", velocity_m_per_s, True, "")
-    if velocity_m_per_s == 0.0:
-        return at_rest
-    omega, n = 2.0 * math.pi / period_s, damping_n_per_s
-    direction = math.copysign(1.0, velocity_m_per_s)
-    x = displacement_m + direction * coulomb_displacement_m
-    y = (velocity_m_per_s + n * x) / omega
-    k2 = omega**2 + n**2
-    phase = math.atan2(direction * velocity_m_per_s, -direction * (k2 * x + n * velocity_m_per_s) / omega)
-    since_s = phase / omega
-    amplitude = math.exp(n * since_s) * math.hypot(x, y) / math.hypot(1.0, n / omega)
-    turning_m = -direction * (amplitude + coulomb_displacement_m)
-    return OneMassDecay(period_s, n, coulomb_displacement_m, -since_s, turning_m)
-
-
 def simulate(decay: OneMassDecay, time_s: Floats) -> OneMassMotion:
     """Motion of `decay` at `time_s` ((n,), s, in any order, also before the given turning point).
 

@@ -210,16 +210,13 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
     found = fit_with_friction(free, crossings.period_s, order)
     first_s = found.parameters.from_turning_point_before(start_s).turning_s
     earlier = readings.between(first_s, start_s)
-    if len(earlier) < 2 or not _continues(found, earlier):
+    if len(earlier) < 2:
         return found
+    off = earlier.value_m - curve(found.parameters, earlier.time_s, found.order)
+    if float(np.mean(off**2)) > found.rms**2 * (1.0 + _SIGMAS * math.sqrt(2.0 / len(earlier))):
+        return found  # the earlier readings lie farther from the curve than the others
     longer = readings_before_stop(readings.between(first_s, math.inf), found.parameters)
     return fit(longer, found.parameters, order)
-
-
-def _continues(found: OneMassFit, earlier: Channel) -> bool:
-    """Tell whether `earlier` readings lie on the fitted curve as closely as the others."""
-    off = earlier.value_m - curve(found.parameters, earlier.time_s, found.order)
-    return float(np.mean(off**2)) <= found.rms**2 * (1.0 + _SIGMAS * math.sqrt(2.0 / len(earlier)))
 
 
 def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> Channel:

@@ -267,7 +267,7 @@ _REPEATS_MAX = 0.05
 
 def remove_invalid_readings(channel: Channel, gauge: int, warnings: list[ResultWarning]) -> Channel:
     """Leave out what the gauge cannot have seen, with a warning for each kind."""
-    repeated = _repeated(channel.value_m)
+    repeated = np.concatenate(([False], np.diff(channel.value_m) == 0.0))
     clipped = _clipped(channel.value_m, repeated)
     frozen = _frozen(channel, repeated) & ~clipped
     kinds = (
@@ -301,11 +301,6 @@ def _warning(code: str, gauge: int, count: int, total: int, what: Message) -> Re
             what=what,
         ),
     )
-
-
-def _repeated(x: Floats) -> NDArray[np.bool_]:
-    """True for a reading that equals the one before."""
-    return np.concatenate(([False], np.diff(x) == 0.0))
 
 
 def _long_runs(member: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
@@ -489,7 +484,8 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
     None where it drifts, but neither alike in both halves of `rest` nor as before the release: it has
     not one drift then. A late slip too small to be seen moves the first half only, and is no drift.
     """
-    whole, half = _line(rest, noise_m), _line(_later_half(rest), noise_m)
+    later_half = rest.between(0.5 * float(rest.time_s[0] + rest.time_s[-1]), np.inf)
+    whole, half = _line(rest, noise_m), _line(later_half, noise_m)
     if abs(whole[0]) < _DRIFT_SIGMAS * whole[1] or abs(half[0]) < _STEADY_SIGMAS * half[1]:
         return 0.0
     others = [half] if held is None or len(held) < _LINE_READINGS else [half, _line(held, noise_m)]
@@ -520,10 +516,6 @@ def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> 
 def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:
     """Readings without a drift that is zero at `zero_s`."""
     return Channel(channel.time_s, channel.value_m - drift_m_per_s * (channel.time_s - zero_s))
-
-
-def _later_half(channel: Channel) -> Channel:
-    return channel.between(0.5 * float(channel.time_s[0] + channel.time_s[-1]), np.inf)
 
 
 def _line(channel: Channel, noise_m: float) -> tuple[float, float]:

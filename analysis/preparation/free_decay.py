@@ -391,7 +391,8 @@ def _slip_by_gauge_2(
     release_s = stretch.release.time_s
     slip = relative_to_table(stretch.table, relative, stretch.gauge_2_absolute)
     if stretch.gauge_2_absolute:
-        noise = detrended_noise(_last_part(slip, _NOISE_SHARE), period_s)
+        start_s = slip.time_s[-1] - _NOISE_SHARE * (slip.time_s[-1] - slip.time_s[0])
+        noise = detrended_noise(slip.between(start_s, np.inf), period_s)
     else:
         noise = third_difference_noise(slip)
     noise = max(noise, NOISE_FLOOR_M)
@@ -477,11 +478,6 @@ def _is_dead(stretch: _Stretch, slip: _Slip, warnings: list[ResultWarning]) -> b
     )
     warnings.append(ResultWarning("gauge-2-dead", text))
     return True
-
-
-def _last_part(channel: Channel, share: float) -> Channel:
-    start_s = channel.time_s[-1] - share * (channel.time_s[-1] - channel.time_s[0])
-    return channel.between(start_s, np.inf)
 
 
 def _table_noise(stretch: _Stretch, slip: _Slip) -> tuple[tuple[float, int], Channel]:

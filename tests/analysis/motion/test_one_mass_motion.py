@@ -8,7 +8,34 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from analysis.motion.one_mass import DecayError, OneMassDecay, decay_from_state, free_decay, simulate
+from analysis.motion.one_mass import DecayError, OneMassDecay, free_decay, simulate
+
+
+def decay_from_state(
+    displacement_m: float,
+    velocity_m_per_s: float,
+    *,
+    period_s: float,
+    damping_n_per_s: float,
+    coulomb_displacement_m: float = 0.0,
+) -> OneMassDecay:
+    """Free decay that has this displacement (m) and velocity (m/s) at time 0.
+
+    A mass that moves at time 0 is given by the turning point it would have come from.
+    """
+    at_rest = OneMassDecay(period_s, damping_n_per_s, coulomb_displacement_m, 0.0, displacement_m)
+    if velocity_m_per_s == 0.0:
+        return at_rest
+    omega, n = 2.0 * math.pi / period_s, damping_n_per_s
+    direction = math.copysign(1.0, velocity_m_per_s)
+    x = displacement_m + direction * coulomb_displacement_m
+    y = (velocity_m_per_s + n * x) / omega
+    k2 = omega**2 + n**2
+    phase = math.atan2(direction * velocity_m_per_s, -direction * (k2 * x + n * velocity_m_per_s) / omega)
+    since_s = phase / omega
+    amplitude = math.exp(n * since_s) * math.hypot(x, y) / math.hypot(1.0, n / omega)
+    turning_m = -direction * (amplitude + coulomb_displacement_m)
+    return OneMassDecay(period_s, n, coulomb_displacement_m, -since_s, turning_m)
 
 
 def integrate(u0, v0, k, n, x_k, times):
