@@ -35,20 +35,14 @@ class Message(msgspec.Struct, frozen=True):
     """A sentence, or a part of one, as template and values.
 
     Build it with `message`, which converts values.
-
-    Attributes
-    ----------
-    template : str
-        English, with fields in braces: "{port} is busy". It is the key of its translations.
-    values : dict
-        By field name. A `Message` is rendered in the same language. A list is joined with ", ".
-    plural : str
-        Template where `values["count"]` is not 1; "" where the message counts nothing.
     """
 
     template: str
+    """English, with fields in braces: "{port} is busy". It is the key of its translations."""
     values: dict[str, Value] = {}
+    """By field name. A `Message` is rendered in the same language. A list is joined with ", "."""
     plural: str = ""
+    """Template where `values["count"]` is not 1; "" where the message counts nothing."""
 
     def __str__(self) -> str:
         """Render the English sentence."""

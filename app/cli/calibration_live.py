@@ -23,9 +23,7 @@ def measure_points(
 ) -> CalibrationPoints:
     """Ask for dial readings on stdin and average the counts at each; `kept` is written with every one.
 
-    Raises
-    ------
-    DriverError, AcquisitionError, CalibrationError
+    Raises DriverError, AcquisitionError, CalibrationError.
     """
     with (
         open_stream(complete_port_settings(port, gauges.device), gauges) as stream,

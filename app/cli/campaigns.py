@@ -20,19 +20,14 @@ def load_campaign(
     save: bool = False,
     excluded: Mapping[str, str] | None = None,
 ) -> tuple[CollectedRuns, "Campaign"]:
-    """Gather run files and folders of runs, and sum them up.
+    """Gather run files and folders of runs, and sum them up. Raises RunError.
 
     Parameters
     ----------
-    paths, crew
     save
         Keep new analyses in their runs.
     excluded
         Why runs do not count, by their absolute paths, beside those that say so themselves.
-
-    Raises
-    ------
-    RunError
     """
     with out.progress_bar("gathering", total=1.0) as update:
         gathered = collect_runs(paths, CollectOptions(crew, save=save, excluded=dict(excluded or {})), update)

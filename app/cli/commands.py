@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 
 from app.cli.options import command_function
 from app.log import start_log
@@ -19,8 +19,6 @@ class CommandEntry(NamedTuple):
     """Module and class of its options, imported when the command is named: "library_options:Runs"."""
     target: str
     """Module and function that does the work, imported when the command runs."""
-    summary: str
-    """First line of the help, for the list of commands."""
     example: str = ""
     """Shown below the help."""
     group: type[TyperGroup] | None = None
@@ -48,146 +46,71 @@ def _load(target: str) -> Any:
 
 
 class LazyGroup(TyperGroup):
-    """A group that lists its commands without importing them."""
+    """A group of commands whose options are imported when they are needed."""
 
     entries: ClassVar[tuple[CommandEntry, ...]] = ()
 
-    def __init__(self, **attributes: Any) -> None:
-        super().__init__(**attributes)
-        groups, self.commands = self.commands, {}
-        for entry in self.entries:
-            self.add_command(TyperCommand(entry.name, help=entry.summary))
-        self.commands |= groups
-        self._entries = {entry.name: entry for entry in self.entries}
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as Click calls it
+        """Return the names, those of groups below this one last."""
+        return [*(entry.name for entry in self.entries), *self.commands]
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Return name, command and remaining arguments, with the command's module imported."""
-        name, command, rest = super().resolve_command(ctx, args)
-        entry = self._entries.get(name or "")
-        return name, entry.load() if entry else command, rest
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of this name; None if there is none."""
+        for entry in self.entries:
+            if entry.name == cmd_name:
+                return entry.load()
+        return super().get_command(ctx, cmd_name)
 
 
 class CalibrateGroup(LazyGroup):
     """Commands of `slipstand calibrate`."""
 
-    entries = (
-        CommandEntry(
-            "check",
-            "device_options:CheckOptions",
-            "calibration_check:check",
-            "Check a gauge by a known displacement or its shunt.",
-        ),
-    )
+    entries = (CommandEntry("check", "device_options:CheckOptions", "calibration_check:check"),)
 
 
 class SlipstandGroup(LazyGroup):
     """Commands of `slipstand`."""
 
     entries = (
-        CommandEntry(
-            "demo",
-            "measurement_options:DemoOptions",
-            "demo:demo",
-            "Record a simulated pullback, and compare it with the truth.",
-        ),
+        CommandEntry("demo", "measurement_options:DemoOptions", "demo:demo"),
         CommandEntry(
             "record",
             "measurement_options:RecordOptions",
             "record:record",
-            "Record a pullback test from a device into a run file.",
-            "Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
+            example="Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
         ),
-        CommandEntry(
-            "analyze",
-            "result_options:AnalyzeOptions",
-            "analyze:analyze",
-            "Identify friction, stiffness and damping of one or more runs.",
-        ),
+        CommandEntry("analyze", "result_options:AnalyzeOptions", "analyze:analyze"),
         CommandEntry(
             "simulate",
             "measurement_options:SimulateOptions",
             "simulate:simulate",
-            "Simulate one pullback test: numbers, a CSV file or a run.",
-            "Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv",
+            example="Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv",
         ),
         CommandEntry(
             "plan",
             "measurement_options:PlanOptions",
             "plan:plan",
-            "Predict what a test will show, before it is made.",
-            "Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500",
+            example="Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500",
         ),
         CommandEntry(
             "import",
             "library_options:ImportOptions",
             "import_record:import_record",
-            "Make a run of a CSV, .mat, .xlsx or .parquet file.",
-            "Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm --series 1FFM0"
-            " -o test.h5",
+            example="Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm"
+            " --series 1FFM0 -o test.h5",
         ),
+        CommandEntry("export", "library_options:ExportOptions", "export:export"),
+        CommandEntry("table", "result_options:TableOptions", "table:table"),
+        CommandEntry("figures", "result_options:FiguresOptions", "figures:figures"),
+        CommandEntry("report", "result_options:ReportOptions", "report:report"),
+        CommandEntry("runs", "library_options:ListRunsOptions", "runs:runs"),
+        CommandEntry("recover", "library_options:RecoverOptions", "recover:recover"),
+        CommandEntry("edit", "library_options:EditOptions", "edit:edit"),
+        CommandEntry("trash", "library_options:TrashOptions", "runs:trash"),
+        CommandEntry("audit", "result_options:AuditOptions", "audit:audit"),
+        CommandEntry("doctor", "library_options:DoctorOptions", "doctor.command:doctor"),
         CommandEntry(
-            "export",
-            "library_options:ExportOptions",
-            "export:export",
-            "Write samples and coefficients of runs for other programs.",
-        ),
-        CommandEntry(
-            "table",
-            "result_options:TableOptions",
-            "table:table",
-            "Pool runs to the paper's Table 1, a row a series.",
-        ),
-        CommandEntry(
-            "figures",
-            "result_options:FiguresOptions",
-            "figures:figures",
-            "Draw the paper's figures 2 to 5 from runs, for print.",
-        ),
-        CommandEntry(
-            "report",
-            "result_options:ReportOptions",
-            "report:report",
-            "Write a test report of one run or a campaign, as PDF.",
-        ),
-        CommandEntry(
-            "runs", "library_options:ListRunsOptions", "runs:runs", "List recorded runs, oldest first."
-        ),
-        CommandEntry(
-            "recover",
-            "library_options:RecoverOptions",
-            "recover:recover",
-            "Rebuild runs that a crash cut short, from their journals.",
-        ),
-        CommandEntry(
-            "edit",
-            "library_options:EditOptions",
-            "edit:edit",
-            "Change what is known of runs, kept as history.",
-        ),
-        CommandEntry(
-            "trash",
-            "library_options:TrashOptions",
-            "runs:trash",
-            "Move runs to the trash, and bring them back.",
-        ),
-        CommandEntry(
-            "audit",
-            "result_options:AuditOptions",
-            "audit:audit",
-            "Check a published table against itself and the motion.",
-        ),
-        CommandEntry(
-            "doctor",
-            "library_options:DoctorOptions",
-            "doctor.command:doctor",
-            "Check installation, settings, gauges, ports and clocks.",
-        ),
-        CommandEntry(
-            "calibrate",
-            "device_options:CalibrateOptions",
-            "calibrate:calibrate",
-            "Calibrate a gauge against a dial: live, or from a file.",
-            group=CalibrateGroup,
+            "calibrate", "device_options:CalibrateOptions", "calibrate:calibrate", group=CalibrateGroup
         ),
     )
 
@@ -196,36 +119,11 @@ class DeviceGroup(LazyGroup):
     """Commands of `slipstand device`."""
 
     entries = (
-        CommandEntry(
-            "list",
-            "device_options:ListDevicesOptions",
-            "device:list_devices",
-            "List the protocols, and what each was verified against.",
-        ),
-        CommandEntry(
-            "ports",
-            "device_options:ListPortsOptions",
-            "device:list_ports",
-            "List the serial ports of this computer.",
-        ),
-        CommandEntry(
-            "probe",
-            "device_options:ProbeOptions",
-            "device:probe",
-            "Look at ports: what speaks on them, how to record it.",
-        ),
-        CommandEntry(
-            "simulate",
-            "device_options:SimulateDeviceOptions",
-            "simulate_device:simulate_device",
-            "Be a simulated stand on a port until interrupted.",
-        ),
-        CommandEntry(
-            "health",
-            "device_options:HealthOptions",
-            "health:health",
-            "Look at both gauges at rest: noise, drift, hum, range.",
-        ),
+        CommandEntry("list", "device_options:ListDevicesOptions", "device:list_devices"),
+        CommandEntry("ports", "device_options:ListPortsOptions", "device:list_ports"),
+        CommandEntry("probe", "device_options:ProbeOptions", "device:probe"),
+        CommandEntry("simulate", "device_options:SimulateDeviceOptions", "simulate_device:simulate_device"),
+        CommandEntry("health", "device_options:HealthOptions", "health:health"),
     )
 
 

@@ -80,7 +80,6 @@ def number(
 
     Parameters
     ----------
-    name : str
     above : float
         The number must be greater.
     least : float

@@ -43,9 +43,7 @@ def record_with_progress(
 def check_recording(run: RunSettings, gauges_file: Path) -> None:
     """Refuse what no run can have, before any port is opened, and say which calibration has expired.
 
-    Raises
-    ------
-    CommandError, AcquisitionError, ConfigError, RunError
+    Raises CommandError, AcquisitionError, ConfigError, RunError.
     """
     check_run_settings(run)
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()

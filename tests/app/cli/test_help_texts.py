@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from app.cli.commands import CalibrateGroup, DeviceGroup, SlipstandGroup
 from app.cli.result_options import FIGURE_FORMATS, TABLE_FORMATS
 from app.reports.figures import style
 from app.reports.table import files
@@ -48,15 +47,6 @@ def test_lists_of_commands_say_in_whole_sentences_what_they_do(
 
     assert names - {"device"} == {name for name in COMMANDS if name.split()[:-1] == list(group)}
     assert [line for line in listed if not re.search(r"[^.]\.$", line)] == []
-
-
-def test_the_list_of_commands_says_the_first_line_of_their_help(slipstand: Any) -> None:
-    entries: list[tuple[Any, tuple[str, ...]]] = [(entry, ()) for entry in SlipstandGroup.entries]
-    entries += [(entry, ("device",)) for entry in DeviceGroup.entries]
-    entries += [(entry, ("calibrate",)) for entry in CalibrateGroup.entries]
-    for entry, group in entries:
-        text = " ".join(slipstand(*group, entry.name, "--help").out.split())
-        assert entry.summary in text, entry.name
 
 
 @pytest.mark.parametrize("command", COMMANDS)
