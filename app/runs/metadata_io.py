@@ -22,21 +22,10 @@ from app.runs.metadata import EndMetadata, RunMetadata, is_field_name
 from app.version import __version__
 from config.schema import GaugeCheck
 
-EDITABLE = frozenset(
-    (
-        "title",
-        "series",
-        "pullback_m",
-        "table_mass_kg",
-        "plate_mass_kg",
-        "operator",
-        "note",
-        "conditions",
-        "gauges",
-        "stand",
-        "excluded",
-    )
-)
+EDITABLE = frozenset((
+    "title", "series", "pullback_m", "table_mass_kg", "plate_mass_kg", "operator", "note", "conditions",
+    "gauges", "stand", "excluded",
+))  # fmt: skip
 """Fields of `RunMetadata` that an edit may replace. What was measured is not among them."""
 _GAUGE_NAMES = ("table", "relative")
 

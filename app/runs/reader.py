@@ -5,7 +5,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import h5py
 import msgspec
@@ -29,7 +29,7 @@ from app.runs.metadata_io import (
 from app.runs.raw_bytes import RawBytes, read_raw_bytes
 from app.runs.saved_analyses import SavedAnalysis, read_analyses
 from app.runs.validator import Validator
-from config.schema import Gauge, Gauges
+from config.schema import Gauges
 from drivers.samples import ABSENT_BY_GAUGE, Losses
 
 T = TypeVar("T")
@@ -95,11 +95,6 @@ def open_run(path: Path | str, *, validator: Validator | None = None, trusted: b
     started. A `trusted` file, which the caller wrote or checked, is read without validation.
     """
     return validate_and_read(path, _read, validator=validator, trusted=trusted)
-
-
-def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
-    """Readings from counts."""
-    return gauge.displacement_m(counts.astype(np.float64))
 
 
 def load_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
@@ -193,7 +188,11 @@ def reading_columns(
         flags = read_column(status, rows)
         columns = zip(counts, gauges, ABSENT_BY_GAUGE, strict=False)
         return [
-            np.where((flags & absent) != 0, np.nan, calibrate(read_column(column, rows), gauge))
+            np.where(
+                (flags & absent) != 0,
+                np.nan,
+                gauge.displacement_m(read_column(column, rows).astype(np.float64)),
+            )
             for column, gauge, absent in columns
         ]
 

@@ -1,9 +1,16 @@
-"""Validate files in a child process, before this one opens them."""
+"""Validate files, which may crash or hang HDF5, in a child process before this one opens them.
+
+The process is `python -m app.runs.validator`.
+"""
 
 import atexit
 import contextlib
+import faulthandler
 import functools
+import math
 import queue
+import signal
+import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -13,21 +20,38 @@ from typing import Literal, Self
 import h5py
 import msgspec
 
-from app.child_process import ChildProcess, encode_line, json_decoder, spawn
+from app.child_process import (
+    ChildProcess,
+    CommandReader,
+    EventSender,
+    LineDecoder,
+    encode_line,
+    ignore_session_signals,
+    json_decoder,
+    reserve_stdout,
+    spawn,
+)
+from app.log import start_log
 from app.runs.errors import (
     BeingRecordedError,
     DamagedRunError,
     NotARunError,
     RunError,
     ValidationTimeoutError,
+    being_recorded,
+    damaged,
 )
-from app.runs.summary import RunSummary
+from app.runs.summary import RunSummary, summarize_file
+from app.runs.validation import validate_file
 from messages.message import Message
 
 _START_S = 60.0
 _STOP_S = 5.0
 _REPLY_S = 60.0
 """For a slow disk, or a computer that is too busy; over a file that hangs HDF5 the process ends itself."""
+_MEMORY_BYTES = 2 << 30
+_CPU_S = 2.0
+_IDLE_S = 60.0
 
 Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
 _ERRORS: dict[Fault, type[RunError]] = {
@@ -147,7 +171,7 @@ class _Child:
     def __init__(self) -> None:
         self._replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
         self._child: ChildProcess[str, ValidatorEvent] = ChildProcess(
-            spawn("app.runs.validator_process", discard_stderr=True),  # a crash becomes a fault of the file
+            spawn("app.runs.validator", discard_stderr=True),  # a crash becomes a fault of the file
             encode_line,
             decode_validator_event,
             self._replies.put,
@@ -180,3 +204,71 @@ class _Child:
         """End the process, which has nothing to lose."""
         self._child.kill()
         self._child.stop(_STOP_S)
+
+
+def main() -> None:
+    """Validate paths in this process until stdin ends: one a line as JSON, with one reply a line on stdout.
+
+    Memory and processor time are limited where the system can, so that a hostile file ends only this process.
+    """
+    start_log("validator")
+    ignore_session_signals()
+    _limit_memory()
+    events: EventSender[ValidatorEvent] = EventSender(reserve_stdout())
+    paths: CommandReader[str] = CommandReader(0, LineDecoder(json_decoder(str)))
+    events.send(ValidatorReady())
+    while not paths.is_closed:
+        if (path := paths.take(_IDLE_S)) is not None:
+            _limit_time(_CPU_S)
+            reply = _validate(path)
+            _limit_time(0.0)
+            events.send(reply)
+    events.close()
+
+
+def _limit_memory() -> None:
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with contextlib.suppress(ValueError, OSError):  # macOS may refuse
+            resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+
+
+def _limit_time(seconds: float) -> None:
+    """Let the system end this process after so much processor time; 0 lifts the limit.
+
+    Windows measures no processor time here: five times as long by the clock, as a disk may be slow.
+    """
+    if sys.platform != "win32":
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+    elif seconds:  # a thread that needs no interpreter lock, so that a hung HDF5 cannot hold it up
+        faulthandler.dump_traceback_later(5.0 * seconds, exit=True)
+    else:
+        faulthandler.cancel_dump_traceback_later()
+
+
+def _checked(summary: RunSummary) -> RunSummary:
+    """Check types and that numbers are finite: the values come from the file. Raises ValueError."""
+    for name, value in msgspec.structs.asdict(summary).items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+    return msgspec.convert(msgspec.to_builtins(summary), RunSummary)
+
+
+def _validate(path: str) -> ValidationReply:
+    try:
+        with h5py.File(path, "r", locking="best-effort") as file:
+            validate_file(file)
+            return ValidationReply(summary=_checked(summarize_file(file)))
+    except RunError as error:
+        fault: Fault = "not-a-run" if isinstance(error, NotARunError) else "damaged"
+        return ValidationReply(fault=fault, message=error.message)
+    except BlockingIOError:
+        return ValidationReply(fault="being-recorded", message=being_recorded(path).message)
+    except Exception as error:
+        return ValidationReply(fault="damaged", message=damaged(path, error).message)
+
+
+if __name__ == "__main__":
+    main()

@@ -10,7 +10,7 @@ import h5py
 import msgspec
 
 from analysis.campaign.series import RunResult, SeriesKey
-from analysis.quantities import BudgetSource, Quantity
+from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import AnalysisRequest, Progress, analyze_run
 from app.runs.batch.tasks import error_message, latest_valid_in_file, validate_and_count
@@ -173,12 +173,12 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
     """What a campaign takes of an analysed run."""
     mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
     mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
-    budget = [*document["budget"], _line(str(BudgetSource.PLATE_MASS), "plate_mass_kg", mass_u_kg)]
+    plate_mass_line = BudgetLine(BudgetSource.PLATE_MASS, "plate_mass_kg", mass_u_kg)
     return RunResult(
         name=str(path),
         series=series_key(metadata),
         results={"plate_mass_kg": mass} | result_quantities(document),
-        budget=tuple(map(read_budget_line, budget)),
+        budget=(*map(read_budget_line, document["budget"]), plate_mass_line),
         calibration_id=calibration_identity(metadata.gauges),
         stand_id=stand_identity(metadata),
         adequate=(document["model"] or {}).get("adequate"),
@@ -195,14 +195,6 @@ def series_key(metadata: RunMetadata) -> SeriesKey:
     return SeriesKey(
         metadata.series or "", contact, metadata.pullback_m, metadata.plate_mass_kg, metadata.table_mass_kg
     )
-
-
-def _line(source: str, contribution_to: str, standard_uncertainty: float) -> dict[str, Any]:
-    return {
-        "source": source,
-        "contribution_to": contribution_to,
-        "standard_uncertainty": standard_uncertainty,
-    }
 
 
 def _hash(facts: list[Any]) -> str:

@@ -1,5 +1,6 @@
 """What is exported of a run, before any format: columns of samples, rows of coefficients, facts."""
 
+import importlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.errors import ExtraMissingError
 from app.runs.reader import Run, load_counts
 from app.runs.saved_analyses import Document
 from app.runs.schema import signal_path
@@ -122,6 +124,19 @@ def run_metadata_document(run: Run) -> dict[str, Any]:
         "ending": ending,
         "changes": msgspec.to_builtins(list(run.changes)),
     }
+
+
+def import_optional(module: str, for_what: str) -> Any:
+    """Import a library of the extra `exchange`, which few need. Raises ExtraMissingError."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ExtraMissingError(
+            "{for_what} needs {package}, which is not installed. Install it: pip install {package}",
+            for_what=for_what,
+            package=package,
+        ) from None
 
 
 def _name(run: Run, gauge: int) -> str:

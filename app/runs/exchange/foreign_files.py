@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ExtraMissingError, ImportFileError
 from app.runs.exchange.columns import ForeignColumns, column_stack, find_columns
+from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_reading import CsvOptions, read_columns
-from app.runs.optional import import_optional
 from messages.message import option
 
 Reader = Callable[[Path, CsvOptions], ForeignColumns]

@@ -11,9 +11,9 @@ from app.runs.exchange.content import (
     COEFFICIENT_COLUMNS,
     ExportedRun,
     coefficient_documents,
+    import_optional,
     run_metadata_document,
 )
-from app.runs.optional import import_optional
 
 if TYPE_CHECKING:
     import pyarrow

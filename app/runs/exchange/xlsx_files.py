@@ -14,9 +14,9 @@ from app.runs.exchange.content import (
     COEFFICIENT_COLUMNS,
     ExportedRun,
     coefficient_rows,
+    import_optional,
     run_metadata_document,
 )
-from app.runs.optional import import_optional
 
 Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
 """Header and rows."""

@@ -100,7 +100,7 @@ def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
         assert owner.stdout.readline() == "armed\n"
         running = descendants_of(owner.pid)
         said = b" ".join(command_of(pid) for pid in running)
-        for module in (b"simulated_stand", b"acquisition.engine", b"runs.writer", b"validator_process"):
+        for module in (b"simulated_stand", b"acquisition.engine", b"runs.writer", b"runs.validator"):
             assert module in said
         owner.kill()
     assert all(gone(process_id, patience_s=30.0) for process_id in running)
