@@ -50,6 +50,7 @@ class SummaryCache:
         self._database = _connect(path)
         try:
             self.entries = _states(self._database)
+            """State and summary of each file by path, as they were when the cache was opened."""
         except BaseException:
             self.close()
             raise

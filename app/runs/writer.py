@@ -136,7 +136,9 @@ class RunWriter:
         self.path = Path(file.filename)
         self.losses = Losses()
         self.flushed_samples = 0
+        """Rows that the file holds whatever happens next."""
         self.usable = True
+        """False once HDF5 failed: the file then stays as it was flushed last, and must be left alone."""
         self._file = file
         self._column_paths = column_paths
         self._columns = [file[path] for path in column_paths]
