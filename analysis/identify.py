@@ -22,29 +22,8 @@ from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError
-from analysis.results.fitted_quantities import (
-    add_fitted_quantities,
-    add_no_slip_bound,
-    add_static_friction_bounds,
-    build_events,
-    find_slip_end,
-)
-from analysis.results.joint_fit import (
-    DecayConstants,
-    JointFit,
-    add_constants,
-    assess_model,
-    choose_law,
-    constants_from_joint_fit,
-    constants_from_tail,
-    fitted_curves,
-    friction_curves,
-    friction_objective,
-    identifiability_warnings,
-    inadequate_warning,
-    named_parameters,
-    tail_warnings,
-)
+from analysis.results import fitted_quantities, joint_fit
+from analysis.results.joint_fit import DecayConstants, JointFit
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
 from analysis.synthetic import Truth, simulate_record
@@ -109,27 +88,27 @@ def identify(
             fits.append(search.fit_fallback(law, widest))
 
     report(0.8, "uncertainty")
-    joint = choose_law(record, decay, problem, fits)
+    joint = joint_fit.choose_law(record, decay, problem, fits)
     adequate = joint.selection.adequate
-    slip_end = find_slip_end(joint)
+    slip_end = fitted_quantities.find_slip_end(joint)
     slip_ended = slip_end is not None or (decay.slip_end_s is not None and not adequate)
     decay = decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
     joint = replace(joint, decay=decay)
     if decay.tail is not None:
-        constants = constants_from_tail(record, decay)
+        constants = joint_fit.constants_from_tail(record, decay)
     else:
-        constants = constants_from_joint_fit(joint.chosen, joint.uncertainty)
+        constants = joint_fit.constants_from_joint_fit(joint.chosen, joint.uncertainty)
 
     budget = UncertaintyBudget()
-    add_constants(constants, budget)
-    labels = add_fitted_quantities(joint, budget, slip_ended=slip_ended)
-    add_static_friction_bounds(joint, budget)
+    joint_fit.add_constants(constants, budget)
+    labels = fitted_quantities.add_fitted_quantities(joint, budget, slip_ended=slip_ended)
+    fitted_quantities.add_static_friction_bounds(joint, budget)
     warnings = [
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
-        *(tail_warnings(decay) if decay.tail is not None else [_no_tail_warning()]),
-        *identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
+        *(joint_fit.tail_warnings(decay) if decay.tail is not None else [_no_tail_warning()]),
+        *joint_fit.identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
         *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
-        *([] if adequate else [inadequate_warning(joint.selection), *mass_warnings(joint)]),
+        *([] if adequate else [joint_fit.inadequate_warning(joint.selection), *mass_warnings(joint)]),
         *([] if model == "auto" else _needless_static(search, joint.chosen, minima)),
     ]
     drawn = None
@@ -143,12 +122,12 @@ def identify(
         labels,
         joint.selection,
         budget.lines + unstated_gains(record),
-        build_events(joint, slip_end),
+        fitted_quantities.build_events(joint, slip_end),
         warnings,
-        named_parameters(joint.chosen.parameters, decay),
-        fitted_curves(joint.chosen, decay, delays_s),
-        friction_objective(problem, joint.chosen),
-        friction_curves(joint.chosen, decay, delays_s),
+        joint_fit.named_parameters(joint.chosen.parameters, decay),
+        joint_fit.fitted_curves(joint.chosen, decay, delays_s),
+        joint_fit.friction_objective(problem, joint.chosen),
+        joint_fit.friction_curves(joint.chosen, decay, delays_s),
         drawn,
     )
 
@@ -166,9 +145,9 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
             length=format_number(decay.table.time_s[-1] - decay.release.time_s),
         )
     budget = UncertaintyBudget()
-    constants = constants_from_tail(record, decay)
-    add_constants(constants, budget)
-    add_no_slip_bound(record, constants, decay, budget)
+    constants = joint_fit.constants_from_tail(record, decay)
+    joint_fit.add_constants(constants, budget)
+    fitted_quantities.add_no_slip_bound(record, constants, decay, budget)
     if decay.relative is not None:
         seen = message("gauge 2 shows no slip")
     else:
@@ -176,7 +155,7 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
     if decay.plateau is None:
         seen = message("{seen}, unless it came before the record", seen=seen)
     text = message("{seen}: period and damping are given, and the least f_s that prevents slip.", seen=seen)
-    warnings = [*decay.warnings, *tail_warnings(decay), ResultWarning("no-slip", text)]
+    warnings = [*decay.warnings, *joint_fit.tail_warnings(decay), ResultWarning("no-slip", text)]
     if with_monte_carlo:
         text = message(
             "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
@@ -191,7 +170,7 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
 def _may_need_other_law(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
     """Whether none of `fits` explains the record, and another friction law may."""
     best = min(fits, key=lambda fit: fit.bic)
-    selection = assess_model(problem, best, fits, decay.noise_reading_counts, decay.period_s)
+    selection = joint_fit.assess_model(problem, best, fits, decay.noise_reading_counts, decay.period_s)
     return not selection.adequate and may_be_friction(problem, fits)
 
 
