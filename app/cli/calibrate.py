@@ -1,7 +1,6 @@
 """`slipstand calibrate`: counts of a gauge against a dial gauge, to a calibration file."""
 
 import datetime
-import math
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from app.cli.device_options import CalibrateOptions, CertificateOptions, Reading
 from app.cli.errors import CommandError
 from app.cli.option_values import calibration_file, check_figure_file, port_settings
 from app.cli.options import LinkOptions
-from app.runs.analysis_json import quantity_document as describe_quantity
+from app.runs.analysis_json import budget_documents, quantity_document, warning_documents
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, read_points
 from config.files import activate_calibration, config_directory, load_gauges, save_calibration
 
@@ -165,24 +164,15 @@ def calibration_document(
         "file": str(file),
         "in_use": used,
         "kept": None if kept is None else str(kept),
-        "gain_m_per_count": describe_quantity(found.gain_m_per_count),
+        "gain_m_per_count": quantity_document(found.gain_m_per_count),
         "gain_relative_standard_uncertainty": found.gain_relative_standard_uncertainty,
-        "zero_count": describe_quantity(found.zero_count),
+        "zero_count": quantity_document(found.zero_count),
         "zero_standard_uncertainty_m": found.zero_standard_uncertainty_m,
         "polynomial": list(found.polynomial),
         "displacement_standard_uncertainty_m": found.displacement_standard_uncertainty_m,
         "scatter_m": found.scatter_m,
         **{name: getattr(found.characteristics, name) for name, _ in _MERITS},
-        "budget": [
-            {
-                "source": str(line.source),
-                "contribution_to": line.contribution_to,
-                "standard_uncertainty": None
-                if math.isnan(line.standard_uncertainty)
-                else line.standard_uncertainty,
-            }
-            for line in found.budget
-        ],
+        "budget": budget_documents(found.budget),
         "readings": [
             {
                 "counts": float(counts), "dial_m": float(dial_m), "direction": "up" if way > 0 else "down",
@@ -190,7 +180,7 @@ def calibration_document(
             }
             for counts, dial_m, way, number, left in rows
         ],
-        "warnings": [{"code": caution.code, "message": str(caution.message)} for caution in found.warnings],
+        "warnings": warning_documents(found.warnings),
     }  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from app.cli import output as out
 from app.cli.device_options import CheckOptions, StepOptions
 from app.cli.errors import CommandError
 from app.cli.option_values import calibration_file, device_settings
+from app.runs.analysis_json import warning_documents
 from config.files import append_check, checks_path, load_checks, load_gauges
 from config.schema import GaugeCheck
 
@@ -152,5 +153,5 @@ def check_document(found: DisplacementCheck, entry: GaugeCheck) -> dict[str, Any
             }
             for line in found.budget
         ],
-        "warnings": [{"code": caution.code, "message": str(caution.message)} for caution in found.warnings],
+        "warnings": warning_documents(found.warnings),
     }
