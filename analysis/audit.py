@@ -13,7 +13,7 @@ from messages.message import message
 
 KILOGRAM_FORCE_N: Final = 9.80665
 FRICTION_RANGE: Final = (0.03, 0.3)
-"""Range of f_d in which a residual displacement must be reachable (PHYSICS, the paper's range)."""
+"""Range of f_d in which a residual displacement must be reachable: the range that the paper searched."""
 _POSITIVE: Final = ("plate_mass_kg", "stiffness_as_printed", "period_s", "damping_n1_per_s")
 _FIGURES: Final = (
     *_POSITIVE,
@@ -154,7 +154,7 @@ def audit(
     pullbacks_m: Mapping[str, float],
     gravity_m_per_s2: float = 9.81,
 ) -> AuditReport:
-    """Check every row of a published table by the rules of PHYSICS.md, "Checking the published table".
+    """Check every row of a published table against itself and the equations of motion.
 
     A value exactly at a limit is not flagged. The flags:
 

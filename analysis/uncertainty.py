@@ -38,7 +38,7 @@ class ParameterUncertainty:
     """Linearised distribution of the parameters about a fit."""
 
     shifts: dict[Source, Floats]
-    """(16,) float64 by source: shift of every parameter by one standard uncertainty of the source."""
+    """(p,) float64 by source: shift of every parameter by one standard uncertainty of the source."""
     noise_covariance: Floats
     """(16, 16) float64: covariance from the noise of the readings."""
 

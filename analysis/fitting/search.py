@@ -60,7 +60,7 @@ class Fit:
 
     law: FrictionLaw
     parameters: Floats
-    """(16,) float64: by `Parameter`."""
+    """(p,) float64: by `Parameter`."""
     free: Indices
     """(k,) int: places that were free."""
     normal_matrix: Floats
@@ -442,7 +442,7 @@ def range_m(value_m: Floats) -> float:
 
 
 def initial_guess(problem: FitProblem, decay: FreeDecay) -> tuple[Floats, FitProblem]:
-    """Parameters (16,) near the truth without a guess, from tail, hold and the plate's parabolas.
+    """Parameters (p,) near the truth without a guess, from tail, hold and the plate's parabolas.
 
     With them comes `problem` with what those three know as prior knowledge.
     """
@@ -548,7 +548,7 @@ def guess_release(
     ----------
     guided : FitProblem
         With prior knowledge of friction, tilt, stiffness and damping.
-    start : (16,) float64
+    start : (p,) float64
         Release and pullback in it are ignored.
     pullback_m : float or None
         Nominal pullback; any up to twice the first swing where None.
@@ -563,7 +563,7 @@ def guess_release(
 
 
 def _candidates(window: FitProblem, start: Floats, period_s: float, pullback_m: float | None) -> Floats:
-    """Every combination of release time, pullback of either sign, and f_s, (m, 16)."""
+    """Every combination of release time, pullback of either sign, and f_s, (m, p)."""
     swing = float(np.abs(window.table.value_m - start[Parameter.TABLE_OFFSET]).max())
     pullbacks = swing * np.arange(1.0, 2.0, 0.05)
     if pullback_m is not None:

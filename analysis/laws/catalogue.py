@@ -55,10 +55,10 @@ def law_by_name(name: str) -> FrictionLaw:
     )
 
 
-def law_with_own_parameters(names: Container[str]) -> FrictionLaw:
-    """The law whose own parameters are all among `names` of results; else one in closed form."""
-    fitted = (law for law in FALLBACK_LAWS if law.own and all(own.name in names for own in law.own))
-    return next(fitted, WIDEST_LAW)
+def fitted_law(name: str, results: Container[str]) -> FrictionLaw:
+    """The law of this name if its own parameters are among the results; else the widest in closed form."""
+    law = law_by_name(name)
+    return law if all(own.name in results for own in law.own) else WIDEST_LAW
 
 
 def compared_law(*, static_friction: bool, tilt: bool) -> FrictionLaw:

@@ -90,7 +90,7 @@ GaugeReadings = tuple[Floats, Floats, Floats, Floats, Floats, int]
 
 @compiled
 def chi_squares(points: Floats, readings: GaugeReadings) -> Floats:
-    """Chi-square of each of the points (m, 16), shape (m,), for laws without Stribeck friction."""
+    """Chi-square of each of the points (m, p), shape (m,), for laws in closed form."""
     result = np.empty(len(points))
     for k in range(len(points)):
         sums = _sums(points[k], readings)
@@ -100,7 +100,7 @@ def chi_squares(points: Floats, readings: GaugeReadings) -> Floats:
 
 @compiled
 def chi_squares_with_fitted_zero(points: Floats, readings: GaugeReadings) -> Floats:
-    """Chi-square of each of the points (m, 16) with gauge 2's zero at its best, shape (m,)."""
+    """Chi-square of each of the points (m, p) with gauge 2's zero at its best, shape (m,)."""
     result = np.empty(len(points))
     for k in range(len(points)):
         sums = _sums(points[k], readings)

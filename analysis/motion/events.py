@@ -1,4 +1,4 @@
-"""Compiled walk of the two-mass motion from event to event, on closed forms (PHYSICS, "Motion").
+"""Compiled walk of the two-mass motion from event to event, on closed forms.
 
 Inside a phase the table moves as u1 = u_e + e^(-n tau) (a cos w tau + b sin w tau), tau counted from the
 start of the phase. The derivative of e^(-n tau) (a cos + b sin) has the same form, so acceleration and

@@ -3,7 +3,7 @@
 The motion is ``m u'' + 2 m n u' + c u + F sign(u') = 0`` with ``x_k = F / c``. Between two turning
 points it is a damped oscillation about ``-sign(u') x_k`` that lasts half a period, so the turning points
 follow ``|X_(i+1)| = b |X_i| - (1 + b) x_k`` with ``b = exp(-n T / 2)``, and the mass stays at the first
-one inside ``|X| <= x_k`` (PHYSICS.md, "One mass"). Nothing is stepped through time.
+one inside ``|X| <= x_k`` (docs/explanation/identification.md, "One mass"). Nothing is stepped through time.
 """
 
 import math

@@ -137,7 +137,7 @@ def msk64_degree(velocity_max_m_per_s: float) -> str:
     """MSK-64 degree of a largest velocity (m/s, 0 or above).
 
     Degrees are intervals of velocity, each closed above: V (1, 2] cm/s, VI (2, 4], VII (4, 8],
-    VIII (8, 16], IX (16, 32], X (32, 64] (PHYSICS.md; Medvedev, Sponheuer and Karnik 1964). Outside them
+    VIII (8, 16], IX (16, 32], X (32, 64] (Medvedev, Sponheuer and Karnik 1964). Outside them
     "below V" or "above X". Raises AnalysisError for a velocity that is negative or not finite.
     """
     if not (math.isfinite(velocity_max_m_per_s) and velocity_max_m_per_s >= 0.0):
@@ -184,9 +184,9 @@ class Profile:
     law: FrictionLaw
     parameter: int
     parameters: Floats
-    """(16,) float64: the fit."""
+    """(p,) float64: the fit."""
     follow: Floats
-    """(16,) float64: how the others follow a step of one in the parameter, by a parabola."""
+    """(p,) float64: how the others follow a step of one in the parameter, by a parabola."""
     deviation: float
     """Standard uncertainty of the parameter by the noise, the known parameters being as fitted."""
     white: float

@@ -381,7 +381,7 @@ def constants_from_joint_fit(fit: Fit, fitted: ParameterUncertainty) -> DecayCon
 
 
 def period_and_damping(parameters: Floats) -> tuple[float, float]:
-    """Period (s) and n1 (1/s) of fitted parameters (16,)."""
+    """Period (s) and n1 (1/s) of fitted parameters (p,)."""
     return _period(parameters), _n1(parameters)
 
 

@@ -46,7 +46,7 @@ class MonteCarloModel:
 
     @property
     def values(self) -> Floats:
-        """The fitted parameters (16,), then T and n1."""
+        """The fitted parameters (p,), then T and n1."""
         return np.concatenate((self.joint.chosen.parameters, self.constants.point[:2]))
 
     def linear(self, rng: np.random.Generator, draws: int) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.identification import Identification
 from analysis.identify import warm_up as identify_once
-from analysis.laws.catalogue import law_with_own_parameters
+from analysis.laws.catalogue import fitted_law
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from analysis.record import Record
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
@@ -128,9 +128,9 @@ def _objective(found: Identification) -> Objective | None:
 
 def _motion(found: Identification, record: Record) -> Motion | None:
     """Fitted motion of both masses; None for one mass, without slip, or for an integrated law."""
-    if FRICTION.name not in found.parameters:
+    if found.model is None or FRICTION.name not in found.parameters:
         return None
-    if not law_with_own_parameters(found.results).solver.is_closed_form:
+    if not fitted_law(found.model.name, found.results).solver.is_closed_form:
         return None
     of_motion = {name: value for name, value in found.parameters.items() if name != "release_s"}
     return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])

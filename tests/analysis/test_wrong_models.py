@@ -1,4 +1,4 @@
-"""What PHYSICS.md lists as going wrong when a model is wrong: each is detected, or the right law is found."""
+"""Errors of a wrong model: each is detected, or the right law is found."""
 
 from dataclasses import replace
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, definition
 from analysis.identification import Identification
-from analysis.laws.catalogue import law_with_own_parameters
+from analysis.laws.catalogue import fitted_law
 from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
 from analysis.quantities import Quantity
 from analysis.record import Record
@@ -87,12 +87,12 @@ def _period_s(found: Identification) -> float:
 
 def _fitted_motion(record: Record, found: Identification) -> Motion | None:
     """The fitted motion to the end of the record."""
-    if "release_s" not in found.parameters:
+    if found.model is None or "release_s" not in found.parameters:
         return None
     parameters = dict(found.parameters)
     duration_s = float(record.time_s[-1]) - parameters.pop("release_s")
     of_motion = TwoMassParameters(**parameters)
-    law = law_with_own_parameters(found.results)
+    law = fitted_law(found.model.name, found.results)
     own = [found.results[parameter.name].value for parameter in law.own]
     return law.solver.simulate(of_motion, own, duration_s)
 

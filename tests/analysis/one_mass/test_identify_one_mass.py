@@ -91,7 +91,7 @@ def test_exact_readings_give_the_exact_answer(quantity):
 
 
 def test_coulomb_is_said_beside_the_classical_number():
-    # PHYSICS.md: x_k = 1 % of x0 makes a plain decrement read a damping ratio of 0.042 for a true 0.020.
+    # x_k = 1 % of x0 makes a plain decrement read a damping ratio of 0.042 for a true 0.020.
     truth = Truth(period_s=1.0, damping=0.02 * 2 * math.pi, coulomb=0.01, duration_s=20.0, noise=5e-4)
     result = identified(truth)
     assert result.results["damping_ratio"].value == pytest.approx(0.02, rel=0.02)

@@ -76,7 +76,7 @@ def test_plain_log_decrement_is_right_for_viscous_damping_only():
 
 
 def test_the_papers_warning_about_the_plain_log_decrement():
-    # PHYSICS.md: x_k = 1 % of x0 reads as a damping ratio of 0.042 for a true 0.020.
+    # x_k = 1 % of x0 reads as a damping ratio of 0.042 for a true 0.020.
     omega = 2 * math.pi
     n = 0.02 * omega / math.sqrt(1 - 0.02**2)
     time_s = np.arange(0.0, 12.0, 0.002)

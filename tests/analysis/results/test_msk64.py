@@ -1,4 +1,4 @@
-"""MSK-64 degrees against the table in PHYSICS.md."""
+"""MSK-64 degrees against the published scale (Medvedev, Sponheuer and Karnik 1964)."""
 
 import math
 

@@ -99,7 +99,7 @@ def test_a_record_without_release_is_one_line(
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [(["--model", "viscous"], "'viscous'"), (["--plate-mass", "0"], "--plate-mass 0")],
+    [(["--model", "nope"], "'nope'"), (["--plate-mass", "0"], "--plate-mass 0")],
 )
 def test_bad_options_are_one_line(
     slipstand: Any, simulated_run: Path, arguments: list[str], said: str
