@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reports_kit import truth_of
 
-from analysis.identification import Events, Identification
+from analysis.identification import Events, Identification, ModelSelection
 from analysis.identify import identify
 from analysis.laws.stribeck import simulate as simulate_stribeck
 from analysis.quantities import Quantity
@@ -134,6 +134,7 @@ def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
     found = Identification(
         "two-mass",
         {"stribeck_velocity_m_per_s": speed},
+        model=ModelSelection("stribeck+tilt", adequate=True, residual_rms_m=2e-5, noise_rms_m=2e-5),
         parameters=parameters,
         events=Events(1.0, 4.0),
     )
