@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import serial
 
-from drivers.devices.csv_lines.codec import LineDecoder, compile_decoder, encode_lines
+from drivers.devices.csv_lines.codec import LineDecoder, encode_line, encode_lines
 from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT
 from drivers.devices.gsv.codec import FrameDecoder as GsvDecoder
@@ -280,6 +280,6 @@ def port_lines_per_s(data: bytes) -> float:
 
 
 if __name__ == "__main__":
-    compile_decoder(PLAIN)
-    compile_decoder(CHECKED)
+    for layout in (PLAIN, CHECKED):  # compiled code is loaded
+        list(LineDecoder(layout, 1.0).feed(b"\n" + encode_line(layout, 0.0, 0, 0), 0))
     sys.exit(main())

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,16 +23,17 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEventLoop
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.acquisition.messages import PullbackState
+from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.ring import RingRows
 from app.presenters.composition import make_window_presenter
-from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions
+from config.files import load_gauges
 
 RATE_HZ = 2000.0
 HOUR_S = 3600.0
@@ -148,27 +149,28 @@ def starts(count: int) -> None:
 
 def hour_in_view(app: QApplication, theme: Theme, frames: Frames, count: int) -> None:
     """An hour at 2 kHz on the live plots, 1/60 s more with each frame."""
-    traces = LiveTraces(0.025, 0.025)
+    traces = replace(LiveTraces.of_gauges(load_gauges()), width_px=SIZE[0])
     plots = LivePlots(theme)
     plots.resize(*SIZE)
     plots.show()
     before_kb = memory_kb()
     feed(traces, 0.0, RELEASED_S)
-    traces.on_state_changed(PullbackState.RELEASED, RELEASED_S)
+    traces = traces.on_state(PullbackState.RELEASED, RELEASED_S, StandPosition())
     for second in np.arange(RELEASED_S, HOUR_S - 60.0, 0.5):
         feed(traces, float(second), 0.5)
     after_kb = memory_kb()
-    plots.show_traces(traces.render(SIZE[0], PULLBACK_M))
+    traces = traces.cleared(PULLBACK_M)
+    plots.show_traces(traces.traces)
     app.processEvents()
-    now_s, took = traces.history.end_s, []
+    now_s, took = traces.samples.end_s, []
     frames.clear()
     for _ in range(count):
         began = time.perf_counter()
-        feed(traces, now_s, 1.0 / FRAMES_HZ)
-        plots.show_traces(traces.render(SIZE[0], PULLBACK_M))
+        traces = traces.with_rows(rows(now_s, 1.0 / FRAMES_HZ), PULLBACK_M, None)
+        plots.show_traces(traces.traces)
         repaint(plots)
         took.append(time.perf_counter() - began)
-        now_s = traces.history.end_s
+        now_s = traces.samples.end_s
     tell(f"hour at {RATE_HZ:g} Hz in view, {SIZE[0]} x {SIZE[1]}", took)
     frames.check(count)
     grown_kb = memory_kb() - after_kb
@@ -231,8 +233,8 @@ def wire_to_screen(app: QApplication, theme: Theme, frames: Frames, seconds: flo
         app.processEvents(QEventLoop.ProcessEventsFlag.WaitForMoreEvents)
         if len(frames.ended_s) > painted and record.state.traces is not shown:
             shown = record.state.traces
-            seen.append((frames.ended_s[-1], record._display.live.history.end_s))
-    simulation = presenter._connection.simulation
+            seen.append((frames.ended_s[-1], record._model.live.samples.end_s))
+    simulation = presenter._connection.stand
     started_s = origin_s + simulation.truth().wire.started_s
     grown_kb = memory_kb() - before_kb
     window.close()
@@ -254,11 +256,17 @@ def ages_s(seen: np.ndarray, started_s: float) -> np.ndarray:
 
 
 def feed(traces: LiveTraces, start_s: float, length_s: float) -> None:
+    """Append samples without drawing them."""
+    new = rows(start_s, length_s)
+    traces.samples.append(new.time_s, np.column_stack((new.table_m, new.relative_m)))
+
+
+def rows(start_s: float, length_s: float) -> RingRows:
     first, count = round(start_s * RATE_HZ), round(length_s * RATE_HZ)
     time_s = (first + np.arange(count)) / RATE_HZ
     readings = motion_m(time_s)
     counts, status = np.zeros((count, 2)), np.zeros(count, np.uint8)
-    traces.append(RingRows(first, counts, readings, readings[:, 1], status, time_s))
+    return RingRows(first, counts, readings, readings[:, 1], status, time_s)
 
 
 def motion_m(time_s: np.ndarray) -> np.ndarray:

@@ -1,0 +1,27 @@
+"""Benchmarks and drills are run by hand: their imports must follow the modules that they measure."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+IMPORT_ALL = """
+import importlib, sys
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+"""
+
+
+def test_benchmarks_and_drills_find_what_they_import() -> None:
+    benchmarks = sorted(path.stem for path in (ROOT / "benchmarks").glob("*.py"))
+    drills = sorted(f"tests.drills.{path.stem}" for path in (ROOT / "tests" / "drills").glob("[a-z]*.py"))
+    assert "decoders" in benchmarks
+    assert "tests.drills.unplug" in drills
+    places = os.pathsep.join(
+        map(str, (ROOT, ROOT / "benchmarks", ROOT / "tests" / "analysis", ROOT / "tests"))
+    )
+    environment = os.environ | {"PYTHONPATH": places, "QT_QPA_PLATFORM": "offscreen"}
+    command = [sys.executable, "-c", IMPORT_ALL, *benchmarks, *drills]
+    ended = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
