@@ -16,7 +16,7 @@ class CommandEntry(NamedTuple):
 
     name: str
     options: str
-    """Module and class of its options, imported when the command is named: "library_options:Runs"."""
+    """Module and class of its options, imported when the command is named: "run_file_options:Runs"."""
     target: str
     """Module and function that does the work, imported when the command runs."""
     example: str = ""
@@ -94,21 +94,21 @@ class SlipstandGroup(LazyGroup):
         ),
         CommandEntry(
             "import",
-            "library_options:ImportOptions",
+            "run_file_options:ImportOptions",
             "import_record:import_record",
             example="Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm"
             " --series 1FFM0 -o test.h5",
         ),
-        CommandEntry("export", "library_options:ExportOptions", "export:export"),
+        CommandEntry("export", "run_file_options:ExportOptions", "export:export"),
         CommandEntry("table", "result_options:TableOptions", "table:table"),
         CommandEntry("figures", "result_options:FiguresOptions", "figures:figures"),
         CommandEntry("report", "result_options:ReportOptions", "report:report"),
-        CommandEntry("runs", "library_options:ListRunsOptions", "runs:runs"),
-        CommandEntry("recover", "library_options:RecoverOptions", "recover:recover"),
-        CommandEntry("edit", "library_options:EditOptions", "edit:edit"),
-        CommandEntry("trash", "library_options:TrashOptions", "runs:trash"),
+        CommandEntry("runs", "run_file_options:ListRunsOptions", "runs:runs"),
+        CommandEntry("recover", "run_file_options:RecoverOptions", "recover:recover"),
+        CommandEntry("edit", "run_file_options:EditOptions", "edit:edit"),
+        CommandEntry("trash", "run_file_options:TrashOptions", "runs:trash"),
         CommandEntry("audit", "result_options:AuditOptions", "audit:audit"),
-        CommandEntry("doctor", "library_options:DoctorOptions", "doctor.command:doctor"),
+        CommandEntry("doctor", "run_file_options:DoctorOptions", "doctor.command:doctor"),
         CommandEntry(
             "calibrate", "device_options:CalibrateOptions", "calibrate:calibrate", group=CalibrateGroup
         ),

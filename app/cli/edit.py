@@ -8,8 +8,8 @@ import msgspec
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.library_options import EditOptions
 from app.cli.option_values import key_values
+from app.cli.run_file_options import EditOptions
 from app.runs.edits import edit_run, series_fields, undo_edit
 from app.runs.metadata import Conditions
 from app.runs.metadata_io import Change

@@ -4,7 +4,7 @@ import msgspec
 import typer
 
 from app.cli import output as out
-from app.cli.library_options import ExportOptions
+from app.cli.run_file_options import ExportOptions
 from app.runs.exchange.exporting import ExportRequest, export_runs
 
 

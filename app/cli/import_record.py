@@ -4,8 +4,8 @@ import msgspec
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.library_options import FileOptions, ImportOptions
 from app.cli.option_values import checked_conditions, print_mass_overrides
+from app.cli.run_file_options import FileOptions, ImportOptions
 from app.runs.exchange.importing import CsvImport, import_csv
 from config.files import load_stand
 

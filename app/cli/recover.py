@@ -7,7 +7,7 @@ import typer
 
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.cli import output as out
-from app.cli.library_options import RecoverOptions
+from app.cli.run_file_options import RecoverOptions
 from app.runs.journal import unfinished_journals
 from app.runs.paths import journal_fallback_folders, recordings_directory
 

@@ -7,8 +7,8 @@ import msgspec
 from analysis.formatting import format_value
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.library_options import ListRunsOptions, TrashOptions
 from app.cli.recover import print_unfinished_runs
+from app.cli.run_file_options import ListRunsOptions, TrashOptions
 from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
 from app.runs.listing import RunFilter, list_runs
 from app.runs.paths import recordings_directory

@@ -8,7 +8,7 @@ import typer
 
 from app.cli import output as out
 from app.cli.doctor import Finding, FindingState, fail
-from app.cli.library_options import DoctorOptions
+from app.cli.run_file_options import DoctorOptions
 
 
 def doctor(options: DoctorOptions) -> None:
