@@ -6,6 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+from config.schema import Gauges
 from messages.i18n import N_, gettext, ngettext
 
 State = TypeVar("State")
@@ -39,6 +40,9 @@ class Presenter(Generic[State]):
 
     def tick(self) -> None:
         """Process what has come from workers and the engine; called some 60 times a second."""
+
+    def on_gauges(self, gauges: Gauges) -> None:
+        """React to other calibrations being in use."""
 
     def close(self) -> None:
         """End the workers."""

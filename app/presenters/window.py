@@ -204,7 +204,8 @@ class WindowPresenter(Presenter[WindowState]):
             self._open_again()
 
     def set_gauges(self, gauges: Gauges) -> None:
-        self.record.dispatch(gauges)
+        for presenter in self.presenters.values():
+            presenter.on_gauges(gauges)
 
     def ask_to_recover(self) -> None:
         count = self._count_unfinished()

@@ -30,6 +30,7 @@ from app.presenters.record.state import (
 )
 from app.presenters.results import sentence
 from app.presenters.worker import LazyFunction, Worker
+from config.schema import Gauges
 from messages.i18n import N_, gettext, translate
 
 _EXECUTE = LazyFunction("app.presenters.record.tasks", "execute")
@@ -97,6 +98,9 @@ class RecordPresenter(Presenter[RecordState]):
         rows = self._connection.new_rows()
         if rows is not None and len(rows):
             self.dispatch(rows)
+
+    def on_gauges(self, gauges: Gauges) -> None:
+        self.dispatch(gauges)
 
     def close(self) -> None:
         """Wait until decisions are stored, then end the worker."""

@@ -25,7 +25,6 @@ U8, U16, S16 = 0x01, 0x02, 0x82
 HAS_TIMESTAMP = 0x10
 """Bit of the payload type: a timestamp comes first."""
 MIN_MESSAGE_BYTES = 6
-MAX_MESSAGE_BYTES = 256
 WHO_AM_I = 1232
 TICKS_PER_S = 31_250
 _TIME = 6

@@ -17,6 +17,7 @@ from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
 from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, WindowContext, WindowPresenter
+from config.files import load_gauges
 
 
 class Desk:
@@ -213,3 +214,20 @@ def test_gauge_2_gets_a_port_of_its_own_beside_what_is_filled_in(desk: Desk) -> 
     desk.window.fill_second_port("COM8")
     assert desk.window.start.state.form == ConnectForm("COM7", "csv", relative_port="COM8")
     assert desk.window.state.screen is Screen.START
+
+
+def test_other_calibrations_reach_every_screen(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    reached = []
+    for presenter in desk.window.presenters.values():
+        monkeypatch.setattr(presenter, "on_gauges", lambda gauges, to=presenter: reached.append((to, gauges)))
+    gauges = load_gauges()
+
+    desk.window.set_gauges(gauges)
+
+    assert reached == [(presenter, gauges) for presenter in desk.window.presenters.values()]
+
+
+def test_record_measures_with_other_calibrations(desk: Desk) -> None:
+    gauges = load_gauges()
+    desk.window.set_gauges(gauges)
+    assert desk.window.record._model.stand.gauges is gauges
