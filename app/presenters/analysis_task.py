@@ -13,7 +13,7 @@ from analysis.record import Record
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.presenters.analysed_run import AnalysedRun, AnalysisTask, Channel, Kinematics, Objective
 from app.presenters.base import Progress, ReportProgress
-from app.presenters.recovery import RecoverFolder, RecoveryReport
+from app.presenters.recovery import RecoveryReport
 from app.presenters.results import FRICTION, sentence
 from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
 from app.runs.paths import journal_folders
@@ -77,19 +77,19 @@ def cached_analysis(task: AnalysisTask, report: ReportProgress) -> Analysis:
     return _AnalysisCache.analyses[task]
 
 
-def warm_up(_nothing: None, _report: ReportProgress) -> None:
+def warm_up() -> None:
     """Identify a simulated record, so that all code is loaded, and compiled on a first start."""
     identify_once()
 
 
-def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
-    """Finish the runs of a folder that a crash has left unfinished."""
+def recover_runs(folder: str, report: ReportProgress) -> RecoveryReport:
+    """Finish the runs of a folder that a crash has left unfinished, with journals in fallback folders."""
     found: list[Recovery] = []
-    for folder in journal_folders(Path(task.folder)):
+    for place in journal_folders(Path(folder)):
         found += recover_folder(
-            folder,
+            place,
             lambda journal, share: report(Progress(gettext("Recovering {name}", name=journal.stem), share)),
-            original_folder=Path(task.folder),
+            original_folder=Path(folder),
         )
     return RecoveryReport(
         runs=tuple(one.run for one in found if one.run),

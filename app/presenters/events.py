@@ -10,6 +10,14 @@ Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, slots=True)
+class TaskFailure:
+    """Why a task has failed."""
+
+    message: Message
+    is_cancelled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TaskDone(Generic[Answer]):
     """A task has returned `answer`."""
 

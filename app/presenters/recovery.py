@@ -12,15 +12,8 @@ LATER = N_("Later")
 
 
 @dataclass(frozen=True, slots=True)
-class RecoverFolder:
-    """Task to finish all runs of a folder, with their journals in fallback folders."""
-
-    folder: str
-
-
-@dataclass(frozen=True, slots=True)
 class RecoveryReport:
-    """Answer to `RecoverFolder`: paths of recovered runs and of replaced files, and errors."""
+    """Paths of recovered runs and of replaced files, and errors."""
 
     runs: tuple[str, ...] = ()
     replaced_files: tuple[str, ...] = ()

@@ -5,19 +5,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Notice, Presenter, Tone
+from app.presenters.base import Notice, Presenter, Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
-from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.events import SimulationStarted, TaskFailed, TaskFailure, TaskProgress
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import IdentifyTask
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
@@ -26,7 +25,7 @@ from app.presenters.record.state import (
     RunsChanged,
     StandContext,
 )
-from app.presenters.recovery import LATER, RECOVER, RecoverFolder
+from app.presenters.recovery import LATER, RECOVER, RecoveryReport
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
@@ -34,16 +33,18 @@ from app.presenters.screens import Screen, ScreenContext
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
-from app.presenters.worker import LazyFunction, Worker, WorkerPool
+from app.presenters.worker import EventWorker, LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
 from messages.message import Message
 
+if TYPE_CHECKING:
+    from app.presenters import analysis_task
+else:
+    analysis_task = LazyModule("app.presenters.analysis_task")
+
 RECONNECT = N_("Connect again")
-ANALYSE = LazyFunction("app.presenters.analysis_task", "analyse_run")
-WARM_UP = LazyFunction("app.presenters.analysis_task", "warm_up")
-RECOVER_RUNS = LazyFunction("app.presenters.analysis_task", "recover_runs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +74,11 @@ class Workers:
     analysis: Worker
     """Identifies recorded and opened runs, in a process of its own that has the analysis loaded."""
     record: Worker
-    runs: Worker
-    batch: Worker
-    campaign: Worker
-    gauges: Worker
-    ports: Worker
+    runs: EventWorker
+    batch: EventWorker
+    campaign: EventWorker
+    gauges: EventWorker
+    ports: EventWorker
     pool: WorkerPool = field(default_factory=WorkerPool)
     report_error: Callable[[ErrorReport], None] = lambda _error: None
 
@@ -85,7 +86,8 @@ class Workers:
     def sharing(cls, report_error: Callable[[ErrorReport], None]) -> "Workers":
         """Make workers that share processes, all but the analysis."""
         pool = WorkerPool()
-        record, runs, batch, campaign, gauges, ports = (Worker(report_error, pool) for _ in range(6))
+        record = Worker(report_error, pool)
+        runs, batch, campaign, gauges, ports = (EventWorker(Worker(report_error, pool)) for _ in range(5))
         analysis = Worker(report_error)
         return cls(analysis, record, runs, batch, campaign, gauges, ports, pool, report_error)
 
@@ -116,7 +118,7 @@ class WindowPresenter(Presenter[WindowState]):
         stand, author = context.stand, getpass.getuser()
         self.start = StartPresenter(context.start, self, context.list_ports)
         self.record = RecordPresenter(connection, stand, workers.record, author)
-        self.identify = IdentifyPresenter(workers.analysis, self._poll_analysis)
+        self.identify = IdentifyPresenter(workers.analysis, workers.analysis.poll)
         self.gauges = GaugesPresenter(workers.gauges, workers.ports, stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
@@ -151,8 +153,7 @@ class WindowPresenter(Presenter[WindowState]):
         offered = self.state.notice.action if self.state.notice else ""
         self._update(notice=None)
         if offered == RECOVER:
-            self._update(notice=recovery.recovery_progress())
-            self._workers.analysis.submit(RECOVER_RUNS, RecoverFolder(self._folder))
+            self._recover_runs()
         else:
             self.reconnect()
 
@@ -178,7 +179,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.on_opening(path)
         self.show_screen(Screen.IDENTIFY)
         self._update(notice=None)
-        self._workers.analysis.submit(ANALYSE, path)
+        self._analyse(path)
 
     def show_runs(self, folder: str, series: str) -> None:
         if folder != self.runs.state.folder:
@@ -214,7 +215,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def warm_up(self) -> None:
         """Load the analysis, so that the first one is as fast as the others."""
-        self._workers.analysis.submit(WARM_UP, None)
+        self._workers.analysis.submit(analysis_task.warm_up)
 
     def tick(self) -> None:
         """Process events of engine and workers, and new samples; called some 60 times a second."""
@@ -224,7 +225,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_engine_event(event)
         for presenter in self.presenters.values():
             presenter.tick()
-        self._poll_analysis()
+        self._workers.analysis.poll()
 
     def close(self) -> None:
         self._connection.close()
@@ -283,39 +284,47 @@ class WindowPresenter(Presenter[WindowState]):
         if event.path:
             self._true_frictions[event.path] = self._true_friction
             self.identify.on_opening(event.path)
-            self._workers.analysis.submit(ANALYSE, event.path)
+            self._analyse(event.path)
 
     def _failure_notice(self, message: Message | str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
         if self._count_unfinished():
             return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
         return Notice(sentence(message), tone, action)
 
-    def _poll_analysis(self) -> None:
-        for event in self._workers.analysis.poll():
-            self._on_analysis_event(event)
+    def _recover_runs(self) -> None:
+        self._update(notice=recovery.recovery_progress())
+        self._workers.analysis.submit(
+            analysis_task.recover_runs,
+            self._folder,
+            done=self._on_recovered,
+            failed=self._on_recovery_failed,
+            progress=lambda progress: self._update(notice=recovery.recovery_progress(progress)),
+        )
 
-    def _on_recovery_event(self, event: WorkerEvent) -> None:
-        match event:
-            case TaskProgress(_, progress):
-                self._update(notice=recovery.recovery_progress(progress))
-            case TaskFailed(_, message):
-                self._update(notice=Notice(sentence(message), Tone.BAD, RECOVER, LATER))
-            case TaskDone(_, report):
-                self._update(notice=recovery.recovery_outcome(report))
-                self.record.dispatch(RunsChanged())
+    def _on_recovered(self, report: RecoveryReport) -> None:
+        self._update(notice=recovery.recovery_outcome(report))
+        self.record.dispatch(RunsChanged())
 
-    def _on_analysis_event(self, event: WorkerEvent) -> None:
-        match event:
-            case _ if isinstance(event.argument, RecoverFolder):
-                self._on_recovery_event(event)
-            case _ if isinstance(event.argument, IdentifyTask):
-                self.identify.on_event(event)
-            case TaskProgress(path, progress):
-                self.record.dispatch(event)
-                self.identify.on_progress(path, progress)
-            case TaskFailed(path, message):
-                self.record.dispatch(event)
-                self.identify.on_failed(path, message)
-            case TaskDone(path, AnalysedRun() as run):
-                self.record.dispatch(run)
-                self.identify.on_analysed(run, self._true_frictions.get(path))
+    def _on_recovery_failed(self, failure: TaskFailure) -> None:
+        self._update(notice=Notice(sentence(failure.message), Tone.BAD, RECOVER, LATER))
+
+    def _analyse(self, path: str) -> None:
+        self._workers.analysis.submit(
+            analysis_task.analyse_run,
+            path,
+            done=self._on_analysed,
+            failed=partial(self._on_analysis_failed, path),
+            progress=partial(self._on_analysis_progress, path),
+        )
+
+    def _on_analysed(self, run: AnalysedRun) -> None:
+        self.record.dispatch(run)
+        self.identify.on_analysed(run, self._true_frictions.get(str(run.path)))
+
+    def _on_analysis_failed(self, path: str, failure: TaskFailure) -> None:
+        self.record.dispatch(TaskFailed(path, failure.message))
+        self.identify.on_failed(path, failure.message)
+
+    def _on_analysis_progress(self, path: str, progress: Progress) -> None:
+        self.record.dispatch(TaskProgress(path, progress))
+        self.identify.on_progress(path, progress)

@@ -9,19 +9,20 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, TypeVar, TypeVarTuple, overload
 
 from app.log import start_log
 from app.presenters.base import ReportProgress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.events import TaskDone, TaskFailed, TaskFailure, TaskProgress, WorkerEvent
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import language, use_language
 from messages.message import message
 
-Task = Callable[[Any, ReportProgress], Any]
-"""Module-level function that takes its argument and a function to report progress with."""
+Answer = TypeVar("Answer")
+Arguments = TypeVarTuple("Arguments")
 CANCELLED = message("The analysis was given up. Open the recording to repeat it")
 _PROCESS_DIED = message(
     "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
@@ -31,6 +32,23 @@ _GRACE_S = 3.0
 _END_S = 4.0
 """A process that has not ended after this time is killed: a little more than `_GRACE_S`."""
 _log = logging.getLogger(__name__)
+
+
+def _ignore(_: object) -> None:
+    pass
+
+
+class LazyModule:
+    """Module whose functions are imported where they are called: in the child process, not in the window.
+
+    Type checkers see the module itself where it is imported `if TYPE_CHECKING` and made `else`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, name: str) -> "LazyFunction":
+        return LazyFunction(self._name, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +90,18 @@ class WorkerPool:
             process.join()
 
 
+@dataclass(frozen=True, slots=True)
+class _Task:
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    reports: bool
+    done: Callable[[Any], object]
+    failed: Callable[[TaskFailure], object]
+    progress: Callable[[Any], object]
+
+
 class Worker:
-    """Carries out tasks in a child process, one after another.
+    """Calls functions in a child process, one after another.
 
     No method but `close`, which must be called, waits. `report_error` takes errors of the program itself, in
     addition to the failure of the task. Workers with a `pool` share its processes; a worker without one keeps
@@ -82,44 +110,65 @@ class Worker:
 
     def __init__(
         self,
-        report_error: Callable[[ErrorReport], None] = lambda _error: None,
+        report_error: Callable[[ErrorReport], None] = _ignore,
         pool: WorkerPool | None = None,
     ) -> None:
         self._report_error = report_error
         self._pool = pool
         self._process: _TaskProcess | None = None
         self._ending: list[_TaskProcess] = []
-        self._waiting: deque[tuple[Task, Any]] = deque()
-        self._cancelled: list[WorkerEvent] = []
+        self._waiting: deque[_Task] = deque()
+        self._cancelled: deque[_Task] = deque()
 
     @property
     def is_busy(self) -> bool:
         return bool(self._waiting)
 
-    def submit(self, task: Task, argument: Any) -> None:
-        """Call `task(argument, report)` after the tasks submitted before; both must be picklable."""
-        self._waiting.append((task, argument))
-        if self._process is None:
-            self._process = _TaskProcess() if self._pool is None else self._pool.acquire()
-        self._process.send(task, argument)
+    @overload
+    def submit(
+        self,
+        function: Callable[[*Arguments], Answer],
+        *arguments: *Arguments,
+        done: Callable[[Answer], object] = ...,
+        failed: Callable[[TaskFailure], object] = ...,
+    ) -> None: ...
+    @overload
+    def submit(
+        self,
+        function: Callable[[*Arguments, ReportProgress], Answer],
+        *arguments: *Arguments,
+        done: Callable[[Answer], object] = ...,
+        failed: Callable[[TaskFailure], object] = ...,
+        progress: Callable[[Any], object],
+    ) -> None: ...
+    def submit(
+        self,
+        function: Callable[..., Answer],
+        *arguments: *Arguments,
+        done: Callable[[Answer], object] = _ignore,
+        failed: Callable[[TaskFailure], object] = _ignore,
+        progress: Callable[[Any], object] | None = None,
+    ) -> None:
+        """Call `function(*arguments)` after the tasks submitted before; all must be picklable.
 
-    def poll(self) -> list[WorkerEvent]:
-        events, self._cancelled = self._cancelled, []
+        `poll` calls `done` with what it returns, or `failed`. With `progress`, the function gets one more
+        argument: a function whose argument is passed on to `progress`.
+        """
+        task = _Task(function, arguments, progress is not None, done, failed, progress or _ignore)
+        self._send(task)
+
+    def poll(self) -> None:
+        """Call the callbacks of tasks that have ended, failed or reported progress."""
         self._ending = [process for process in self._ending if not process.has_ended()]
-        try:
-            while self._process is not None and (received := self._process.receive()) is not None:
-                events.append(self._event_of(*received))
-        except (EOFError, OSError):
-            events += self._on_process_death()
+        while (callback := self._next_callback()) is not None:
+            callback()
         if self._process is not None and self._pool is not None and not self._waiting:
             self._pool.release(self._process)
             self._process = None
-        return events
 
     def cancel(self) -> None:
         """Abort all tasks, which fail; the next task starts another process."""
-        for _, argument in self._waiting:
-            self._cancelled.append(TaskFailed(argument, CANCELLED, is_cancelled=True))
+        self._cancelled += self._waiting
         self._waiting.clear()
         self._end(abort=True)
 
@@ -131,33 +180,74 @@ class Worker:
             process.join()
         self._ending.clear()
 
+    def _send(self, task: _Task) -> None:
+        self._waiting.append(task)
+        if self._process is None:
+            self._process = _TaskProcess() if self._pool is None else self._pool.acquire()
+        self._process.send(task)
+
     def _end(self, *, abort: bool) -> None:
         if self._process is not None:
             (self._process.abort if abort else self._process.detach)()
             self._ending.append(self._process)
             self._process = None
 
-    def _event_of(self, kind: str, content: Any) -> WorkerEvent:
-        argument = self._waiting[0][1]
+    def _next_callback(self) -> Callable[[], object] | None:
+        if self._cancelled:
+            return partial(self._cancelled.popleft().failed, TaskFailure(CANCELLED, is_cancelled=True))
+        if self._process is None:
+            return None
+        try:
+            received = self._process.receive()
+        except (EOFError, OSError):
+            return self._on_process_death()
+        if received is None:
+            return None
+        kind, content = received
         if kind == "progress":
-            return TaskProgress(argument, content)
-        self._waiting.popleft()
+            return partial(self._waiting[0].progress, content)
+        task = self._waiting.popleft()
         if kind == "done":
-            return TaskDone(argument, content)
+            return partial(task.done, content)
         if kind == "error":
             self._report_error(content)
-        return TaskFailed(argument, content.message)
+        return partial(task.failed, TaskFailure(content.message))
 
-    def _on_process_death(self) -> list[WorkerEvent]:
+    def _on_process_death(self) -> Callable[[], object] | None:
         self._end(abort=True)
         if not self._waiting:
-            return []
+            return None
         _log.error("process of a worker ended unexpectedly")
-        _, argument = self._waiting.popleft()
-        waiting, self._waiting = self._waiting, deque()
-        for task, later in waiting:
-            self.submit(task, later)
-        return [TaskFailed(argument, _PROCESS_DIED)]
+        failed, *later = self._waiting
+        self._waiting.clear()
+        for task in later:
+            self._send(task)
+        return partial(failed.failed, TaskFailure(_PROCESS_DIED))
+
+
+class EventWorker:
+    """Worker that returns events with the argument of their task."""
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._events: list[WorkerEvent] = []
+        self.cancel, self.close = worker.cancel, worker.close
+
+    def submit(self, task: Callable[..., Any], argument: Any) -> None:
+        add = self._events.append
+        self._worker.submit(
+            task,
+            argument,
+            done=lambda answer: add(TaskDone(argument, answer)),
+            failed=lambda failure: add(TaskFailed(argument, failure.message, failure.is_cancelled)),
+            progress=lambda progress: add(TaskProgress(argument, progress)),
+        )
+
+    def poll(self) -> list[WorkerEvent]:
+        self._worker.poll()
+        events = self._events.copy()
+        self._events.clear()
+        return events
 
 
 class _TaskProcess:
@@ -188,9 +278,9 @@ class _TaskProcess:
             return False
         return self._process.is_alive()
 
-    def send(self, task: Task, argument: Any) -> None:
+    def send(self, task: _Task) -> None:
         with contextlib.suppress(OSError):  # `receive` notices a dead process
-            self._pipe.send((task, argument))
+            self._pipe.send((task.function, task.arguments, task.reports))
 
     def receive(self) -> tuple[str, Any] | None:
         """Next message; None without any. Raises EOFError, OSError where the process has died."""
@@ -235,13 +325,14 @@ def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
     start_log("worker")
     use_language(language_code)
     exit_with_parent(lifeline, _GRACE_S)
+    report = (lambda progress: pipe.send(("progress", progress)),)
     with contextlib.suppress(EOFError, OSError):
         while True:
-            task, argument = pipe.recv()
-            name = task.name if isinstance(task, LazyFunction) else getattr(task, "__name__", "task")
+            function, arguments, reports = pipe.recv()
+            name = function.name if isinstance(function, LazyFunction) else function.__name__
             _log.info("task %s starts", name)
             try:
-                answer = task(argument, lambda progress: pipe.send(("progress", progress)))
+                answer = function(*arguments, *(report if reports else ()))
             except Exception as error:
                 _log.warning("task %s failed: %s", name, error)
                 pipe.send(("failed" if is_user_error(error) else "error", error_report(error)))

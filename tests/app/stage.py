@@ -2,7 +2,7 @@
 
 import datetime
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +29,10 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
+from app.presenters.events import TaskFailure
 from app.presenters.record.state import StandContext
 from app.presenters.window import Workers
+from app.presenters.worker import CANCELLED
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -301,19 +303,45 @@ class RecordingView:
         self.states.append(state)
 
 
+@dataclass(frozen=True)
+class Call:
+    """A call that a presenter has submitted; a test answers it with one of the callbacks."""
+
+    function: Any
+    arguments: tuple[Any, ...]
+    done: Callable[[Any], object] = lambda _: None
+    failed: Callable[[TaskFailure], object] = lambda _: None
+    progress: Callable[[Any], object] = lambda _: None
+
+    @property
+    def name(self) -> str:
+        return getattr(self.function, "name", "") or self.function.__name__
+
+    def fail(self, text: str) -> None:
+        self.failed(TaskFailure(message("{text}", text=text)))
+
+    def cancel(self) -> None:
+        self.failed(TaskFailure(CANCELLED, is_cancelled=True))
+
+
 class FakeWorker:
-    """Keeps tasks; a test puts what came of them into `news`."""
+    """Keeps calls for a test to answer; for an `EventWorker`, a test puts events into `news`."""
 
     is_busy = False
 
     def __init__(self) -> None:
-        self.submitted: list[tuple[Callable[..., Any], Any]] = []
+        self.calls: list[Call] = []
         self.news: list[Any] = []
         self.cancelled = 0
         self.closed = False
 
-    def submit(self, task: Callable[..., Any], argument: Any) -> None:
-        self.submitted.append((task, argument))
+    @property
+    def submitted(self) -> list[tuple[Any, Any]]:
+        """Function and only argument of each call."""
+        return [(call.function, call.arguments[0]) for call in self.calls]
+
+    def submit(self, function: Callable[..., Any], *arguments: Any, **callbacks: Any) -> None:
+        self.calls.append(Call(function, arguments, **callbacks))
 
     def poll(self) -> list[Any]:
         news, self.news = self.news, []

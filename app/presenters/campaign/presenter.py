@@ -20,7 +20,7 @@ from app.presenters.campaign.tasks import (
 from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import Worker
+from app.presenters.worker import EventWorker
 from messages.i18n import gettext, ngettext
 
 
@@ -36,7 +36,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     """Campaign of a folder: `author` is recorded with each exclusion, `close` ends the worker."""
 
     def __init__(
-        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
+        self, worker: EventWorker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
     ) -> None:
         rows = formatting.table_rows(None, all_series)
         super().__init__(CampaignState(folder=folder, columns=formatting.column_titles(), rows=rows))

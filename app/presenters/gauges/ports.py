@@ -9,7 +9,7 @@ from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import LazyFunction, Worker
+from app.presenters.worker import EventWorker, LazyFunction
 from messages.i18n import gettext
 
 LIST_PORTS: Final = LazyFunction("app.presenters.gauges.port_tasks", "list_port_cards")
@@ -32,7 +32,7 @@ class ProbePorts:
 class PortsPresenter(Presenter[PortsState]):
     """Runs one probe at a time, in a worker of its own: cancelling a probe ends its process."""
 
-    def __init__(self, worker: Worker, navigator: Navigator) -> None:
+    def __init__(self, worker: EventWorker, navigator: Navigator) -> None:
         super().__init__(PortsState())
         self._worker = worker
         self._navigator = navigator

@@ -26,7 +26,7 @@ from app.presenters.gauges.tasks import (
 )
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import Worker
+from app.presenters.worker import EventWorker
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import N_, gettext
 from messages.message import Message
@@ -49,8 +49,8 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def __init__(
         self,
-        worker: Worker,
-        port_worker: Worker,
+        worker: EventWorker,
+        port_worker: EventWorker,
         gauges: Gauges,
         navigator: Navigator,
         now: Callable[[], datetime.datetime] = datetime.datetime.now,

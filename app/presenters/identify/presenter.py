@@ -24,6 +24,7 @@ from app.presenters.identify.state import (
     Cursors,
     EstimateClassical,
     IdentifyState,
+    IdentifyTask,
     ManualSimulation,
     PlotTab,
     SimulateFriction,
@@ -126,13 +127,13 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             )
         else:
             self._update(progress=Progress(gettext("Fitting {law}", law=name)))
-            self._worker.submit(RUN_ANALYSIS, AnalysisTask(self._path, name))
+            self._submit(RUN_ANALYSIS, AnalysisTask(self._path, name))
 
     def analyse_as_alternative(self) -> None:
         if self.state.alternative_kind is not None and self.state.progress is None:
             task = AnalysisTask(self._path, kind=self.state.alternative_kind)
             self._update(progress=Progress(gettext("Reading the run")), failure="")
-            self._worker.submit(RUN_ANALYSIS, task)
+            self._submit(RUN_ANALYSIS, task)
 
     def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
         self._span = start_s, end_s, pixels
@@ -149,7 +150,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._next_friction = friction
             return
         self._pending = SimulateFriction(self._path, friction, self._drawn_span(shown), shown.task.model)
-        self._worker.submit(SIMULATE_FRICTION, self._pending)
+        self._submit(SIMULATE_FRICTION, self._pending)
 
     def poll(self) -> bool:
         """Process events; True while a simulation is pending."""
@@ -177,6 +178,15 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def step_cursor(self, samples: int) -> None:
         if self.state.cursors is not None and self.state.curves is not None:
             self._set_cursors(step_cursor(self.state.cursors, self.state.curves.time_s, samples))
+
+    def _submit(self, function: LazyFunction, task: IdentifyTask) -> None:
+        self._worker.submit(
+            function,
+            task,
+            done=lambda answer: self.on_event(TaskDone(task, answer)),
+            failed=lambda failure: self.on_event(TaskFailed(task, failure.message, failure.is_cancelled)),
+            progress=lambda progress: self.on_event(TaskProgress(task, progress)),
+        )
 
     def _show(self, shown: _Shown) -> None:
         """Show a variant of a run; cursors keep their moments."""
@@ -208,7 +218,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if cursors is not None and before is not None:
             self._set_cursors(shift_cursors(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
-            self._worker.submit(ESTIMATE_CLASSICAL, EstimateClassical(self._path, shown.task.model))
+            self._submit(ESTIMATE_CLASSICAL, EstimateClassical(self._path, shown.task.model))
 
     def _on_variant(self, task: AnalysisTask, run: AnalysedRun) -> None:
         """Show another law beside those of the first analysis, or another kind of analysis."""

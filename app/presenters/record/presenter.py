@@ -1,9 +1,10 @@
 """Presenter of the Record screen: dispatches events to the reducer, carries out effects, shows the state."""
 
 import time
+from typing import TYPE_CHECKING, Any
 
 from app.acquisition.guidance import guidance_for
-from app.acquisition.messages import Arm, PullbackState, Quit, Stop
+from app.acquisition.messages import Command, PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
@@ -29,11 +30,15 @@ from app.presenters.record.state import (
     StepStatus,
 )
 from app.presenters.results import sentence
-from app.presenters.worker import LazyFunction, Worker
+from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
 from messages.i18n import N_, gettext, translate
 
-_EXECUTE = LazyFunction("app.presenters.record.tasks", "execute")
+if TYPE_CHECKING:
+    from app.presenters.record import tasks
+else:
+    tasks = LazyModule("app.presenters.record.tasks")
+
 _STEPS: tuple[tuple[str, frozenset[PullbackState]], ...] = (
     (N_("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
     (N_("Pull"), frozenset({PullbackState.PULLING})),
@@ -76,8 +81,6 @@ class RecordPresenter(Presenter[RecordState]):
         return session.is_recording or session.engine is PullbackState.CLOSING
 
     def dispatch(self, event: RecordEvent) -> None:
-        if isinstance(event, TaskDone | TaskFailed) and event.argument in self._unfinished:
-            self._unfinished.remove(event.argument)
         before = self._model
         self._model, effects = reduce(before, event)
         for effect in effects:
@@ -93,7 +96,7 @@ class RecordPresenter(Presenter[RecordState]):
 
     def tick(self) -> None:
         """Take answers of the worker and new samples; to be called some 60 times a second."""
-        self._poll_files()
+        self._files.poll()
         self.dispatch(ClockTicked(self._model.stand.clock()))
         rows = self._connection.new_rows()
         if rows is not None and len(rows):
@@ -106,22 +109,27 @@ class RecordPresenter(Presenter[RecordState]):
         """Wait until decisions are stored, then end the worker."""
         until_s = time.monotonic() + self.CLOSE_S
         while self._unfinished and self._files.is_busy and time.monotonic() < until_s:
-            self._poll_files()
+            self._files.poll()
             time.sleep(0.005)
         self._files.close()
 
-    def _poll_files(self) -> None:
-        for event in self._files.poll():
-            if isinstance(event, TaskDone | TaskFailed):
-                self.dispatch(event)
-
     def _execute(self, effect: Effect) -> None:
-        if isinstance(effect, Arm | Stop | Quit):
+        if isinstance(effect, Command):
             self._connection.send(effect)
             return
         if isinstance(effect, KeepRun | MoveToTrash | RestoreFromTrash | SavePlan):
             self._unfinished.append(effect)
-        self._files.submit(_EXECUTE, effect)
+        self._files.submit(
+            tasks.execute,
+            effect,
+            done=lambda answer: self._on_task_ended(TaskDone(effect, answer)),
+            failed=lambda failure: self._on_task_ended(TaskFailed(effect, failure.message)),
+        )
+
+    def _on_task_ended(self, event: TaskDone[Any] | TaskFailed) -> None:
+        if event.argument in self._unfinished:
+            self._unfinished.remove(event.argument)
+        self.dispatch(event)
 
 
 def record_state(model: RecordModel) -> RecordState:

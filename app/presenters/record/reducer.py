@@ -121,9 +121,8 @@ class _Reduction:
                 self._on_task_done(task, answer)
             case AnalysedRun() | TaskFailed(str()) | TaskProgress():
                 self._on_identification(event)
-            case TaskFailed(task, message, is_cancelled):
-                if not is_cancelled:
-                    self._on_task_failed(task, message)
+            case TaskFailed(task, message):
+                self._on_task_failed(task, message)
             case Connecting(device, waiting_for):
                 self._close_ended()
                 self._set_session(true_friction=None, waiting_for=waiting_for)

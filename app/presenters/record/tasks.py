@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from app.presenters.base import ReportProgress
 from app.presenters.record.state import (
     CountCompletedRuns,
     KeepRun,
@@ -23,7 +22,7 @@ from app.runs.next_tests import counts_as_done, load_next_tests, save_next_tests
 from app.runs.reader import open_run
 
 
-def execute(task: RecordTask, _report: ReportProgress) -> Any:
+def execute(task: RecordTask) -> Any:
     """Carry out a task; its class says what the answer is. Raises RunError."""
     match task:
         case LoadPlan(folder):

@@ -6,7 +6,7 @@ from pathlib import Path
 from app.presenters.base import Progress, batch_progress, run_count_text
 from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
 from app.presenters.runs.tasks import ANALYSE_RUNS, ANALYSING, AnalyseRuns, RunAnalysed
-from app.presenters.worker import Worker
+from app.presenters.worker import EventWorker
 from messages.i18n import gettext, ngettext
 
 
@@ -49,7 +49,7 @@ class AnalysisSummary:
 class AnalysisQueue:
     """Submits analyses to a worker of their own, and collects their outcome until all are done."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: EventWorker) -> None:
         self._worker = worker
         self._pending: list[AnalyseRuns] = []
         self._summary = AnalysisSummary()

@@ -31,7 +31,7 @@ from app.presenters.runs.tasks import (
     UndoEdits,
 )
 from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
-from app.presenters.worker import Worker
+from app.presenters.worker import EventWorker
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ class RunsPresenter(Presenter[RunsState]):
 
     def __init__(
         self,
-        worker: Worker,
-        analysis_worker: Worker,
+        worker: EventWorker,
+        analysis_worker: EventWorker,
         folder: str,
         all_series: tuple[str, ...],
         author: str,

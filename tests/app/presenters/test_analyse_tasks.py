@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from app.presenters.base import Progress
-from app.presenters.events import TaskProgress
 from app.presenters.runs.tasks import AnalyseRuns, RunAnalysed
 from app.presenters.runs.work import analyse_runs
 from app.presenters.worker import Worker
@@ -70,12 +69,13 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
     short_runs: list[Path], tmp_path: Path, worker: Worker
 ) -> None:
     paths = tuple(str(shutil.copy(short_runs[0], tmp_path / f"run_{number:02d}.h5")) for number in range(12))
-    worker.submit(analyse_runs, AnalyseRuns(paths))
+    said: list[Any] = []
+    worker.submit(analyse_runs, AnalyseRuns(paths), progress=said.append)
     done: list[RunAnalysed] = []
     deadline = time.monotonic() + 120.0
     while not done and time.monotonic() < deadline:
-        news = [one.progress for one in worker.poll() if isinstance(one, TaskProgress)]
-        done += [progress for progress in news if isinstance(progress, RunAnalysed)]
+        worker.poll()
+        done = [progress for progress in said if isinstance(progress, RunAnalysed)]
         time.sleep(0.01)
     (child,) = multiprocessing.active_children()
     running = [child.pid, *descendants_of(child.pid or 0)]

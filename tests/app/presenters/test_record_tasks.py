@@ -44,7 +44,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def done(task: RecordTask) -> object:
-    return execute(task, lambda _: None)
+    return execute(task)
 
 
 def test_what_was_shown_is_what_is_kept(run: Path) -> None:

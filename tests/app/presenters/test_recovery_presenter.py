@@ -12,10 +12,9 @@ from app.presenters.analysis_task import recover_runs
 from app.presenters.base import Notice, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress
-from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport
+from app.presenters.recovery import LATER, RECOVER, RecoveryReport
 from app.presenters.start_screen import StartState
-from app.presenters.window import RECONNECT, RECOVER_RUNS, WindowContext, WindowPresenter
+from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
 
 
 class Desk:
@@ -35,10 +34,6 @@ class Desk:
         assert self.window.state.notice is not None
         return self.window.state.notice
 
-    def hear(self, news: object) -> None:
-        self.worker.news = [news]
-        self.window.tick()
-
 
 @pytest.fixture
 def desk() -> Iterator[Desk]:
@@ -47,19 +42,17 @@ def desk() -> Iterator[Desk]:
     made.session.close()
 
 
-TASK = RecoverFolder(str(bench().directory))
-
-
 def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
     desk.window.ask_to_recover()
     assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (RECOVER, LATER, Tone.WARN)
     assert "2 runs were cut short" in desk.notice.text
     desk.window.execute_notice_action()
-    assert desk.worker.submitted == [(RECOVER_RUNS, TASK)]
+    (call,) = desk.worker.calls
+    assert (call.name, call.arguments) == ("recover_runs", (str(bench().directory),))
     assert desk.notice.action == ""
-    desk.hear(TaskProgress(TASK, Progress("Recovering x", 0.4)))
+    call.progress(Progress("Recovering x", 0.4))
     assert desk.notice.text == "Recovering x: 40%"
-    desk.hear(TaskDone(TASK, RecoveryReport(runs=("/r/a.h5", "/r/b.h5"))))
+    call.done(RecoveryReport(runs=("/r/a.h5", "/r/b.h5")))
     assert (desk.notice.text, desk.notice.tone) == ("Recovered 2 runs", Tone.OK)
 
 
@@ -67,7 +60,7 @@ def test_later_leaves_all_as_it_is(desk: Desk) -> None:
     desk.window.ask_to_recover()
     desk.window.dismiss_notice()
     assert desk.window.state.notice is None
-    assert desk.worker.submitted == []
+    assert desk.worker.calls == []
 
 
 def test_nothing_is_asked_where_nothing_is_unfinished(desk: Desk) -> None:
@@ -90,19 +83,20 @@ def test_an_engine_that_died_is_said_and_recovery_offered_where_there_is_any(
     assert "ended by itself" in desk.notice.text
     assert desk.notice.action == offered
     desk.window.execute_notice_action()
-    assert len(desk.worker.submitted) == unfinished
+    assert len(desk.worker.calls) == unfinished
 
 
 def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
     desk.window.ask_to_recover()
     desk.window.execute_notice_action()
     faults = ("/r/x.journal is not a journal of Slipstand. Nothing was done to it",)
-    desk.hear(TaskDone(TASK, RecoveryReport(("/r/a.h5",), ("/r/a.h5.before-recovery",), faults)))
+    (call,) = desk.worker.calls
+    call.done(RecoveryReport(("/r/a.h5",), ("/r/a.h5.before-recovery",), faults))
     assert desk.notice.tone is Tone.BAD
     assert desk.notice.text == (
         "Recovered a.h5. What was there before is kept as a.h5.before-recovery. " + faults[0]
     )
-    desk.hear(TaskFailed(TASK, "the disk is full. Free some space"))
+    call.fail("the disk is full. Free some space")
     assert (desk.notice.action, desk.notice.text) == (RECOVER, "The disk is full. Free some space")
 
 
@@ -111,7 +105,7 @@ def test_the_task_itself_finishes_what_is_in_the_folder(
 ) -> None:
     monkeypatch.setattr("app.runs.paths.journal_fallback_folders", list)
     (tmp_path / "some.journal").write_bytes(b"not ours")
-    done = recover_runs(RecoverFolder(str(tmp_path)), lambda _: None)
+    done = recover_runs(str(tmp_path), lambda _: None)
     assert done.runs == ()
     assert "not a journal" in done.errors[0]
     assert recovery.recovery_outcome(RecoveryReport()).text == "Nothing was left to recover"

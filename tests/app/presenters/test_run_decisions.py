@@ -1,7 +1,6 @@
 """What becomes of runs on Record as values: kept, repeated, discarded, brought back; plan and form kept."""
 
 from dataclasses import replace
-from typing import Any
 
 import msgspec
 import pytest
@@ -64,11 +63,11 @@ class Desk:
 
     def tasks(self) -> list[RecordTask]:
         asked = [argument for _, argument in self.worker.submitted]
-        self.worker.submitted.clear()
+        self.worker.calls.clear()
         return asked
 
     def answer(self, task: RecordTask, answer: object) -> None:
-        self.worker.news.append(TaskDone(task, answer))
+        self.record.dispatch(TaskDone(task, answer))
         self.record.tick()
 
     def run(self, path: str = RUN, remaining: int = 0) -> None:
@@ -235,8 +234,7 @@ def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
     desk = Desk()
     desk.result()
     desk.record.dispatch(Action.DISCARD)
-    desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
-    desk.record.tick()
+    desk.worker.calls[0].fail("the disk is full. Free some space")
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     desk.record.dispatch(Action.UNDO)
     assert desk.record.state.decision == ""
@@ -246,13 +244,13 @@ def test_closing_waits_until_what_was_decided_is_stored() -> None:
     desk = Desk()
     desk.result()
     desk.record.dispatch(Action.NEXT)
-    (task,) = desk.tasks()
+    (call,) = desk.worker.calls
     desk.worker.is_busy = True
 
-    def store() -> list[Any]:
+    def store() -> None:
         assert not desk.worker.closed
         desk.worker.is_busy = False
-        return [TaskDone(task, RUN)]
+        call.done(RUN)
 
     desk.worker.poll = store  # type: ignore[method-assign]
     desk.record.close()
@@ -346,8 +344,7 @@ def test_what_could_not_be_done_is_said() -> None:
     desk = Desk()
     desk.result()
     desk.record.dispatch(Action.NEXT)
-    desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
-    desk.record.tick()
+    desk.worker.calls[0].fail("the disk is full. Free some space")
     assert desk.record.state.status_message.tone is Tone.BAD
     assert desk.record.state.status_message.text == "The disk is full. Free some space"
 
@@ -441,9 +438,9 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     desk = Desk()
     fresh = RecordPresenter(desk.recorder, bench(), desk.worker, "me")  # type: ignore[arg-type]
     fresh.dispatch(ScreenEntered())
-    (task,) = desk.tasks()
-    desk.worker.news.append(TaskFailed(task, "next-tests.json: cannot be used. Mend it"))
-    fresh.tick()
+    (call,) = desk.worker.calls
+    desk.worker.calls.clear()
+    call.fail("next-tests.json: cannot be used. Mend it")
     assert desk.tasks() == [CountCompletedRuns("/recordings")]
     assert fresh.state.status_message.text == "next-tests.json: cannot be used. Mend it"
     fresh.dispatch(PlanEdited("1FFM0 x2"))

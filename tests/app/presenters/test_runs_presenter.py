@@ -83,7 +83,7 @@ class Desk:
     def tasks(self) -> list[RunsTask]:
         """What was asked of the worker since the last look."""
         asked = [argument for _, argument in self.worker.submitted]
-        self.worker.submitted.clear()
+        self.worker.calls.clear()
         return asked
 
     def hear(self, *news: object) -> None:

@@ -4,19 +4,29 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed, bench, ended, fake_workers
+from stage import (
+    END_S,
+    RUN,
+    Call,
+    FakeLauncher,
+    FakeWorker,
+    RecordingView,
+    analysed,
+    bench,
+    ended,
+    fake_workers,
+)
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
 from app.presenters.base import Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
-from app.presenters.window import ANALYSE, RECONNECT, WARM_UP, WindowContext, WindowPresenter
+from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
 from config.files import load_gauges
 
 
@@ -41,6 +51,12 @@ class Desk:
             assert time.monotonic() < deadline
             self.window.tick()
 
+    def analysis(self, path: str = RUN) -> Call:
+        """The only analysis that was submitted."""
+        (call,) = self.worker.calls
+        assert (call.name, call.arguments) == ("analyse_run", (path,))
+        return call
+
     def play(self, until_s: float) -> None:
         self.launcher.engines[-1].play(until_s)
         self.window.tick()
@@ -63,12 +79,10 @@ def test_from_the_start_page_to_the_result(desk: Desk) -> None:
     window.record.dispatch(Action.ARM)
     for until_s in (1.0, 3.0, 6.0, END_S + 0.1):
         desk.play(until_s)
-    assert desk.worker.submitted == [(ANALYSE, RUN)]
-    desk.worker.news = [TaskProgress(RUN, Progress("Fitting", 0.5))]
-    window.tick()
+    analysis = desk.analysis()
+    analysis.progress(Progress("Fitting", 0.5))
     assert window.record.state.progress == window.identify.state.progress == Progress("Fitting", 0.5)
-    desk.worker.news = [TaskDone(RUN, analysed())]
-    window.tick()
+    analysis.done(analysed())
     assert window.record.state.result is not None
     assert window.record.state.result.comparison == "True value 0.10000: found +0.30\u202f%"
     assert window.identify.state.curves is not None
@@ -84,8 +98,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
     desk.play(1.0)
     window.record.dispatch(Action.STOP)
     window.tick()
-    desk.worker.news = [TaskFailed(RUN, "there is no release. Record until one")]
-    window.tick()
+    desk.analysis().fail("there is no release. Record until one")
     assert window.record.state.result is not None
     assert window.record.state.result.warnings == ("There is no release. Record until one",)
     assert window.identify.state.failure == "there is no release. Record until one"
@@ -94,9 +107,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
 def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
     desk.window.start.open_run("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
-    assert desk.worker.submitted == [(ANALYSE, "/recordings/a.h5")]
-    desk.worker.news = [TaskDone("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
-    desk.window.tick()
+    desk.analysis("/recordings/a.h5").done(analysed(path="/recordings/a.h5"))
     assert desk.window.identify.state.title == "a.h5"
     assert desk.window.identify.state.result is not None
     assert desk.window.identify.state.result.comparison == "", "the truth of another run is not known"
@@ -134,7 +145,7 @@ def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None
     assert window.state.notice is not None
     assert window.state.notice.text == "The disk is full. Free some space"
     assert window.state.notice.action == ""
-    assert desk.worker.submitted == [(ANALYSE, RUN)]
+    desk.analysis()
     window.dismiss_notice()
     assert window.state.notice is None
 
@@ -144,7 +155,7 @@ def test_a_run_that_was_not_kept_is_not_analysed(desk: Desk) -> None:
     desk.tick_until_connected()
     desk.launcher.engines[0].say(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
     desk.window.tick()
-    assert desk.worker.submitted == []
+    assert desk.worker.calls == []
     assert desk.window.state.notice is not None
 
 
@@ -182,9 +193,10 @@ def test_warming_up_shows_nothing(desk: Desk) -> None:
     view = RecordingView()
     desk.window.attach(view)
     desk.window.warm_up()
-    assert desk.worker.submitted == [(WARM_UP, None)]
-    desk.worker.news = [TaskDone(None, None), TaskFailed(None, "numba is broken")]
-    desk.window.tick()
+    (call,) = desk.worker.calls
+    assert (call.name, call.arguments) == ("warm_up", ())
+    call.done(None)
+    call.fail("numba is broken")
     assert len(view.states) == 1
     assert desk.window.identify.state.failure == ""
 

@@ -12,7 +12,6 @@ from stage import RUN, analysed
 from test_identify_screen import with_scan
 from test_main_window import Desk
 
-from app.presenters.events import TaskDone
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.screens import Screen
@@ -113,7 +112,7 @@ def test_the_start_page_with_all_settings_unfolded(desk: Desk) -> None:
 
 def test_a_recording_that_is_open(desk: Desk) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [TaskDone(RUN, analysed())]
+    desk.worker.calls[-1].done(analysed())
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     check(desk.window)
 
@@ -121,7 +120,7 @@ def test_a_recording_that_is_open(desk: Desk) -> None:
 @pytest.mark.parametrize("side", IdentifySide)
 def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [TaskDone(RUN, with_scan())]
+    desk.worker.calls[-1].done(with_scan())
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.presenter.identify.toggle_cursors()
     desk.presenter.identify.set_tab(side)
@@ -130,7 +129,7 @@ def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -
 
 def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [TaskDone(RUN, with_scan())]
+    desk.worker.calls[-1].done(with_scan())
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.window.activateWindow()
     for plots in (*desk.window.findChildren(PlotTabs), *desk.window.findChildren(ScanPlot)):

@@ -26,9 +26,7 @@ from stage import RUN, FakeLauncher, FakeWorker, analysed, bench, fake_workers
 from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
-from app.presenters.events import TaskDone
 from app.presenters.navigator import ConnectForm
-from app.presenters.recovery import RecoverFolder
 from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
@@ -162,7 +160,7 @@ def test_unfinished_runs_are_asked_about_in_words_that_fit(desk: Desk) -> None:
     desk.presenter.ask_to_recover()
     desk.click("Recover")
     assert "Recovering runs" in desk.words()
-    assert [argument for _, argument in desk.worker.submitted] == [RecoverFolder("/recordings")]
+    assert [(call.name, call.arguments) for call in desk.worker.calls] == [("recover_runs", ("/recordings",))]
 
 
 def test_screens_are_reached_by_keys_and_built_when_first_shown(desk: Desk) -> None:
@@ -181,7 +179,7 @@ def test_a_recording_is_chosen_in_a_dialog_that_blocks_nothing(desk: Desk) -> No
     assert dialog is not None
     dialog.fileSelected.emit(RUN)
     dialog.close()
-    desk.worker.news = [TaskDone(RUN, analysed())]
+    desk.worker.calls[-1].done(analysed())
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     assert desk.presenter.state.screen is Screen.IDENTIFY
 

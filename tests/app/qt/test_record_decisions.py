@@ -81,12 +81,12 @@ class Stage:
         self.tasks()
 
     def answer(self, task: RecordTask, answer: object) -> None:
-        self.files.news.append(TaskDone(task, answer))
+        self.presenter.dispatch(TaskDone(task, answer))
         self.presenter.tick()
 
     def tasks(self) -> list[RecordTask]:
         asked = [argument for _, argument in self.files.submitted]
-        self.files.submitted.clear()
+        self.files.calls.clear()
         return asked
 
     def record(self) -> None:
