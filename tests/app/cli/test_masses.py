@@ -24,11 +24,11 @@ def test_only_other_masses_are_said(
     plate_kg: float | None,
     said: list[str],
 ) -> None:
-    print_mass_overrides(MassOptions(series, plate_kg, table_kg))
+    print_mass_overrides(MassOptions(series=series, plate_mass=plate_kg, table_mass=table_kg))
     captured = capsys.readouterr()
     assert (captured.out, captured.err.splitlines()) == ("", said)
 
 
 def test_a_series_that_is_not_one_is_refused() -> None:
     with pytest.raises(ConfigError, match="'9XX'"):
-        print_mass_overrides(MassOptions("9XX", plate_mass=40.0))
+        print_mass_overrides(MassOptions(series="9XX", plate_mass=40.0))
