@@ -1,6 +1,6 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from analysis.one_mass.identify import mass_from_added_mass
 from analysis.quantities import BudgetSource, Quantity
 from app.cli import output as out
 from app.cli.analysis_text import print_analysis
-from app.cli.errors import CommandError, error_text
-from app.cli.option_values import executor_options
+from app.cli.errors import CommandError, alternatives, error_text
+from app.cli.option_values import executor_options, figure_file
 from app.cli.recover import print_interrupted_run
 from app.cli.result_options import AddedMassOptions, AnalyzeOptions
 from app.runs.analysis_json import quantity_document
@@ -28,55 +28,54 @@ MODELS = ("auto", *(law.name for law in LAWS))
 
 
 def analyze(options: AnalyzeOptions) -> None:
-    """Identify friction, stiffness and damping of one or more runs."""
-    request = _request(options)
-    executor = executor_options(options.jobs)
+    request, executor = _request(options), executor_options(options.jobs)
     paths = resolve_run_files(options.runs)
     options.added.check(request.kind, len(paths))
-    target = _figure_file(options.figure, len(paths), force=options.force)
+    if options.figure and len(paths) > 1:
+        raise CommandError(
+            f"--figure {options.figure} is one file for {len(paths)} runs. Analyse them one by one"
+        )
+    figure = figure_file(options.figure, force=options.force)
     tasks = [AnalysisTask(str(path), request, options.save, options.anew) for path in paths]
-    outcomes = _analyze_with_figure(tasks[0], target) if target else _analyze_runs(tasks, executor)
+    outcomes = _analyze_with_figure(tasks[0], figure) if figure else _analyze_runs(tasks, executor)
     failed = False
-    with out.print_json_list() if options.as_json else nullcontext(_discard) as add, closing(outcomes):
+    with out.print_json_list() if options.as_json else nullcontext(None) as add, closing(outcomes):
         documents: Iterator[dict[str, Any]] = (_report_run(outcome, options.as_json) for outcome in outcomes)
         if options.added.added_mass is not None:  # computed from both analyses, or not at all
-            documents = _with_table_mass(list(documents), options.added, options.as_json)
+            documents = iter(_with_table_mass(list(documents), options.added, options.as_json))
         for document in documents:
             failed |= "error" in document
-            add(document)
+            if add:
+                add(document)
     if failed:
         raise typer.Exit(1)
 
 
-def _discard(_document: object) -> None:
-    """Take a JSON object that is not printed."""
-
-
 def _with_table_mass(
-    documents: list[dict[str, Any]], added: AddedMassOptions, as_json: bool
-) -> Iterator[dict[str, Any]]:
-    """Append the mass of the table to the analyses of both runs, unless one failed."""
-    if added.added_mass is not None and not any("error" in document for document in documents):
-        mass = Quantity.normal(added.added_mass, added.added_mass_uncertainty, "kg")
-        documents.append(_table_mass_document(documents, mass, as_json))
-    return iter(documents)
+    documents: list[dict[str, Any]], options: AddedMassOptions, as_json: bool
+) -> list[dict[str, Any]]:
+    """Append the mass of the table to the analyses of both runs, unless one failed.
 
-
-def _figure_file(figure: Path | None, runs: int, *, force: bool) -> Path | None:
-    if figure is None:
-        return None
-    if runs > 1:
-        raise CommandError(f"--figure {figure} is one file for {runs} runs. Analyse them one by one")
-    if figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    return out.output_file(figure, force)
+    The time base is common to both runs and cancels, so that the periods count with their noise alone.
+    """
+    if any("error" in document for document in documents):
+        return documents
+    added = Quantity.normal(options.added_mass or 0.0, options.added_mass_uncertainty, "kg")
+    alone, loaded = (_quantity(document, "period_s") for document in documents)
+    damping = (_quantity(document, "damping_n_per_s") for document in documents)
+    mass = mass_from_added_mass(alone, loaded, added, *damping)
+    if not as_json:
+        out.print_line(f"table mass {format_value(mass.value, mass.standard_uncertainty)} kg, from both runs")
+    results = {"table_mass_kg": quantity_document(mass), "added_mass_kg": quantity_document(added)}
+    runs = [document["run"] for document in documents]
+    return [*documents, {"kind": "table-mass", "runs": runs, "results": results}]
 
 
 def _request(options: AnalyzeOptions) -> AnalysisRequest:
     """Build the request. Raises CommandError for options that do not fit together."""
     model, refits = options.model, options.monte_carlo
     if model not in MODELS:
-        raise CommandError(f"--model {model!r} is not known. Use {', '.join(MODELS[:-1])} or {MODELS[-1]}")
+        raise CommandError(f"--model {model!r} is not known. Use {alternatives(MODELS)}")
     table_kg, plate_kg = options.table_mass, options.plate_mass
     if options.kind == "one-mass":
         if model != "auto" or refits is not None:
@@ -112,11 +111,10 @@ def _analyze_with_figure(task: AnalysisTask, figure: Path) -> Generator[Analysis
 
 
 def _report_run(outcome: AnalysisOutcome, as_json: bool) -> dict[str, Any]:
-    """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
+    """Print the result of one run, unless JSON is wanted; return its JSON object."""
     if outcome.document is None:
         fault = str(outcome.error)
-        said = fault if outcome.run in fault else f"{outcome.run}: {fault}"
-        out.print_status(f"error: {said}")
+        out.print_status(f"error: {fault if outcome.run in fault else f'{outcome.run}: {fault}'}")
         return {"run": outcome.run, "error": fault}
     print_interrupted_run(Path(outcome.run), outcome.ended)
     if not as_json:
@@ -127,34 +125,9 @@ def _report_run(outcome: AnalysisOutcome, as_json: bool) -> dict[str, Any]:
 
 
 def save_figure(analysis: Analysis, path: Path) -> None:
-    """Write the figure of record against simulation."""
     from app.reports.figures.record_figure import save_record_figure
 
     save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
-
-
-def _table_mass_document(
-    documents: Sequence[dict[str, Any]], added: Quantity, as_json: bool
-) -> dict[str, Any]:
-    """JSON object of the mass of the table from the analyses of two runs, the second with the added mass.
-
-    The time base is common to both runs and cancels, so that the periods count with their noise alone.
-    """
-    alone, loaded = documents
-    mass = mass_from_added_mass(
-        _quantity(alone, "period_s"),
-        _quantity(loaded, "period_s"),
-        added,
-        _quantity(alone, "damping_n_per_s"),
-        _quantity(loaded, "damping_n_per_s"),
-    )
-    if not as_json:
-        out.print_line(f"table mass {format_value(mass.value, mass.standard_uncertainty)} kg, from both runs")
-    return {
-        "kind": "table-mass",
-        "runs": [document["run"] for document in documents],
-        "results": {"table_mass_kg": quantity_document(mass), "added_mass_kg": quantity_document(added)},
-    }
 
 
 def _quantity(document: dict[str, Any], name: str) -> Any:

@@ -8,7 +8,6 @@ from config.files import load_published_rows, load_stand, published_table
 
 
 def audit(options: AuditOptions) -> None:
-    """Check a published table against itself and the motion."""
     given = options.table
     rows = load_published_rows(given.expanduser()) if given else list(published_table().values())
     stand = load_stand()

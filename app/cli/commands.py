@@ -108,7 +108,7 @@ class SlipstandGroup(LazyGroup):
         CommandEntry("edit", "run_file_options:EditOptions", "edit:edit"),
         CommandEntry("trash", "run_file_options:TrashOptions", "runs:trash"),
         CommandEntry("audit", "result_options:AuditOptions", "audit:audit"),
-        CommandEntry("doctor", "run_file_options:DoctorOptions", "doctor.command:doctor"),
+        CommandEntry("doctor", "run_file_options:DoctorOptions", "doctor:doctor"),
         CommandEntry(
             "calibrate", "device_options:CalibrateOptions", "calibrate:calibrate", group=CalibrateGroup
         ),

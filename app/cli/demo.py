@@ -11,17 +11,16 @@ import typer
 from analysis.campaign.campaign import summarize
 from analysis.catalogue import Place, definition
 from analysis.formatting import format_value
-from app.acquisition.messages import EndReason, PortSettings, RunEnded, RunSettings
+from app.acquisition.messages import EndReason, PortSettings, RunSettings
 from app.cli import output as out
 from app.cli.analysis_text import print_analysis
 from app.cli.analyze import save_figure
 from app.cli.errors import CommandError
 from app.cli.measurement_options import DemoOptions
-from app.cli.option_values import calibration_file, executor_options, recordings_folder
-from app.cli.recording import record_with_progress
+from app.cli.option_values import calibration_file, checked, executor_options, recordings_folder
+from app.cli.record import record_with_progress
+from app.runs.analysis_json import read_quantity
 from app.runs.analyze import AnalysisRequest, analyze_run
-from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
-from app.runs.batch.tasks import map_runs
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_runs
 from app.runs.listing import find_run_files
 from app.runs.paths import recordings_directory
@@ -30,13 +29,11 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.synthetic_campaign import (
     CampaignOptions,
     Comparison,
-    SyntheticTest,
     compare,
     plan_tests,
-    record_test,
+    record_tests,
     series_truths,
 )
-from app.simulated_stand.truth import StandTruth
 from config.files import load_gauges, load_stand
 
 _RECORD_S = 8.0
@@ -44,62 +41,42 @@ _RECORD_S = 8.0
 
 
 def demo(options: DemoOptions) -> None:
-    """Record a simulated pullback, and compare it with the truth."""
     if options.campaign:
-        if options.friction is not None:
-            raise CommandError("--friction is for one test. In a campaign f_d is that of Table 1")
-        codes = tuple(code.strip() for code in (options.series or "").split(",") if code.strip())
-        try:
-            campaign = CampaignOptions(
-                series=codes,
-                repeats=options.repeats,
-                friction_scatter=options.scatter,
-                seed=options.seed,
-            )
-        except ValueError as error:
-            raise CommandError(str(error)) from None
-        demo_campaign(campaign, options.directory, executor_options(options.jobs), as_json=options.as_json)
-        return
-    _one_test(options.series, options.friction, options.directory, options.as_json)
+        _record_campaign(options)
+    else:
+        _record_test(options)
 
 
-def _one_test(series: str | None, friction: float | None, directory: Path | None, as_json: bool) -> None:
+def _record_test(options: DemoOptions) -> None:
     out.print_status("starting the simulated stand (a first start compiles the solver, up to a minute)")
-    try:
-        options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
-    except ValueError as error:
-        raise CommandError(str(error)) from None
-    with SimulatedStand.start(options) as stand:
-        port = PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz)
+    series, friction = options.series or "1FFM0", options.friction
+    stand_options = checked(SimulatedStandOptions, series=series, friction=friction, decay_s=_RECORD_S + 2.0)
+    with SimulatedStand.start(stand_options) as stand:
+        port = PortSettings(url=stand.port, protocol=stand_options.protocol, rate_hz=stand_options.rate_hz)
         run = RunSettings(
-            directory=str(recordings_folder(directory)),
-            series=options.series,
+            directory=str(recordings_folder(options.directory)),
+            series=series,
             duration_s=_RECORD_S,
             operator="demo",
             note="recorded from the simulated stand",
         )
         (ended,) = record_with_progress(port, run, calibration_file(None), simulated=True)
-        truth = stand.truth().stand
+        truth = msgspec.to_builtins(stand.truth().stand)
     if ended.ended == EndReason.INTERRUPTED:
         raise typer.Exit(130)
     if ended.ended != EndReason.DURATION:
         raise CommandError(f"the demo's run ended: {ended.ended}. {ended.message} (kept in {ended.path})")
-    _report(ended, truth, as_json)
-
-
-def _report(ended: RunEnded, truth: StandTruth, as_json: bool) -> None:
     path = Path(ended.path)
     with out.progress_bar("identifying", total=1.0) as update:
         analysis = analyze_run(path, AnalysisRequest(), save=True, progress=update)
     figure = path.with_suffix(".png")
     save_figure(analysis, figure)
-    document = analysis.document | {"truth": msgspec.to_builtins(truth), "figure": str(figure)}
-    if as_json:
-        out.print_json(document)
-        return
-    print_analysis(analysis.document)
-    _compare(document)
-    out.print_line(f"  figure         {figure}")
+    if options.as_json:
+        out.print_json(analysis.document | {"truth": truth, "figure": str(figure)})
+    else:
+        print_analysis(analysis.document)
+        _print_compared(analysis.document["results"], truth)
+        out.print_line(f"  figure         {figure}")
 
 
 _COMPARED = (
@@ -107,46 +84,56 @@ _COMPARED = (
 )  # fmt: skip
 
 
-def _compare(document: dict[str, Any]) -> None:
+def _print_compared(results: dict[str, Any], truth: dict[str, float]) -> None:
     """Write found beside true, and their difference in per cent and in standard uncertainties."""
     rows = []
     for row in map(definition, _COMPARED):
-        found, true = document["results"].get(row.name), document["truth"][row.name]
-        if found is None:
+        if row.name not in results:
             continue
-        uncertainty = found["standard_uncertainty"] or 0.0
-        off, scale = found["value"] - true, row.unit_at(Place.TERMINAL).scale
+        found, true = read_quantity(results[row.name]), truth[row.name]
+        off, scale = found.value - true, row.unit_at(Place.TERMINAL).scale
+        uncertainty = found.standard_uncertainty or 0.0
+        shown = str(format_value(found.value * scale, uncertainty * scale))
         per_cent = f"{100 * off / true:+.3f} %" if true else ""
         spread = f"{off / uncertainty:+.1f} u" if uncertainty else ""
-        shown = str(format_value(found["value"] * scale, uncertainty * scale))
         rows.append((row.heading(Place.TERMINAL), shown, f"{true * scale:.6g}", per_cent, spread))
     out.print_table(("", "found", "true", "off by", ""), rows)
 
 
-def demo_campaign(
-    options: CampaignOptions, directory: Path | None, executor: ExecutorOptions, *, as_json: bool
-) -> None:
-    """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
-    stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
-    folder = _new_folder(directory, now)
-    tests = plan_tests(options, stand, gauges, folder, now)
-    folder.mkdir(parents=True, exist_ok=True)
-    out.print_status(
-        f"{len(tests)} tests of {len({test.series for test in tests})} series are recorded in {folder}"
+def _record_campaign(options: DemoOptions) -> None:
+    """Simulate, record and identify a campaign; write its table beside the truth."""
+    if options.friction is not None:
+        raise CommandError("--friction is for one test. In a campaign f_d is that of Table 1")
+    codes = tuple(code.strip() for code in (options.series or "").split(",") if code.strip())
+    campaign_options = checked(
+        CampaignOptions,
+        series=codes,
+        repeats=options.repeats,
+        friction_scatter=options.scatter,
+        seed=options.seed,
     )
-    _record(tests, executor)
-    gathered = _gather(tests, executor)
-    campaign = summarize(gathered.runs, known_contacts=tuple(stand.contacts))
-    codes = [row.series.code for row in campaign.rows]
-    compared = list(compare(campaign.rows, series_truths(options, stand, gauges, codes)))
-    if as_json:
-        out.print_json(_document(folder, options, compared, gathered))
+    executor = executor_options(options.jobs)
+    stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
+    folder = _new_folder(options.directory, now)
+    tests = plan_tests(campaign_options, stand, gauges, folder, now)
+    series = len({test.series for test in tests})
+    out.print_status(f"{len(tests)} tests of {series} series are recorded in {folder}")
+    with out.progress_bar("recording", total=1.0) as update:
+        record_tests(tests, executor, update)
+    with out.progress_bar("identifying", total=1.0) as update:
+        collect = CollectOptions(executor, save=True)
+        collected = collect_runs([Path(test.path) for test in tests], collect, update)
+    rows = summarize(collected.runs, known_contacts=tuple(stand.contacts)).rows
+    truths = series_truths(campaign_options, stand, gauges, [row.series.code for row in rows])
+    compared = list(compare(rows, truths))
+    if options.as_json:
+        out.print_json(_document(folder, campaign_options, compared, collected))
     else:
-        _show(compared)
-    if gathered.failures:
+        _print_campaign(compared)
+    if collected.failures:
         raise CommandError(
-            f"{len(gathered.failures)} of {len(tests)} runs could not be identified, the first:"
-            f" {gathered.failures[0].error}"
+            f"{len(collected.failures)} of {len(tests)} runs could not be identified, the first:"
+            f" {collected.failures[0].error}"
         )
 
 
@@ -160,21 +147,8 @@ def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
     return folder
 
 
-def _record(tests: Sequence[SyntheticTest], executor: ExecutorOptions) -> None:
-    with out.progress_bar("recording", total=1.0) as update, open_executor(executor, len(tests)) as workers:
-        for came in map_runs(tests, record_test, workers, update):
-            error = came.message if isinstance(came, FailedItem) else came.error
-            if error:
-                raise CommandError(error)
-
-
-def _gather(tests: Sequence[SyntheticTest], executor: ExecutorOptions) -> CollectedRuns:
-    with out.progress_bar("identifying", total=1.0) as update:
-        return collect_runs([Path(test.path) for test in tests], CollectOptions(executor, save=True), update)
-
-
 def _document(
-    folder: Path, options: CampaignOptions, compared: Sequence[Comparison], gathered: CollectedRuns
+    folder: Path, options: CampaignOptions, compared: Sequence[Comparison], collected: CollectedRuns
 ) -> dict[str, Any]:
     rows: dict[str, dict[str, Any]] = {}
     for one in compared:
@@ -190,15 +164,15 @@ def _document(
         "schema": "slipstand-synthetic-campaign/1",
         "directory": str(folder),
         "options": msgspec.to_builtins(options),
-        "runs": [run.name for run in gathered.runs],
-        "failures": msgspec.to_builtins(gathered.failures),
+        "runs": [run.name for run in collected.runs],
+        "failures": msgspec.to_builtins(collected.failures),
         "inside": sum(one.is_covered for one in compared),
         "compared": len(compared),
         "rows": list(rows.values()),
     }
 
 
-def _show(compared: Sequence[Comparison]) -> None:
+def _print_campaign(compared: Sequence[Comparison]) -> None:
     """Found, true, and the difference in standard uncertainties; `!` where the 95 % interval misses."""
     rows = [
         (

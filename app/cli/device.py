@@ -1,8 +1,9 @@
 """`slipstand device list`, `ports` and `probe`: which devices are supported, plugged in, and recognised."""
 
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,71 +19,61 @@ from drivers.registry import DRIVERS
 UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
 
 
+_NO_PORT = "No serial port found. Plug the amplifier in, or try: slipstand device simulate"
+
+
 def list_devices(options: ListDevicesOptions) -> None:
-    """List the protocols, and what each was verified against."""
-    rows = [
-        {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,
-         "verified": p.verified}
-        for p in DRIVERS.values()
-    ]  # fmt: skip
     if options.as_json:
-        out.print_json(rows)
+        out.print_json(
+            [
+                {"protocol": info.name, "title": info.title, "default_baud": info.default_baud,
+                 "available": info.available, "verified": info.verified}
+                for info in DRIVERS.values()
+            ]
+        )  # fmt: skip
         return
-    out.print_table(
-        ("protocol", "device", "baud", "verified"),
-        [(p.name, p.title, str(p.default_baud or ""), p.verified) for p in DRIVERS.values()],
-    )
+    rows = [(info.name, info.title, str(info.default_baud or ""), info.verified) for info in DRIVERS.values()]
+    out.print_table(("protocol", "device", "baud", "verified"), rows)
 
 
 def list_ports(options: ListPortsOptions) -> None:
-    """List the serial ports of this computer."""
     ports = present_ports()
     if options.as_json:
         out.print_json([asdict(port) for port in ports])
-    elif ports:
-        rows = [
-            (
-                port.device,
-                usb_chip_name(port.vendor_id, port.product_id) or port.description,
-                usb_identity(port),
-                ", ".join(map(str, other_port_users(port.device))),
-            )
-            for port in ports
-        ]
-        out.print_table(("port", "what it is", "identity", "in use by"), rows)
+    elif not ports:
+        out.print_line(_NO_PORT)
     else:
-        out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+        rows = []
+        for port in ports:
+            what = usb_chip_name(port.vendor_id, port.product_id) or port.description
+            users = ", ".join(map(str, other_port_users(port.device)))
+            rows.append((port.device, what, usb_identity(port), users))
+        out.print_table(("port", "what it is", "identity", "in use by"), rows)
 
 
 def probe(options: ProbeOptions) -> None:
-    """Look at ports: what speaks on them, how to record it."""
-    present = _ports(options.ports)
+    ports = [port_info(url) for url in options.ports] if options.ports else present_ports()
     reports = []
-    for port in present:
-        report = probe_port(port, options.write, _status_printer(port))
+    for port in ports:
+        report = probe_port(port, options.write, partial(_print_progress, port))
         reports.append(report)
         if not options.as_json:
             for line in report_lines(report):
                 out.print_line(line)
     if options.as_json:
         out.print_json([port_document(report) for report in reports])
-    elif not present:
-        out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+    elif not ports:
+        out.print_line(_NO_PORT)
 
 
-def _status_printer(port: PortInfo) -> Callable[[object], None]:
-    """Print progress on stderr."""
-    return lambda doing: out.print_status(f"{port.device}: {doing}")
-
-
-def _ports(given: list[str] | None) -> list[PortInfo]:
-    """Ports to look at; of one that is given by another name or as a URL, what is known of it."""
-    return [port_info(url) for url in given] if given else present_ports()
+def _print_progress(port: PortInfo, doing: object) -> None:
+    out.print_status(f"{port.device}: {doing}")
 
 
 def report_lines(report: PortReport) -> Iterator[str]:
     """What is said of a port, one thing a line."""
-    yield " ".join(part for part in (report.port.device, _what(report)) if part)
+    what = (report.chip or _description(report.port), usb_identity(report.port))
+    yield f"{report.port.device} {', '.join(filter(None, what))}".rstrip()
     found = report.recognition
     if found is not None:
         info = DRIVERS[found.protocol]
@@ -115,10 +106,9 @@ def record_command(report: PortReport) -> str:
         return ""
     words = ["slipstand", "record", "--port", report.port.device, "--protocol", found.protocol]
     usual = DRIVERS[found.protocol].default_baud_for(found.settings)
-    if report.line_settings is not None and report.line_settings.baud != usual:
-        words += ["--baud", str(report.line_settings.baud)]
-    if report.line_settings is not None and report.line_settings.parity != "N":
-        words += ["--parity", report.line_settings.parity]
+    if line := report.line_settings:
+        words += ["--baud", str(line.baud)] if line.baud != usual else []
+        words += ["--parity", line.parity] if line.parity != "N" else []
     for key, value in found.settings.items():
         words += ["--set", f"{key}={value}"]
     if found.rate_option:
@@ -130,14 +120,13 @@ def record_command(report: PortReport) -> str:
 
 def port_document(report: PortReport) -> dict[str, Any]:
     """JSON object of a port."""
-    found = report.recognition
-    speaks = None
+    found, line, speaks = report.recognition, report.line_settings, None
     if found is not None:
         speaks = {
             "protocol": found.protocol,
             "verified": DRIVERS[found.protocol].verified,
-            "baud": report.line_settings.baud if report.line_settings else None,
-            "parity": report.line_settings.parity if report.line_settings else None,
+            "baud": line and line.baud,
+            "parity": line and line.parity,
             "rate_hz": found.rate_hz,
             "channels": found.channels,
             "settings": found.settings,
@@ -165,11 +154,6 @@ def usb_identity(port: PortInfo) -> str:
     if port.vendor_id is None or port.product_id is None:
         return ""
     return f"USB {port.vendor_id:04x}:{port.product_id:04x} {port.serial_number}".rstrip()
-
-
-def _what(report: PortReport) -> str:
-    known = report.chip or _description(report.port)
-    return ", ".join(part for part in (known, usb_identity(report.port)) if part)
 
 
 def _description(port: PortInfo) -> str:

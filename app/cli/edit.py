@@ -19,7 +19,6 @@ from config.schema import Gauges
 
 
 def edit(options: EditOptions) -> None:
-    """Change what is known of runs, kept as history."""
     given: dict[str, Any] = {
         "table_mass_kg": options.table_mass,
         "plate_mass_kg": options.plate_mass,

@@ -1,11 +1,18 @@
 """Which exceptions are the user's or the machine's to mend, rather than faults of the program."""
 
+from collections.abc import Sequence
+
 from app.runs.errors import internal_error
 from messages.message import MessageError
 
 
 class CommandError(Exception):
     """A command that cannot be done as asked. The message names the value, the fault and the remedy."""
+
+
+def alternatives(values: Sequence[str]) -> str:
+    """List values as "a, b or c"."""
+    return " or ".join(filter(None, (", ".join(values[:-1]), values[-1])))
 
 
 def error_text(error: Exception) -> str:

@@ -9,7 +9,6 @@ from app.runs.exchange.exporting import ExportRequest, export_runs
 
 
 def export(options: ExportOptions) -> None:
-    """Write samples and coefficients of runs for other programs."""
     chosen = {"format": options.format_name, "content": options.content, "replace": options.force}
     request = msgspec.convert(chosen, ExportRequest)
     target = options.output.expanduser().resolve()

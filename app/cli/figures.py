@@ -21,7 +21,6 @@ from app.runs.campaign.collect import CollectedRuns
 
 
 def figures(options: FiguresOptions) -> None:
-    """Draw the paper's figures 2 to 5 from runs, for print."""
     numbers, executor = _numbers(options.figure), executor_options(options.jobs)
     folder = _folder(options.output, options.format_name, options.force)
     folder.check()

@@ -1,27 +1,26 @@
 """`slipstand device health`: how the gauges do while the stand rests."""
 
-from pathlib import Path
 from typing import Any
 
 import typer
 
 from analysis.gauge_health import GaugeHealth, HealthGrade, measure_health
 from app.acquisition.gauge_samples import collect_samples
-from app.acquisition.messages import PortSettings
-from app.acquisition.run_setup import complete_port_settings
-from app.acquisition.stream.live_stream import open_stream
 from app.cli import output as out
+from app.cli.calibrate import open_gauges
 from app.cli.device_options import HealthOptions
-from app.cli.option_values import calibration_file, check_figure_file, device_settings
+from app.cli.option_values import calibration_file, device_settings, figure_file
 from app.presenters.gauge_health import GAUGE_NAMES, GaugeHealthState, gauge_health_state
 from config.files import load_gauges
 
 
 def health(options: HealthOptions) -> None:
-    """Look at both gauges at rest: noise, drift, hum, range."""
-    figure, port = check_figure_file(options.figure), device_settings(options.source)
-    title, pair = _watch_gauges(port, calibration_file(options.calibration), options.seconds)
-    measured = [measure_health(gauge) for gauge in pair]
+    figure, port = figure_file(options.figure), device_settings(options.source)
+    gauges = load_gauges(calibration_file(options.calibration))
+    with open_gauges(port, gauges) as (stream, name):
+        title = f"{name}, {stream.rate_hz:g} Hz"
+        out.print_status(f"Leave the stand alone for {options.seconds:g} s")
+        measured = [measure_health(gauge) for gauge in collect_samples(stream, options.seconds, gauges)]
     states = [gauge_health_state(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
     if figure is not None:
         from app.reports.figures.gauge_figures import save_health_figure  # loads matplotlib
@@ -33,14 +32,6 @@ def health(options: HealthOptions) -> None:
         _print_health(title, options.seconds, states)
     if any(state.verdict is HealthGrade.BAD for state in states):
         raise typer.Exit(1)
-
-
-def _watch_gauges(port: PortSettings, gauges_file: Path, seconds: float) -> tuple[str, Any]:
-    gauges = load_gauges(gauges_file)
-    with open_stream(complete_port_settings(port, gauges.device), gauges) as stream:
-        title = f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz"
-        out.print_status(f"{title}. Leave the stand alone for {seconds:g} s")
-        return title, collect_samples(stream, seconds, gauges)
 
 
 def _print_health(title: str, seconds: float, states: list[GaugeHealthState]) -> None:

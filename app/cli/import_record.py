@@ -11,7 +11,6 @@ from config.files import load_stand
 
 
 def import_record(options: ImportOptions) -> None:
-    """Make a run of a CSV, .mat, .xlsx or .parquet file."""
     plan = _plan(options.source)
     if options.output.suffix != ".h5":
         raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")

@@ -1,6 +1,8 @@
 """What shared options stand for: checked settings, masses, conditions and files."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 from app.acquisition.messages import PortSettings
 from app.cli import output as out
@@ -10,6 +12,16 @@ from app.runs.batch.executors import ExecutorOptions
 from app.runs.metadata import Conditions
 from app.runs.paths import recordings_directory
 from config.files import load_stand, settings_file
+
+Options = TypeVar("Options")
+
+
+def checked(kind: Callable[..., Options], /, **values: Any) -> Options:
+    """Build options that check their values. Raises CommandError for a value out of range."""
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
 
 
 def print_mass_overrides(masses: MassOptions) -> None:
@@ -90,17 +102,9 @@ def calibration_file(given: Path | None) -> Path:
     return given.expanduser().resolve() if given else settings_file("gauges.toml")
 
 
-def check_figure_file(figure: Path | None) -> Path | None:
+def figure_file(given: Path | None, *, force: bool = True) -> Path | None:
     """Return the path of a figure to draw. Raises CommandError for an unknown format or a missing folder."""
-    if figure is None:
-        return None
-    if figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    if not figure.expanduser().absolute().parent.is_dir():
-        raise CommandError(
-            f"--figure {figure}: there is no such folder. Make it first or choose another path"
-        )
-    return figure.expanduser()
+    return out.output_file(given, force, (".png", ".svg", ".pdf"), "--figure") if given else None
 
 
 def recordings_folder(given: Path | None) -> Path:

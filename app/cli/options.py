@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, get_type_hints
 
 import typer
 
-from app.cli.errors import CommandError
+from app.cli.errors import CommandError, alternatives
 
 REQUIRED: Final[Any] = dataclasses.MISSING
 """Default of an option that must be given."""
@@ -41,7 +41,7 @@ def choice(name: str, values: tuple[str, ...], description: str, default: Any = 
 
     def parse(text: str) -> str:
         if text not in values:
-            raise CommandError(f"{name} {text!r} is not known. Use {', '.join(values[:-1])} or {values[-1]}")
+            raise CommandError(f"{name} {text!r} is not known. Use {alternatives(values)}")
         return text
 
     return option(name, description, default, parser=parse, metavar=f"[{'|'.join(values)}]")

@@ -3,12 +3,12 @@
 import json
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from app.cli.errors import CommandError
+from app.cli.errors import CommandError, alternatives
 
 
 def print_json(document: object) -> None:
@@ -49,6 +49,12 @@ def print_status(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
+def print_fields(rows: Iterable[tuple[str, object]], width: int) -> None:
+    """Write a line for each label and value to stdout; the values begin in column `width`."""
+    for label, value in rows:
+        print_line(f"{label:{width}}{value}")
+
+
 def print_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     """Write columns for people to stdout, each as wide as its longest entry."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
@@ -56,8 +62,10 @@ def print_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Non
         print_line("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
-def output_file(path: Path, force: bool) -> Path:
+def output_file(path: Path, force: bool, endings: Sequence[str] = (), option: str = "-o") -> Path:
     """Return the absolute path of a file to write. Raises CommandError rather than overwrite one."""
+    if endings and path.suffix.lower() not in endings:
+        raise CommandError(f"{option} {path.name} has no known ending. Use {alternatives(endings)}")
     path = path.expanduser().resolve()
     if path.is_dir():
         raise CommandError(f"{path} is a folder. Give the name of a file")

@@ -2,24 +2,15 @@
 
 import math
 import time
-from types import TracebackType
 from typing import Self
 
 import numpy as np
 
 from analysis.catalogue import Place, definition
 from analysis.formatting import format_value
+from app.acquisition import messages
 from app.acquisition.guidance import PullbackSituation, guidance_for
-from app.acquisition.messages import (
-    Connected,
-    Event,
-    LiveResult,
-    LiveValue,
-    Reconnected,
-    Reconnecting,
-    RunEnded,
-    StateChanged,
-)
+from app.acquisition.messages import Event, LiveResult, LiveValue, RunEnded, StateChanged
 from app.acquisition.ring import RingRows
 from app.cli import output as out
 
@@ -28,30 +19,20 @@ _SHOWN_S = 0.05
 
 
 class ProgressPrinter:
-    """Follows events and samples of a recording.
+    """Prints events of a recording of `count` runs, and what the operator does next.
 
-    Parameters
-    ----------
-    line : StatusLine
-        Where figures are kept up to date, on a terminal.
-    count : int
-        How many runs there will be.
-    gauge_2_on_base : bool
-        Gauge 2 measures the plate against the base.
-    simulated : bool
-        The stand pulls and lets go by itself.
-    verified : str
-        Against what the device's protocol was tested; "" if that is not to be said.
+    A simulated stand pulls and lets go by itself. `verified` says against what the protocol was tested; "" is
+    not printed. Gauge 2 may measure the plate against the base.
     """
 
     def __init__(
         self,
         line: "StatusLine",
         count: int = 1,
-        *,
-        gauge_2_on_base: bool = False,
         simulated: bool = False,
         verified: str = "",
+        *,
+        gauge_2_on_base: bool = False,
     ) -> None:
         self._line = line
         self._count = count
@@ -65,11 +46,10 @@ class ProgressPrinter:
         self._relative_m = math.nan
 
     def on_event(self, event: Event) -> None:
-        """Take one event of the engine."""
         match event:
-            case Connected(device, firmware, rate_hz):
+            case messages.Connected(device, firmware, rate_hz):
                 out.print_status(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
-            case Reconnecting() | Reconnected():
+            case messages.Reconnecting() | messages.Reconnected():
                 out.print_status(str(event.message))
             case StateChanged():
                 self._on_state(event)
@@ -78,7 +58,6 @@ class ProgressPrinter:
         self._line.on_event(event)
 
     def on_rows(self, rows: RingRows) -> None:
-        """Take the latest samples."""
         recent = rows.time_s >= rows.time_s[-1] - _SHOWN_S
         present = recent & np.isfinite(rows.table_m) & np.isfinite(rows.relative_m)
         if present.any():
@@ -148,7 +127,6 @@ class StatusLine:
         self._told_s = float("-inf")
 
     def on_event(self, event: Event) -> None:
-        """Take one event of the engine."""
         if not isinstance(event, LiveResult):
             return
         if event.message:
@@ -166,9 +144,7 @@ class StatusLine:
             self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._live is not None:
             self._live.stop()
 
@@ -182,18 +158,16 @@ class StatusLine:
 
 def result_text(result: LiveResult) -> str:
     """Period, damping and friction so far; empty before anything is known."""
-    parts = [
-        _part("period_s", result.period),
-        _part("damping_n1_per_s", result.damping_n1),
-        _part("friction_dynamic", result.friction_dynamic),
-    ]
-    text = "  ".join(part for part in parts if part)
+    values = (
+        ("period_s", result.period),
+        ("damping_n1_per_s", result.damping_n1),
+        ("friction_dynamic", result.friction_dynamic),
+    )
+    text = "  ".join(_value_text(name, value) for name, value in values if value and value.is_known)
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
 
 
-def _part(name: str, value: LiveValue | None) -> str:
-    if value is None or not value.is_known:
-        return ""
+def _value_text(name: str, value: LiveValue) -> str:
     row = definition(name)
     unit = row.unit_at(Place.TERMINAL, value.unit)
     shown = format_value(value.value * unit.scale, value.standard_uncertainty * unit.scale, unit.symbol)

@@ -13,13 +13,10 @@ from app.runs.paths import journal_fallback_folders, recordings_directory
 
 
 def recover(options: RecoverOptions) -> None:
-    """Rebuild runs that a crash cut short, from their journals."""
     folder = options.directory.expanduser().absolute() if options.directory else recordings_directory()
-    folders = (
-        [folder]
-        if options.directory
-        else [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
-    )
+    folders = [folder]
+    if not options.directory:
+        folders = [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
     found = []
     for one in folders:
         with out.progress_bar("recovering", total=1.0) as update:

@@ -13,11 +13,8 @@ from app.reports.test_report.render import write_report
 
 
 def report(options: ReportOptions) -> None:
-    """Write a test report of one run or a campaign, as PDF."""
-    if options.output.suffix.lower() != ".pdf":
-        raise CommandError(f"-o {options.output.name} has no known ending. Use .pdf")
     head = _head(options.date, options.title, options.laboratory)
-    target = out.output_file(options.output, options.force)
+    target = out.output_file(options.output, options.force, (".pdf",))
     executor, excluded = executor_options(options.jobs), excluded_runs(options.paths, options.exclude or [])
     gathered, campaign = load_campaign(options.paths, executor, excluded=excluded)
     if not gathered.runs:

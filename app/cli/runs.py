@@ -17,7 +17,6 @@ from config.files import load_stand
 
 
 def runs(options: ListRunsOptions) -> None:
-    """List recorded runs, oldest first."""
     series = load_stand().series(options.series).code if options.series else None
     folder = options.directory or recordings_directory()
     print_unfinished_runs(folder)
@@ -70,7 +69,6 @@ def _friction_text(run: RunSummary) -> str:
 
 
 def trash(options: TrashOptions) -> None:
-    """Move runs to the trash, and bring them back."""
     if options.show and options.bring_back:
         raise CommandError("--list and --restore exclude each other. Give one of them")
     if options.show:

@@ -22,7 +22,6 @@ _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 
 
 def table(options: TableOptions) -> None:
-    """Pool runs to the paper's Table 1, a row a series."""
     name = _format(options.format_name, options.output, as_json=options.as_json)
     target = out.output_file(options.output, options.force) if options.output else None
     executor, excluded = executor_options(options.jobs), excluded_runs(options.paths, options.exclude or [])

@@ -14,8 +14,11 @@ import numpy as np
 from analysis.campaign.rows import SeriesRow
 from analysis.catalogue import table_columns
 from analysis.motion.two_mass import Motion, TwoMassParameters
-from app.runs.batch.tasks import error_message
+from app.runs.analyze import Progress
+from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
+from app.runs.batch.tasks import error_message, map_runs
 from app.runs.blocks import RunBlock, StoredRun, count_flags
+from app.runs.errors import RunError
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
@@ -294,6 +297,15 @@ def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
         return RecordedTest(write_test(test).path)
     except Exception as error:
         return RecordedTest(test.path, error_message(error))
+
+
+def record_tests(tests: Sequence[SyntheticTest], options: ExecutorOptions, progress: Progress) -> None:
+    """Record tests into their folder, which is made. Raises RunError for the first that fails."""
+    Path(tests[0].path).parent.mkdir(parents=True, exist_ok=True)
+    with open_executor(options, len(tests)) as executor:
+        for result in map_runs(tests, record_test, executor, progress):
+            if error := result.message if isinstance(result, FailedItem) else result.error:
+                raise RunError(error)
 
 
 def test_metadata(test: SyntheticTest) -> RunMetadata:

@@ -11,7 +11,7 @@ from bench_kit import GAIN, RATE_HZ, Bench, counts_of
 from cli_kit import assert_one_error_line
 
 from app.acquisition.messages import RunSettings
-from app.cli.recording import check_recording
+from app.cli.record import check_recording
 from config.files import load_gauges, save_calibration, settings_file
 
 MARKS_MM = [0.0, 3.0, 6.0, 9.0, 12.0]

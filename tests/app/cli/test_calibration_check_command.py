@@ -12,7 +12,7 @@ from cli_kit import assert_one_error_line
 
 from app.acquisition.messages import RunSettings
 from app.acquisition.run_setup import build_metadata
-from app.cli.recording import check_recording
+from app.cli.record import check_recording
 from app.runs.analysis_json import gauge_check_warnings
 from config.files import checks_path, load_checks, load_gauges, load_stand, save_calibration, settings_file
 from drivers.samples import DeviceIdentity

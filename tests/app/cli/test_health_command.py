@@ -42,7 +42,7 @@ def test_both_gauges_are_judged(slipstand: Any, bench: Bench, tmp_path: Path) ->
         (("--seconds", 0), "--seconds 0 must be"),
         (("--parity", "X"), "--parity 'X' is not known"),
         (("--figure", "a.bmp"), "--figure a.bmp has no known ending"),
-        (("--figure", "/no/where/a.png"), "there is no such folder"),
+        (("--figure", "/no/where/a.png"), "is not a folder"),
     ],
 )
 def test_what_cannot_be_is_refused(slipstand: Any, options: tuple[Any, ...], said: str) -> None:
