@@ -76,7 +76,7 @@ class Workers:
     record: Worker
     runs: EventWorker
     batch: EventWorker
-    campaign: EventWorker
+    campaign: Worker
     gauges: EventWorker
     ports: EventWorker
     pool: WorkerPool = field(default_factory=WorkerPool)
@@ -87,8 +87,8 @@ class Workers:
         """Make workers that share processes, all but the analysis."""
         pool = WorkerPool()
         record = Worker(report_error, pool)
-        runs, batch, campaign, gauges, ports = (EventWorker(Worker(report_error, pool)) for _ in range(5))
-        analysis = Worker(report_error)
+        runs, batch, gauges, ports = (EventWorker(Worker(report_error, pool)) for _ in range(4))
+        analysis, campaign = Worker(report_error), Worker(report_error, pool)
         return cls(analysis, record, runs, batch, campaign, gauges, ports, pool, report_error)
 
     def make(self) -> Worker:

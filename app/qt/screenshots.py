@@ -195,11 +195,11 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     wait(lambda: campaign.state.is_gathered, "the run is gathered")
     camera.shoot("campaign-first-run")
     campaign.simulate_campaign(campaign.state.folder)
-    wait(lambda: campaign.state.series > 1, "a whole campaign is simulated and gathered")
+    wait(lambda: campaign.state.summary.series_count > 1, "a whole campaign is simulated and gathered")
     camera.shoot("campaign")
     campaign.save_results()
-    wait(lambda: not campaign.state.unsaved_count, "the results are kept")
-    campaign.select_series(campaign.state.rows[0].label)
+    wait(lambda: not campaign.state.summary.unsaved_count, "the results are kept")
+    campaign.select_series(campaign.state.summary.rows[0].label)
     camera.shoot("campaign-series")
 
 

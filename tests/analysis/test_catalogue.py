@@ -23,7 +23,7 @@ from analysis.catalogue import (
     table_columns,
 )
 from analysis.quantities import Quantity
-from app.presenters.campaign import formatting
+from app.presenters.campaign.state import column_titles
 from app.reports.table.content import TableContent, row_cells, table_headers
 from app.reports.table.files import as_text
 from tests.campaign_kit import FRICTION, run
@@ -113,7 +113,7 @@ def test_a_new_column_is_one_row(monkeypatch, rows):
 
     assert table_headers()[-1] == "q_c %"
     assert row_cells(row)[-1].startswith("50.00")
-    assert formatting.column_titles()[-1] == ("q_c", "%")
+    assert column_titles()[-1] == ("q_c", "%")
     for name in ("text", "markdown", "latex"):
         assert re.search(r"q\\?_c", as_text(content, name, 200))
     header, *_ = csv.reader(io.StringIO(as_text(content, "csv", 80)))

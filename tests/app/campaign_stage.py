@@ -1,17 +1,24 @@
 """A made-up campaign as the worker would find it: three contacts' worth of runs with known friction."""
 
+import datetime
 from dataclasses import replace
 
 import numpy as np
 
-from analysis.campaign.campaign import summarize
-from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.series import RunResult, SeriesKey
-from analysis.quantities import BudgetLine, BudgetSource, Quantity
-from app.presenters.campaign.tasks import CampaignData, CampaignRun, PlannedTest
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
+from app.presenters.campaign.formatting import summarise
+from app.presenters.campaign.state import CampaignSummary
+from app.runs.campaign.collect import CollectedRuns, FailedRun
+from app.runs.campaign.run_result import RunDetails
+from app.runs.metadata import Conditions
+from config.files import load_stand
+from messages.message import message
 
 FOLDER = "/recordings"
 ALL_SERIES = ("1FFM0", "1FFM1", "1SSM0", "1SSM1")
+BEGUN = datetime.datetime(2026, 1, 12, tzinfo=datetime.UTC)
+TORN = FailedRun(f"{FOLDER}/torn.h5", message("it is no run. Choose another"))
 FRICTION = {"1FFM0": 0.100, "1FFM1": 0.100, "1SSM0": 0.150}
 
 
@@ -47,21 +54,23 @@ def runs(repeats: int = 3, scatter: float = 1e-4) -> list[RunResult]:
 
 
 def found(
-    taken: list[RunResult] | None = None, excluded: dict[str, str] | None = None, unsaved: int = 0
-) -> CampaignData:
-    """What `Gather` would bring."""
+    taken: list[RunResult] | None = None,
+    excluded: dict[str, str] | None = None,
+    unsaved: int = 0,
+    failures: tuple[FailedRun, ...] = (TORN,),
+) -> CampaignSummary:
+    """What `tasks.collect` would bring; runs given as `excluded` were so by an operator."""
     taken = runs() if taken is None else taken
     reasons = excluded or {}
-    counted = [replace(one, excluded=reasons.get(one.name, one.excluded)) for one in taken]
-    campaign = summarize(counted, known_contacts=("FF", "SS"))
-    return CampaignData(
-        campaign,
-        friction_by_contact(campaign.rows),
-        {"FF": "fluoroplastic on fluoroplastic", "SS": "steel on steel"},
-        {r.name: CampaignRun(r.name, r.results["friction_dynamic"], r.adequate) for r in counted},
-        ((f"{FOLDER}/torn.h5", "it is no run. Choose another"),),
-        ("results of a.h5 were stale: new ones are taken.",),
-        frozenset(reasons),
-        unsaved,
-        PlannedTest("1SSM1", 0, Quantity.normal(0.16, 3e-4, "1"), None, -0.0103, ()),
+    counted = tuple(replace(one, excluded=reasons.get(one.name, one.excluded)) for one in taken)
+    details = {
+        one.name: RunDetails(
+            one.name, BEGUN, one.series.code, "", "", "", Conditions(), 131.6, 22.4, "stand", "cal",
+            analysis=None if number < unsaved else 1, excluded=reasons.get(one.name, ""),
+        )
+        for number, one in enumerate(counted)
+    }  # fmt: skip
+    stale = ResultWarning("stale", message("results of a.h5 were stale: new ones are taken."))
+    return summarise(
+        CollectedRuns(counted, failures, (stale,), details, {"stand": load_stand()}, {}), ALL_SERIES
     )

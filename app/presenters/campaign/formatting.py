@@ -1,15 +1,27 @@
-"""Rows and texts of a campaign."""
+"""Rows and texts of a campaign, formatted in the worker process."""
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from analysis.campaign.campaign import Campaign
+from analysis.campaign.contacts import friction_by_contact
+from analysis.campaign.effects import Effect
+from analysis.campaign.pooling import PooledQuantity
+from analysis.campaign.rows import SeriesRow
+from analysis.campaign.series import RunResult
 from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn, table_columns
 from analysis.formatting import typeset, with_unit
+from analysis.motion.two_mass import TwoMassParameters
+from analysis.plan import plan
+from analysis.quantities import Quantity
+from analysis.record import AnalysisError
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.campaign.state import (
     Bar,
+    CampaignSummary,
     Cell,
     ContactBars,
     EffectRow,
@@ -17,16 +29,17 @@ from app.presenters.campaign.state import (
     RepeatabilityRow,
     RunRow,
     TableRow,
+    row_without_runs,
 )
-from app.presenters.campaign.tasks import TARGET_REPEATS, CampaignData, CampaignRun, PlannedTest
 from app.presenters.results import in_words, sentence
+from app.runs.campaign.collect import CollectedRuns
+from app.runs.plan_json import build_planned_test
+from config.files import load_gauges, load_stand, published_row
+from config.schema import ConfigError, Stand
 from messages.i18n import N_, gettext, ngettext, translate
 
-if TYPE_CHECKING:
-    from analysis.campaign.pooling import PooledQuantity
-    from analysis.campaign.rows import SeriesRow
-    from analysis.quantities import Quantity
-
+TARGET_REPEATS = 3
+"""Tests of each series that a campaign should have: the least that shows an outlier."""
 _FRICTION, _STATIC = "friction_dynamic", "friction_static"
 _LOWER, _UPPER = "friction_static_lower", "friction_static_upper"
 _MARKS = (
@@ -41,62 +54,65 @@ _MARKS = (
 _VERDICTS = {True: N_("found"), False: N_("none found"), None: N_("cannot be told")}
 
 
-def column_titles() -> tuple[tuple[str, str], ...]:
-    """Symbol and unit of each column, in the paper's order."""
-    return tuple((row.symbol.plain, row.unit_at(Place.WINDOW).symbol) for row, _ in table_columns())
-
-
-def table_rows(found: CampaignData | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
-    """Every series of the stand in the paper's order, then other series of the runs."""
-    rows = () if found is None else found.campaign.rows
-    by_code: dict[str, list[SeriesRow]] = {}
-    for row in rows:
-        by_code.setdefault(row.series.code if row.series.code in all_series else "", []).append(row)
-    made = []
-    for code in all_series:
-        made += [_row(row) for row in by_code.get(code, ())] or [_without_runs(code)]
-    return (*made, *(_row(row) for row in by_code.get("", ())))
-
-
-def contact_bars(found: CampaignData) -> tuple[ContactBars, ...]:
-    """Fig. 2: friction by contact."""
-    ratios = {one.contact: one for one in found.campaign.ratios}
-    made = []
-    for one in found.contacts:
-        ratio = ratios.get(one.contact)
-        made.append(
-            ContactBars(
-                one.contact or gettext("unknown"),
-                found.contact_names.get(one.contact, ""),
-                None if one.static is None else _bar(one.static),
-                None if one.dynamic is None else _bar(one.dynamic),
-                tuple(map(_bar, one.static_of_series.values())),
-                tuple(map(_bar, one.dynamic_of_series.values())),
-                tuple(one.static_at_least.values()),
-                "" if ratio is None or ratio.ratio is None else _with_spread(ratio.ratio),
-            )
-        )
-    return tuple(made)
-
-
-def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
-    """Effects on f_d."""
-    return tuple(
-        EffectRow(
-            sentence(effect.cause.value),
-            gettext(_VERDICTS[effect.found]),
-            typeset(translate(effect.sentence)),
-            is_found=effect.found is True,
-        )
-        for effect in found.campaign.effects.effects
+def summarise(runs: CollectedRuns, all_series: Sequence[str]) -> CampaignSummary:
+    """Summarise runs: series of the stand `all_series` have a row in any case."""
+    campaign = runs.campaign()
+    return CampaignSummary(
+        _table_rows(runs, campaign, all_series),
+        _contact_bars(runs, campaign),
+        tuple(map(_effect_row, campaign.effects.effects)),
+        _repeatability_rows(campaign),
+        plan_next_test(campaign, all_series),
+        _excluded_rows(runs, campaign),
+        tuple(f"{Path(failure.run).name}: {sentence(failure.error)}" for failure in runs.failures),
+        _warning_texts(runs, campaign),
+        sum(details.analysis is None for details in runs.details.values()),
     )
 
 
-def repeatability_rows(found: CampaignData) -> tuple[RepeatabilityRow, ...]:
+def _table_rows(runs: CollectedRuns, campaign: Campaign, all_series: Sequence[str]) -> tuple[TableRow, ...]:
+    by_name = {run.name: run for run in runs.runs}
+    of_series: dict[str, list[TableRow]] = {code: [] for code in all_series}
+    others: list[TableRow] = []
+    for row in campaign.rows:
+        of_series.get(row.series.code, others).append(_row(row, by_name))
+    of_stand = (of_series[code] or [row_without_runs(code)] for code in all_series)
+    return (*chain.from_iterable(of_stand), *others)
+
+
+def _contact_bars(runs: CollectedRuns, campaign: Campaign) -> tuple[ContactBars, ...]:
+    """Fig. 2: friction by contact."""
+    names = {code: named.name for stand in runs.stands.values() for code, named in stand.contacts.items()}
+    ratios = {ratio.contact: ratio.ratio for ratio in campaign.ratios}
+    return tuple(
+        ContactBars(
+            friction.contact or gettext("unknown"),
+            names.get(friction.contact, ""),
+            None if friction.static is None else _bar(friction.static),
+            None if friction.dynamic is None else _bar(friction.dynamic),
+            tuple(map(_bar, friction.static_of_series.values())),
+            tuple(map(_bar, friction.dynamic_of_series.values())),
+            tuple(friction.static_at_least.values()),
+            "" if (ratio := ratios.get(friction.contact)) is None else _with_uncertainty(ratio),
+        )
+        for friction in friction_by_contact(campaign.rows)
+    )
+
+
+def _effect_row(effect: Effect) -> EffectRow:
+    return EffectRow(
+        sentence(effect.cause.value),
+        gettext(_VERDICTS[effect.found]),
+        typeset(translate(effect.sentence)),
+        is_found=effect.found is True,
+    )
+
+
+def _repeatability_rows(campaign: Campaign) -> tuple[RepeatabilityRow, ...]:
     """Repeatability of f_d in each series with several runs, the worst first."""
     with_repeats = [
         (row, pooled)
-        for row in found.campaign.rows
+        for row in campaign.rows
         if (pooled := row.quantities.get(_FRICTION)) is not None and pooled.birge_ratio is not None
     ]
     with_repeats.sort(key=lambda pair: -(pair[1].birge_ratio or 0.0))
@@ -106,75 +122,48 @@ def repeatability_rows(found: CampaignData) -> tuple[RepeatabilityRow, ...]:
     )
 
 
-def next_test(found: CampaignData) -> NextTest:
-    """The recommended next test."""
-    expected = found.next_test
-    if expected is None:
-        return NextTest("", gettext("Every series has {count} runs or more.", count=TARGET_REPEATS), ())
-    if expected.runs == 0:
-        why = gettext("No run yet: the first series in the paper's order without one.")
-    else:
-        why = ngettext(
-            "It has {count} run of {wanted}, the fewest.",
-            "It has {count} runs of {wanted}, the fewest.",
-            expected.runs,
-            wanted=TARGET_REPEATS,
-        )
-    return NextTest(expected.series, why, _expectations(expected))
-
-
-def run_rows(found: CampaignData, label: str) -> tuple[RunRow, ...]:
-    """Runs of a row; outliers are marked."""
-    row = next((row for row in found.campaign.rows if row.label == label), None)
-    if row is None:
-        return ()
-    pooled = row.quantities.get(_FRICTION)
-    outliers = () if pooled is None else pooled.outliers
-    return tuple(_line(found.runs[path], is_outlier=path in outliers) for path in row.runs)
-
-
-def excluded_rows(found: CampaignData) -> tuple[RunRow, ...]:
+def _excluded_rows(runs: CollectedRuns, campaign: Campaign) -> tuple[RunRow, ...]:
     """Excluded runs, and why; those that an operator excluded can be included again."""
+    by_name = {run.name: run for run in runs.runs}
+    by_operator = {name for name, details in runs.details.items() if details.excluded}
+    by_operator |= {excluded.run for excluded in runs.excluded}
     return tuple(
         RunRow(
-            one.run,
-            Path(one.run).name,
-            _line(found.runs[one.run]).friction if one.run in found.runs else "–",
-            reason=sentence(one.reason),
-            can_return=one.run in found.excluded_by_operator,
+            excluded.run,
+            Path(excluded.run).name,
+            _run_row(by_name[excluded.run]).friction if excluded.run in by_name else "–",
+            reason=sentence(excluded.reason),
+            can_return=excluded.run in by_operator,
         )
-        for one in found.campaign.excluded
+        for excluded in campaign.excluded
     )
 
 
-def failure_texts(found: CampaignData) -> tuple[str, ...]:
-    """A line for each run without a result."""
-    return tuple(f"{Path(path).name}: {sentence(error)}" for path, error in found.failures)
+def _warning_texts(runs: CollectedRuns, campaign: Campaign) -> tuple[str, ...]:
+    """Warnings about the runs together and about series, with file names for paths."""
+    of_series = chain.from_iterable(row.warnings for row in campaign.rows)
+    texts = []
+    for warning in (*runs.warnings, *campaign.warnings, *of_series):
+        text = in_words(warning.message)
+        for run in runs.runs:
+            text = text.replace(run.name, Path(run.name).name)
+        texts.append(text)
+    return tuple(dict.fromkeys(texts))
 
 
-def warning_texts(found: CampaignData) -> tuple[str, ...]:
-    """Warnings about the runs together and about series."""
-    of_series = [caution.message for row in found.campaign.rows for caution in row.warnings]
-    said = [*found.warnings, *(caution.message for caution in found.campaign.warnings), *of_series]
-    return tuple(dict.fromkeys(_short(in_words(message), found) for message in said))
-
-
-def _row(row: "SeriesRow") -> TableRow:
+def _row(row: SeriesRow, runs: Mapping[str, RunResult]) -> TableRow:
+    pooled = row.quantities.get(_FRICTION)
+    outliers = () if pooled is None else pooled.outliers
     return TableRow(
         row.label,
         row.series.code,
-        len(row.runs),
+        tuple(_run_row(runs[name], is_outlier=name in outliers) for name in row.runs),
         tuple(_cell(row, *column) for column in table_columns()),
         _mark(row),
     )
 
 
-def _without_runs(code: str) -> TableRow:
-    empty = Cell(hint=gettext("No run of {series} yet.", series=code))
-    return TableRow(code, code, 0, (empty,) * len(table_columns()))
-
-
-def _cell(row: "SeriesRow", quantity: QuantityDefinition, column: TableColumn) -> Cell:
+def _cell(row: SeriesRow, quantity: QuantityDefinition, column: TableColumn) -> Cell:
     pooled = row.quantities.get(quantity.name)
     if pooled is not None:
         shown = quantity.format(pooled.quantity, Place.WINDOW)
@@ -185,7 +174,7 @@ def _cell(row: "SeriesRow", quantity: QuantityDefinition, column: TableColumn) -
     return Cell("–", "", gettext(column.missing or N_("No run of this series determined it.")))
 
 
-def _bounds(row: "SeriesRow") -> tuple[str, str]:
+def _bounds(row: SeriesRow) -> tuple[str, str]:
     """Lower and upper bound of f_s."""
     low, high = row.quantities.get(_LOWER), row.quantities.get(_UPPER)
     least = "" if low is None else f"≥ {number_text.format_fixed(low.quantity.value, 4)}"
@@ -193,7 +182,7 @@ def _bounds(row: "SeriesRow") -> tuple[str, str]:
     return least, most
 
 
-def _of_runs(row: "SeriesRow", pooled: "PooledQuantity") -> str:
+def _of_runs(row: SeriesRow, pooled: PooledQuantity) -> str:
     words = ngettext("From {count} run", "From {count} runs", pooled.runs)
     if pooled.runs < len(row.runs):
         words += gettext(" of {all}", all=len(row.runs))
@@ -204,7 +193,7 @@ def _of_runs(row: "SeriesRow", pooled: "PooledQuantity") -> str:
     return words
 
 
-def _mark(row: "SeriesRow") -> Chip:
+def _mark(row: SeriesRow) -> Chip:
     said = {caution.code: caution.message for caution in row.warnings}
     for code, tone, words in _MARKS:
         if code in said:
@@ -212,28 +201,23 @@ def _mark(row: "SeriesRow") -> Chip:
     return EMPTY_CHIP
 
 
-def _bar(quantity: "Quantity") -> Bar:
+def _bar(quantity: Quantity) -> Bar:
     low, high = quantity.interval_95
     return Bar(quantity.value, low, high)
 
 
-def _with_spread(quantity: "Quantity") -> str:
-    value, uncertainty = number_text.format_uncertain(quantity)
-    return f"{value} ± {uncertainty}" if uncertainty else value
-
-
-def _scatter(pooled: "PooledQuantity") -> str:
+def _scatter(pooled: PooledQuantity) -> str:
     if pooled.scatter is None or not pooled.quantity.value:
         return "–"
     return with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
 
 
-def _birge(pooled: "PooledQuantity") -> str:
+def _birge(pooled: PooledQuantity) -> str:
     ratio = pooled.birge_ratio
     return "–" if ratio is None or not math.isfinite(ratio) else number_text.format_fixed(ratio, 1)
 
 
-def _spread_mark(row: "SeriesRow") -> Chip:
+def _spread_mark(row: SeriesRow) -> Chip:
     pooled = row.quantities[_FRICTION]
     if pooled.outliers:
         named = ", ".join(Path(run).stem for run in pooled.outliers)
@@ -243,31 +227,64 @@ def _spread_mark(row: "SeriesRow") -> Chip:
     return Chip(gettext("repeats well"), Tone.OK)
 
 
-def _expectations(expected: PlannedTest) -> tuple[str, ...]:
-    said = []
-    if expected.pooled_friction is not None:
-        said.append(gettext("f<sub>d</sub> so far: {value}", value=_with_spread(expected.pooled_friction)))
-    if expected.friction is not None:
-        said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
-    if math.isfinite(expected.residual_displacement_m):
-        length = number_text.format_in(MILLIMETRE, abs(expected.residual_displacement_m))
-        said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
-    return (*said, *expected.warnings)
-
-
-def _line(run: CampaignRun, *, is_outlier: bool = False) -> RunRow:
-    value, uncertainty = ("–", "") if run.friction is None else number_text.format_uncertain(run.friction)
-    said = EMPTY_CHIP
+def _run_row(run: RunResult, *, is_outlier: bool = False) -> RunRow:
+    friction, status = run.results.get(_FRICTION), EMPTY_CHIP
+    value, uncertainty = ("–", "") if friction is None else number_text.format_uncertain(friction)
     if run.adequate is False:
-        said = Chip(gettext("law does not fit"), Tone.BAD)
+        status = Chip(gettext("law does not fit"), Tone.BAD)
     elif is_outlier:
-        said = Chip(gettext("outlier"), Tone.WARN)
-    return RunRow(run.path, Path(run.path).name, value, f"± {uncertainty}" if uncertainty else "", said)
+        status = Chip(gettext("outlier"), Tone.WARN)
+    return RunRow(run.name, Path(run.name).name, value, f"± {uncertainty}" if uncertainty else "", status)
 
 
-def _short(message: str, found: CampaignData) -> str:
-    """Replace paths by file names."""
-    for path in found.runs:
-        if path in message:
-            message = message.replace(path, Path(path).name)
-    return message
+def _with_uncertainty(quantity: Quantity) -> str:
+    value, uncertainty = number_text.format_uncertain(quantity)
+    return f"{value} ± {uncertainty}" if uncertainty else value
+
+
+def plan_next_test(campaign: Campaign, all_series: Sequence[str]) -> NextTest:
+    """Plan a test of the series with the fewest runs."""
+    counts = dict.fromkeys(all_series, 0)
+    for row in campaign.rows:
+        if row.series.code in counts:
+            counts[row.series.code] += len(row.runs)
+    code = min(counts, key=lambda code: counts[code], default=None)
+    if code is None or counts[code] >= TARGET_REPEATS:
+        return NextTest("", gettext("Every series has {count} runs or more.", count=TARGET_REPEATS), ())
+    reason = gettext("No run yet: the first series in the paper's order without one.")
+    if counts[code]:
+        reason = ngettext(
+            "It has {count} run of {wanted}, the fewest.",
+            "It has {count} runs of {wanted}, the fewest.",
+            counts[code],
+            wanted=TARGET_REPEATS,
+        )
+    try:
+        return NextTest(code, reason, tuple(_expectations(code, campaign, load_stand())))
+    except (AnalysisError, ConfigError):  # the stand of the series is not configured here
+        return NextTest(code, reason)
+
+
+def _expectations(code: str, campaign: Campaign, stand: Stand) -> Iterator[str]:
+    """What a test will show by T, n1 and f_d of its series, else of the published table."""
+    series, published = stand.series(code), published_row(code)
+    found = next((row.quantities for row in campaign.rows if row.series.code == code), {})
+    values = {
+        name: found[name].quantity.value if name in found else getattr(published, name)
+        for name in ("period_s", "damping_n1_per_s", _FRICTION)
+    }
+    parameters = TwoMassParameters.from_free_decay(
+        table_mass_kg=stand.table_mass_kg,
+        plate_mass_kg=series.plate_mass_kg,
+        pullback_m=series.pullback_m,
+        **values,
+    )
+    planned = plan(build_planned_test(parameters, stand, load_gauges()))
+    if _FRICTION in found:
+        so_far = _with_uncertainty(found[_FRICTION].quantity)
+        yield gettext("f<sub>d</sub> so far: {value}", value=so_far)
+    if (friction := planned.results.get(_FRICTION)) is not None:
+        yield gettext("f<sub>d</sub> by one test: {value}", value=_with_uncertainty(friction))
+    length = number_text.format_in(MILLIMETRE, abs(planned.motion.residual_displacement_m))
+    yield gettext("the plate ends {length} off: re-centre it afterwards", length=length)
+    yield from (sentence(warning.message) for warning in planned.warnings)

@@ -1,52 +1,45 @@
 """Presenter of the Campaign screen: collects and summarises the runs of a folder."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.campaign import formatting
-from app.presenters.campaign.state import CampaignState, Product
-from app.presenters.campaign.tasks import (
-    EXECUTE,
-    CampaignData,
-    CampaignTask,
-    CollectRuns,
-    ExcludeRun,
-    SimulateCampaign,
-    UndoExclusion,
-    WriteProduct,
+from app.presenters.campaign.state import (
+    CampaignState,
+    CampaignSummary,
+    Product,
+    column_titles,
+    row_without_runs,
 )
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.events import TaskFailure
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import EventWorker
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext, ngettext
 
-
-@dataclass(frozen=True, slots=True)
-class _Undo:
-    """Task that undoes an exclusion or inclusion, and its description."""
-
-    text: str
-    task: UndoExclusion
+if TYPE_CHECKING:
+    from app.presenters.campaign import products, tasks
+else:
+    products = LazyModule("app.presenters.campaign.products")
+    tasks = LazyModule("app.presenters.campaign.tasks")
 
 
 class CampaignPresenter(Presenter[CampaignState]):
     """Campaign of a folder: `author` is recorded with each exclusion, `close` ends the worker."""
 
     def __init__(
-        self, worker: EventWorker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
+        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
     ) -> None:
-        rows = formatting.table_rows(None, all_series)
-        super().__init__(CampaignState(folder=folder, columns=formatting.column_titles(), rows=rows))
         self._worker = worker
         self._all_series = all_series
         self._author = author
         self.navigator = navigator
-        self._data: CampaignData | None = None
-        self._undos: list[_Undo] = []
-        self._collecting: CollectRuns | None = None
+        self._undos: list[tuple[str, str]] = []
+        """Description of each exclusion or inclusion, and path of the run."""
+        self._is_collecting = False
+        super().__init__(self._empty_state(folder))
 
     def enter(self) -> None:
         self.refresh()
@@ -59,14 +52,8 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def choose_folder(self, folder: str) -> None:
         self._worker.cancel()
-        self._undos, self._data, self._collecting = [], None, None
-        self._update(
-            folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0,
-            contacts=(), effects=(),
-            repeatability=(), next_test=None, selected="", selected_runs=(), excluded=(), faults=(),
-            warnings=(), unsaved_count=0,
-            undo_text="", message=EMPTY_CHIP, progress=None, is_gathered=False,
-        )  # fmt: skip
+        self._undos, self._is_collecting = [], False
+        self._set_state(self._empty_state(folder))
         self.refresh()
 
     def cancel(self) -> None:
@@ -74,136 +61,114 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def select_series(self, label: str) -> None:
         """Select a row, and list its runs."""
-        runs = () if self._data is None else formatting.run_rows(self._data, label)
-        self._update(selected=label, selected_runs=runs)
+        self._update(selected=label)
 
     def open_row(self, label: str) -> None:
-        row = next((row for row in self.state.rows if row.label == label), None)
+        row = next((row for row in self.state.summary.rows if row.label == label), None)
         if row is not None and row.runs:
             self.navigator.show_runs(self.state.folder, row.code)
 
     def exclude_run(self, path: str, reason: str) -> None:
         """Exclude a run; the reason is required, and recorded in the run."""
-        if not reason.strip():
-            self._set_message(
-                Chip(gettext("Say why the run is left out: the reason stands in the table"), Tone.WARN)
-            )
-            return
-        self._exclude(path, reason.strip())
+        if reason.strip():
+            self._exclude(path, reason.strip())
+        else:
+            text = gettext("Say why the run is left out: the reason stands in the table")
+            self._update(message=Chip(text, Tone.WARN))
 
     def include_run(self, path: str) -> None:
         self._exclude(path, "")
 
     def undo(self) -> None:
         if self._undos:
-            self._submit(self._undos.pop().task)
+            _, path = self._undos.pop()
+            arguments = (self.state.folder, self._all_series, path, self._author)
+            self._submit(tasks.undo_exclusion, *arguments, done=self._on_summary)
 
     def save_results(self) -> None:
         self._collect(save=True)
 
     def export(self, product: Product, target: str) -> None:
-        if self.state.runs:
-            self._submit(WriteProduct(self.state.folder, product, target))
+        if self.state.summary.run_count:
+            self._submit(products.write_product, self.state.folder, product, target, done=self._on_written)
 
     def simulate_campaign(self, folder: str) -> None:
         """Simulate a campaign into a new folder below `folder`, and show it."""
         self._update(progress=Progress(gettext("Simulating the campaign")))
-        self._submit(SimulateCampaign(folder))
+        self._submit(tasks.simulate, folder, done=self.choose_folder)
 
     def tick(self) -> None:
-        for event in self._worker.poll():
-            self._on_event(event)
+        self._worker.poll()
 
     def close(self) -> None:
         self._worker.close()
 
-    def _submit(self, task: CampaignTask) -> None:
-        self._worker.submit(EXECUTE, task)
+    def _empty_state(self, folder: str) -> CampaignState:
+        rows = tuple(map(row_without_runs, self._all_series))
+        return CampaignState(folder, CampaignSummary(rows), column_titles())
+
+    def _submit(self, task: Any, *arguments: Any, done: Callable[[Any], None]) -> None:
+        """Submit a task; what comes of it is ignored if another folder was chosen meanwhile."""
+        folder = self.state.folder
+
+        def if_shown(callback: Callable[[Any], None], value: Any) -> None:
+            if self.state.folder == folder:
+                callback(value)
+
+        def on_done(answer: Any) -> None:
+            self._update(progress=None)
+            done(answer)
+
+        self._worker.submit(
+            task,
+            *arguments,
+            done=partial(if_shown, on_done),
+            failed=partial(if_shown, self._on_failed),
+            progress=partial(if_shown, lambda progress: self._update(progress=progress)),
+        )
 
     def _collect(self, *, save: bool) -> None:
-        if self._collecting is not None:
+        if self._is_collecting:
             return
-        self._collecting = CollectRuns(self.state.folder, self._all_series, save)
-        if self._data is None:
+        self._is_collecting = True
+        if not self.state.is_gathered:
             self._update(progress=Progress(gettext("Gathering runs")))
-        self._submit(self._collecting)
+        done = partial(self._on_collected, save)
+        self._submit(tasks.collect, self.state.folder, self._all_series, save, done=done)
 
     def _exclude(self, path: str, reason: str) -> None:
-        self._submit(ExcludeRun(self.state.folder, self._all_series, path, reason, self._author))
+        arguments = (self.state.folder, self._all_series, path, reason, self._author)
+        self._submit(tasks.exclude_run, *arguments, done=partial(self._on_excluded, path, reason))
 
-    def _push_undo(self, done: ExcludeRun) -> None:
-        back = UndoExclusion(done.folder, done.all_series, done.path, self._author)
-        self._undos.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
-
-    def _on_event(self, event: WorkerEvent) -> None:
-        task = event.argument
-        if isinstance(task, CollectRuns | ExcludeRun | UndoExclusion) and task.folder != self.state.folder:
-            return  # another folder was chosen meanwhile
-        if isinstance(event, TaskProgress):
-            self._update(progress=event.progress)
-            return
+    def _on_failed(self, failure: TaskFailure) -> None:
+        self._is_collecting = False
         self._update(progress=None)
-        if task == self._collecting:
-            self._collecting = None
-        if isinstance(event, TaskFailed):
-            self._on_failed(event)
-        else:
-            self._on_done(event)
+        if not failure.is_cancelled:
+            self._update(message=Chip(sentence(failure.message), Tone.BAD))
 
-    def _on_failed(self, event: TaskFailed) -> None:
-        if not event.is_cancelled:
-            self._set_message(Chip(sentence(event.message), Tone.BAD))
+    def _on_collected(self, saved: bool, summary: CampaignSummary) -> None:
+        self._is_collecting = False
+        self._on_summary(summary)
+        if saved:
+            self._update(message=Chip(gettext("New results are kept in their runs"), Tone.OK))
 
-    def _on_done(self, event: TaskDone[Any]) -> None:
-        task, answer = event.argument, event.answer
-        match task:
-            case CollectRuns(save=save):
-                self._show(answer)
-                if save:
-                    self._set_message(Chip(gettext("New results are kept in their runs"), Tone.OK))
-            case ExcludeRun():
-                self._push_undo(task)
-                self._show(answer)
-                run = Path(task.path).stem
-                text = (
-                    gettext("{run} is left out", run=run)
-                    if task.reason
-                    else gettext("{run} counts again", run=run)
-                )
-                self._set_message(Chip(text, Tone.OK))
-            case UndoExclusion():
-                self._show(answer)
-            case WriteProduct():
-                text = ngettext(
-                    "Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0]
-                )
-                self._set_message(Chip(text, Tone.OK))
-            case SimulateCampaign():
-                self.choose_folder(answer)
+    def _on_excluded(self, path: str, reason: str, summary: CampaignSummary) -> None:
+        self._undos.append((gettext("leaving out") if reason else gettext("taking in"), path))
+        self._on_summary(summary)
+        name = Path(path).stem
+        text = gettext("{run} is left out", run=name) if reason else gettext("{run} counts again", run=name)
+        self._update(message=Chip(text, Tone.OK))
 
-    def _show(self, data: CampaignData) -> None:
-        self._data = data
-        chosen = (
-            self.state.selected if any(r.label == self.state.selected for r in data.campaign.rows) else ""
-        )
+    def _on_written(self, files: tuple[str, ...]) -> None:
+        text = ngettext("Wrote {first}", "Wrote {count} files: {first} …", len(files), first=files[0])
+        self._update(message=Chip(text, Tone.OK))
+
+    def _on_summary(self, summary: CampaignSummary) -> None:
+        has_selected = any(row.label == self.state.selected and row.runs for row in summary.rows)
         self._update(
-            rows=formatting.table_rows(data, self._all_series),
-            runs=sum(len(row.runs) for row in data.campaign.rows),
-            series=len(data.campaign.rows),
-            contacts=formatting.contact_bars(data),
-            effects=formatting.effect_rows(data),
-            repeatability=formatting.repeatability_rows(data),
-            next_test=formatting.next_test(data),
-            selected=chosen,
-            selected_runs=formatting.run_rows(data, chosen),
-            excluded=formatting.excluded_rows(data),
-            faults=formatting.failure_texts(data),
-            warnings=formatting.warning_texts(data),
-            unsaved_count=data.unsaved_count,
-            undo_text=self._undos[-1].text if self._undos else "",
+            summary=summary,
+            selected=self.state.selected if has_selected else "",
+            undo_text=self._undos[-1][0] if self._undos else "",
             message=EMPTY_CHIP,
             is_gathered=True,
         )
-
-    def _set_message(self, message: Chip) -> None:
-        self._update(message=message)

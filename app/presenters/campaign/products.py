@@ -1,4 +1,4 @@
-"""Products of a campaign: table, figures and report, written by the code of the command line."""
+"""Products of a campaign: table, figures and report. It loads matplotlib and typst."""
 
 import datetime
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from analysis.campaign.campaign import Campaign
 from app.presenters.base import Progress, ReportProgress
 from app.presenters.campaign.state import Product
+from app.presenters.campaign.tasks import collected_runs
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.content import TableContent
 from app.reports.table.files import as_text, write_text, write_workbook
@@ -19,13 +20,12 @@ _UNLIMITED_WIDTH = 1_000_000
 """Width of a text that is not printed on a terminal."""
 
 
-def write_product(
-    product: Product, target: Path, runs: CollectedRuns, report: ReportProgress
-) -> tuple[str, ...]:
-    """Write a product; return the files. Raises RunError.
+def write_product(folder: str, product: Product, path: str, report: ReportProgress) -> tuple[str, ...]:
+    """Write a product of a folder; return the files. Raises RunError.
 
     Tables and reports replace a file: the dialog has asked. Figures go to a folder and replace nothing.
     """
+    target, runs = Path(path), collected_runs(folder, report)
     campaign = runs.campaign()
     report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from analysis.catalogue import Place, table_columns
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
+from messages.i18n import gettext
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +25,22 @@ class TableRow:
     """Unique in the table."""
     code: str
     """Series code; "" for runs without one."""
-    runs: int
-    """Number of runs that are included."""
+    runs: tuple["RunRow", ...]
+    """Runs that are included."""
     cells: tuple[Cell, ...]
     """In the order of the columns."""
     status: Chip = EMPTY_CHIP
     """Most important warning about the series."""
+
+
+def row_without_runs(code: str) -> TableRow:
+    empty = Cell(hint=gettext("No run of {series} yet.", series=code))
+    return TableRow(code, code, (), (empty,) * len(table_columns()))
+
+
+def column_titles() -> tuple[tuple[str, str], ...]:
+    """Symbol and unit of each column, in the paper's order."""
+    return tuple((row.symbol.plain, row.unit_at(Place.WINDOW).symbol) for row, _ in table_columns())
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,24 +125,15 @@ class Product(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class CampaignState:
-    """State of the screen."""
+class CampaignSummary:
+    """What the runs of a folder say together."""
 
-    folder: str = ""
-    columns: tuple[tuple[str, str], ...] = ()
-    """Symbol and unit of each column."""
-    rows: tuple[TableRow, ...] = ()
+    rows: tuple[TableRow, ...]
     """Every series of the stand in the paper's order, then other series of the runs."""
-    runs: int = 0
-    """Numbers of included runs and series."""
-    series: int = 0
     contacts: tuple[ContactBars, ...] = ()
     effects: tuple[EffectRow, ...] = ()
     repeatability: tuple[RepeatabilityRow, ...] = ()
     next_test: NextTest | None = None
-    selected: str = ""
-    """Label of the row whose runs are `selected_runs`."""
-    selected_runs: tuple[RunRow, ...] = ()
     excluded: tuple[RunRow, ...] = ()
     faults: tuple[str, ...] = ()
     """A line for each run without a result."""
@@ -138,8 +141,32 @@ class CampaignState:
     """Warnings about the runs together."""
     unsaved_count: int = 0
     """Number of runs whose result is not saved in them."""
+
+    @property
+    def run_count(self) -> int:
+        return sum(len(row.runs) for row in self.rows)
+
+    @property
+    def series_count(self) -> int:
+        return sum(bool(row.runs) for row in self.rows)
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignState:
+    """State of the screen."""
+
+    folder: str
+    summary: CampaignSummary
+    columns: tuple[tuple[str, str], ...] = ()
+    """Symbol and unit of each column."""
+    selected: str = ""
+    """Label of the row whose runs are listed."""
     undo_text: str = ""
     """Change that undo would undo; empty without one."""
     message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False
+
+    @property
+    def selected_runs(self) -> tuple[RunRow, ...]:
+        return next((row.runs for row in self.summary.rows if row.label == self.selected), ())

@@ -1,111 +1,134 @@
-"""Tasks of the Campaign screen; the worker process executes them in `work`."""
+"""Tasks of the Campaign screen, executed in its worker process."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
-from app.presenters.campaign.state import Product
-from app.presenters.worker import LazyFunction
-from messages.message import Message
+from app.presenters.base import ReportProgress, batch_progress
+from app.presenters.campaign.formatting import TARGET_REPEATS, summarise
+from app.presenters.campaign.state import CampaignSummary
+from app.runs.batch.executors import ExecutorOptions
+from app.runs.campaign.collect import CollectedRuns, CollectOptions, RunCollection, iter_collected
+from app.runs.edits import edit_run, undo_edit
+from app.runs.listing import find_run_files
+from app.runs.metadata_io import Change
+from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, record_tests
+from config.files import load_gauges, load_stand
+from messages.i18n import N_
 
-if TYPE_CHECKING:  # the window does not load `analysis` before it needs a summary
-    from analysis.campaign.campaign import Campaign
-    from analysis.campaign.contacts import ContactFriction
-    from analysis.quantities import Quantity
-
-EXECUTE: Final = LazyFunction("app.presenters.campaign.work", "execute")
-TARGET_REPEATS: Final = 3
-"""Tests of each series that a campaign should have: the least that shows an outlier."""
+FileStamp = tuple[int, int]
+"""Time of the last change of a file (ns), and its size (bytes)."""
+_READING = N_("Gathering {name}, {number} of {all}")
+_RECORDING = N_("Recording {name}, {number} of {all}")
 
 
-@dataclass(frozen=True, slots=True)
-class CollectRuns:
+@dataclass
+class _Cache:
+    """Last collected folder of this process: unchanged files are not read again."""
+
+    folder: str = ""
+    is_whole: bool = False
+    files: dict[str, FileStamp] = field(default_factory=dict)
+    collection: RunCollection = field(default_factory=RunCollection)
+    runs: CollectedRuns = field(default_factory=lambda: RunCollection().collected_runs([], CollectOptions()))
+
+    def holds(self, folder: str) -> bool:
+        return self.is_whole and self.folder == folder
+
+
+_cache = _Cache()
+
+
+def collect(folder: str, all_series: Sequence[str], save: bool, report: ReportProgress) -> CampaignSummary:
     """Collect and summarise the runs of a folder; with `save`, save new results in their runs."""
-
-    folder: str
-    all_series: tuple[str, ...]
-    save: bool = False
+    _collect(folder, report, save=save)
+    return summarise(_cache.runs, all_series)
 
 
-@dataclass(frozen=True, slots=True)
-class ExcludeRun:
+def exclude_run(
+    folder: str, all_series: Sequence[str], path: str, reason: str, author: str, report: ReportProgress
+) -> CampaignSummary:
     """Record in a run why it is excluded, or with an empty reason that it is not, and summarise again."""
-
-    folder: str
-    all_series: tuple[str, ...]
-    path: str
-    reason: str
-    author: str
+    change = edit_run(Path(path), author, excluded=reason)
+    return _summarise_changed(folder, all_series, path, change, report)
 
 
-@dataclass(frozen=True, slots=True)
-class UndoExclusion:
+def undo_exclusion(
+    folder: str, all_series: Sequence[str], path: str, author: str, report: ReportProgress
+) -> CampaignSummary:
     """Undo the last exclusion or inclusion of a run, and summarise again."""
-
-    folder: str
-    all_series: tuple[str, ...]
-    path: str
-    author: str
+    change = undo_edit(Path(path), author, ("excluded",))
+    return _summarise_changed(folder, all_series, path, change, report)
 
 
-@dataclass(frozen=True, slots=True)
-class WriteProduct:
-    """Write a product of the campaign to a file or folder."""
-
-    folder: str
-    product: Product
-    target: str
-
-
-@dataclass(frozen=True, slots=True)
-class SimulateCampaign:
-    """Simulate a campaign into a new folder below `folder`."""
-
-    folder: str
-    repeats: int = TARGET_REPEATS
+def simulate(folder: str, report: ReportProgress) -> str:
+    """Simulate and record all tests of a campaign into a new folder below `folder`; return its path."""
+    now = datetime.datetime.now().astimezone()
+    place = Path(folder) / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
+    tests = plan_tests(CampaignOptions(repeats=TARGET_REPEATS), load_stand(), load_gauges(), place, now)
+    record_tests(tests, ExecutorOptions(), batch_progress(report, _RECORDING, [test.path for test in tests]))
+    return str(place)
 
 
-CampaignTask = CollectRuns | ExcludeRun | UndoExclusion | WriteProduct | SimulateCampaign
+def collected_runs(folder: str, report: ReportProgress) -> CollectedRuns:
+    """Runs of a folder, which are collected if they are not those collected last."""
+    if not _cache.holds(folder):
+        _collect(folder, report, save=False)
+    return _cache.runs
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class PlannedTest:
-    """Expected results of one more test."""
-
-    series: str
-    runs: int
-    """Number of existing runs."""
-    friction: "Quantity | None"
-    """With the uncertainty of a single test."""
-    pooled_friction: "Quantity | None"
-    """Of the existing runs."""
-    residual_displacement_m: float
-    warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class CampaignRun:
-    """Path, friction and adequacy of a run."""
-
-    path: str
-    friction: "Quantity | None"
-    adequate: bool | None
+def _collect(folder: str, report: ReportProgress, *, save: bool) -> None:
+    """Collect the files of a folder that are new or changed since the last call."""
+    if folder != _cache.folder:
+        _cache.folder, _cache.is_whole, _cache.files, _cache.collection = folder, False, {}, RunCollection()
+    files_now = _run_files(Path(folder))
+    unsaved = _unsaved_runs() if save and _cache.is_whole else set()
+    new = [path for path, stamp in files_now.items() if _cache.files.get(path) != stamp or path in unsaved]
+    options = CollectOptions(save=save)
+    _cache.is_whole = False
+    step = batch_progress(report, _READING, new)
+    for collected in iter_collected([Path(path) for path in new], options, step):
+        _cache.collection.update(collected)
+        _cache.files[collected.path] = files_now[collected.path] if not save else _stamp(Path(collected.path))
+    _cache.files = {path: _cache.files[path] for path in files_now}
+    _cache.collection.keep_only(files_now)
+    _cache.runs = _cache.collection.collected_runs(_folders(folder), options)
+    _cache.is_whole = True
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class CampaignData:
-    """Summary of the runs of a folder."""
+def _summarise_changed(
+    folder: str, all_series: Sequence[str], path: str, change: Change, report: ReportProgress
+) -> CampaignSummary:
+    """Update the cached run, of which nothing but the exclusion has changed."""
+    if _cache.holds(folder) and path in _cache.files:
+        _cache.files[path] = _stamp(Path(path))
+        _cache.collection.exclude(path, change.fields["excluded"])
+        _cache.runs = _cache.collection.collected_runs(_folders(folder), CollectOptions())
+    else:
+        _collect(folder, report, save=False)
+    return summarise(_cache.runs, all_series)
 
-    campaign: "Campaign"
-    contacts: "tuple[ContactFriction, ...]"
-    contact_names: dict[str, str]
-    """By code of the contact."""
-    runs: dict[str, CampaignRun]
-    """By path."""
-    failures: tuple[tuple[str, Message], ...]
-    """Path, and why there is no result."""
-    warnings: tuple[Message, ...]
-    excluded_by_operator: frozenset[str]
-    """Paths of runs that can be included again."""
-    unsaved_count: int
-    """Number of runs whose result is not saved in them."""
-    next_test: PlannedTest | None
+
+def _folders(folder: str) -> list[Path]:
+    """The folder, if it exists: the first recording creates the recordings folder."""
+    return [Path(folder)] if Path(folder).is_dir() else []
+
+
+def _unsaved_runs() -> set[str]:
+    """Paths of runs whose result is not saved in them."""
+    return {path for path, details in _cache.runs.details.items() if details.analysis is None}
+
+
+def _run_files(folder: Path) -> dict[str, FileStamp]:
+    """Run files of a folder, and the stamp of each."""
+    return {str(path): _stamp(path) for path in sorted(find_run_files(folder))} if folder.is_dir() else {}
+
+
+def _stamp(path: Path) -> FileStamp:
+    """Stamp of a file; zeros if it is gone."""
+    try:
+        stat = path.stat()
+    except FileNotFoundError:
+        return 0, 0
+    return stat.st_mtime_ns, stat.st_size

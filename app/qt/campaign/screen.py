@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.state import CampaignState, Product
+from app.presenters.campaign.state import CampaignState, CampaignSummary, Product
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections, SelectedRuns
 from app.qt.campaign.table import SeriesTable
@@ -65,39 +65,41 @@ class CampaignScreen(QWidget):
     def show_state(self, state: CampaignState) -> None:
         old, self._shown = self._shown, state
         self._show_head(state)
-        is_empty = not state.runs and not state.faults
+        is_empty = not state.summary.run_count and not state.summary.faults
         self._stack.setCurrentIndex(1 if is_empty else 0)
         if is_empty:
             self._empty.show_state(state)
         if old is None or state.columns != old.columns:
             self._table.show_columns(state.columns)
-        if old is None or state.rows != old.rows:
-            self._table.show_rows(state.rows)
-        if old is None or state.contacts != old.contacts:
-            self._plot.show_contacts(state.contacts)
+        summary, before = state.summary, old.summary if old else None
+        if before is None or summary.rows != before.rows:
+            self._table.show_rows(summary.rows)
+        if before is None or summary.contacts != before.contacts:
+            self._plot.show_contacts(summary.contacts)
         if old is None or (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
             self._chosen.show_runs(state.selected, state.selected_runs)
-        if old is None or _section_parts(state) != _section_parts(old):
-            self._show_sections(state)
-        if old is not None and len(state.excluded) > len(old.excluded):
+        if summary != before:
+            self._show_sections(summary)
+        if before is not None and len(summary.excluded) > len(before.excluded):
             self._chosen.clear_reason()
             self._table.setFocus()  # in the field of the reason Ctrl+Z would take back letters
 
-    def _show_sections(self, state: CampaignState) -> None:
+    def _show_sections(self, summary: CampaignSummary) -> None:
         while (item := self._sections.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
-        self._sections.addWidget(Sections(state, self._presenter))
+        self._sections.addWidget(Sections(summary, self._presenter))
 
     def _show_head(self, state: CampaignState) -> None:
-        counted = ngettext("{count} run", "{count} runs", state.runs)
-        of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=state.series)
-        self._title.setText(of_all if state.runs else gettext("Campaign"))
+        summary = state.summary
+        counted = ngettext("{count} run", "{count} runs", summary.run_count)
+        of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=summary.series_count)
+        self._title.setText(of_all if summary.run_count else gettext("Campaign"))
         self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
-        self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", state.unsaved_count))
-        self._keep.setVisible(state.unsaved_count > 0 and state.progress is None)
+        self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", summary.unsaved_count))
+        self._keep.setVisible(summary.unsaved_count > 0 and state.progress is None)
         self._undo.setEnabled(bool(state.undo_text))
-        self._export.setEnabled(state.runs > 0 and state.progress is None)
+        self._export.setEnabled(summary.run_count > 0 and state.progress is None)
         self._working.show_progress(state.progress)
         show_chip(self._message, state.message)
 
@@ -226,8 +228,3 @@ def _where(state: CampaignState) -> str:
     if state.is_gathered:
         return N_("There are no runs in {folder} yet.")
     return N_("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
-
-
-def _section_parts(state: CampaignState) -> tuple[object, ...]:
-    """What the sections are made of."""
-    return state.next_test, state.effects, state.repeatability, state.excluded, state.faults, state.warnings

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QVBox
 from analysis.formatting import THIN_SPACE
 from app.presenters.base import Chip, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.state import CampaignState, NextTest, RepeatabilityRow, RunRow
+from app.presenters.campaign.state import CampaignSummary, NextTest, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
@@ -21,19 +21,19 @@ _SPREAD_SHOWN = 8
 class Sections(QWidget):
     """Built anew whenever the campaign was summed up."""
 
-    def __init__(self, state: CampaignState, presenter: CampaignPresenter) -> None:
+    def __init__(self, summary: CampaignSummary, presenter: CampaignPresenter) -> None:
         super().__init__()
         self._presenter = presenter
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(8)
-        if state.next_test is not None:
-            self._add_next(layout, state.next_test)
-        self._add_effects(layout, state)
-        self._add_spread(layout, state.repeatability)
-        self._add_left_out(layout, state.excluded)
-        _add_lines(layout, gettext("Without a result"), state.faults, Tone.BAD)
-        _add_lines(layout, gettext("To know"), state.warnings, Tone.WARN)
+        if summary.next_test is not None:
+            self._add_next(layout, summary.next_test)
+        self._add_effects(layout, summary)
+        self._add_spread(layout, summary.repeatability)
+        self._add_left_out(layout, summary.excluded)
+        _add_lines(layout, gettext("Without a result"), summary.faults, Tone.BAD)
+        _add_lines(layout, gettext("To know"), summary.warnings, Tone.WARN)
         layout.addStretch(1)
 
     def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
@@ -48,11 +48,11 @@ class Sections(QWidget):
             record = make_button(gettext("Record"), show_record, gettext("Go to Record"))
             layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
 
-    def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
-        if not state.effects:
+    def _add_effects(self, layout: QVBoxLayout, summary: CampaignSummary) -> None:
+        if not summary.effects:
             return
         _section(layout, gettext("What f<sub>d</sub> depends on"))
-        for effect in state.effects:
+        for effect in summary.effects:
             line = make_row(
                 label(effect.cause, TextRole.STRONG),
                 STRETCH,

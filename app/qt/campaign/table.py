@@ -144,11 +144,11 @@ class _TwoLines(QStyledItemDelegate):
 
 
 def _head(row: TableRow) -> QTableWidgetItem:
-    said = ngettext("{count} run", "{count} runs", row.runs) if row.runs else gettext("no run yet")
+    said = ngettext("{count} run", "{count} runs", len(row.runs)) if row.runs else gettext("no run yet")
     tone = row.status.tone.value
     below = f"{_MARKS.get(tone, '')}{row.status.text}" if row.status.text else said
     item = _filled(row.label, below, Qt.AlignmentFlag.AlignLeft, f"{said}\n{row.status.hint}".strip())
-    item.setData(_BOLD, row.runs > 0)
+    item.setData(_BOLD, bool(row.runs))
     item.setData(_TONE, tone)
     item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.label}, {said}, {row.status.text}")
     return item

@@ -9,17 +9,8 @@ import pytest
 from analysis.campaign.campaign import summarize
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.base import Progress
-from app.presenters.campaign import formatting
+from app.presenters.campaign import products, tasks
 from app.presenters.campaign.state import Product
-from app.presenters.campaign.tasks import (
-    CampaignData,
-    CollectRuns,
-    ExcludeRun,
-    SimulateCampaign,
-    UndoExclusion,
-    WriteProduct,
-)
-from app.presenters.campaign.work import execute
 from app.runs.campaign.collect import collect_runs
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
@@ -47,20 +38,21 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path) -> None:
     said: list[Progress] = []
-    task = CollectRuns(str(folder), SERIES)
-    found: CampaignData = execute(task, said.append)
-    (row,) = found.campaign.rows
+    found = tasks.collect(str(folder), SERIES, False, said.append)
+    (row, _) = found.rows
     (expected,) = summarize(collect_runs([folder]).runs).rows
-    assert row.quantities["friction_dynamic"].quantity == expected.quantities["friction_dynamic"].quantity
+    friction = expected.quantities["friction_dynamic"].quantity
+    shown = [cell.value for cell in row.cells if cell.uncertainty == f"± {friction.standard_uncertainty:.2g}"]
+    assert f"{friction.value:.5f}" in shown
     assert said[-1].fraction is not None
     assert found.unsaved_count == 2
-    assert [line.name for line in formatting.run_rows(found, "1FFM0")] == ["run_0.h5", "run_1.h5"]
+    assert [line.name for line in row.runs] == ["run_0.h5", "run_1.h5"]
     assert found.next_test is not None
-    assert (found.next_test.series, found.next_test.runs) == ("1FFM1", 0)
-    assert found.next_test.friction is not None
+    assert (found.next_test.series, found.next_test.reason[:10]) == ("1FFM1", "No run yet")
+    assert any("by one test" in text for text in found.next_test.expectations)
 
     said.clear()
-    assert execute(task, said.append).campaign.rows[0].quantities == row.quantities
+    assert tasks.collect(str(folder), SERIES, False, said.append).rows[0] == row
     assert said == []  # nothing has changed, so nothing is read again
 
 
@@ -68,60 +60,60 @@ def test_what_is_left_out_is_kept_in_the_run_and_found_by_window_and_command_lin
     folder: Path, tmp_path: Path
 ) -> None:
     said: list[Progress] = []
-    execute(CollectRuns(str(folder), SERIES), said.append)
+    tasks.collect(str(folder), SERIES, False, said.append)
     said.clear()
     run = str(folder / "run_1.h5")
-    fewer: CampaignData = execute(ExcludeRun(str(folder), SERIES, run, "touched", "Ada"), said.append)
-    assert fewer.campaign.rows[0].runs == (str(folder / "run_0.h5"),)
-    (line,) = formatting.excluded_rows(fewer)
+    fewer = tasks.exclude_run(str(folder), SERIES, run, "touched", "Ada", said.append)
+    assert [run.name for run in fewer.rows[0].runs] == ["run_0.h5"]
+    (line,) = fewer.excluded
     assert (line.path, line.reason, line.can_return) == (run, "Touched", True)
     assert (open_run(run).metadata.excluded, open_run(run).changes[-1].author) == ("touched", "Ada")
-    assert collect_runs([folder]).campaign().excluded == fewer.campaign.excluded
+    assert [one.run for one in collect_runs([folder]).campaign().excluded] == [run]
 
-    again: CampaignData = execute(CollectRuns(str(folder), SERIES), said.append)
-    assert again.campaign.excluded == fewer.campaign.excluded
+    again = tasks.collect(str(folder), SERIES, False, said.append)
+    assert again.excluded == fewer.excluded
     assert said == []  # what was edited here is known, so nothing is read again
 
     target = tmp_path / "table.csv"
-    assert execute(WriteProduct(str(folder), Product.TABLE, str(target)), said.append) == (str(target),)
+    assert products.write_product(str(folder), Product.TABLE, str(target), said.append) == (str(target),)
     (written,) = csv.DictReader(target.read_text().splitlines())
     assert float(written["friction_dynamic"]) == pytest.approx(0.1000, abs=2e-4)
 
     edit_run(Path(run), "Bob", note="dry")
-    both: CampaignData = execute(UndoExclusion(str(folder), SERIES, run, "Ada"), said.append)
-    assert len(both.campaign.rows[0].runs) == 2
+    both = tasks.undo_exclusion(str(folder), SERIES, run, "Ada", said.append)
+    assert len(both.rows[0].runs) == 2
     assert open_run(run).metadata.note == "dry"
 
 
 def test_only_what_has_changed_is_read_again(folder: Path) -> None:
     said: list[Progress] = []
-    execute(CollectRuns(str(folder), SERIES, save=True), said.append)
+    tasks.collect(str(folder), SERIES, True, said.append)
     shutil.copy(folder / "run_0.h5", folder / "run_2.h5")
     said.clear()
-    found: CampaignData = execute(CollectRuns(str(folder), SERIES), said.append)
+    found = tasks.collect(str(folder), SERIES, False, said.append)
     assert {progress.text for progress in said} == {"Gathering run_2, 1 of 1"}
-    assert [line.can_return for line in formatting.excluded_rows(found)] == [False]
+    assert [line.can_return for line in found.excluded] == [False]
     (folder / "run_0.h5").unlink()
-    found = execute(CollectRuns(str(folder), SERIES), said.append)
-    assert formatting.excluded_rows(found) == ()
-    assert found.campaign.rows[0].runs == (str(folder / "run_1.h5"), str(folder / "run_2.h5"))
+    found = tasks.collect(str(folder), SERIES, False, said.append)
+    assert found.excluded == ()
+    assert [run.name for run in found.rows[0].runs] == ["run_1.h5", "run_2.h5"]
 
 
 def test_only_results_that_are_not_kept_are_made_again_to_be_kept(folder: Path) -> None:
     said: list[Progress] = []
-    assert execute(CollectRuns(str(folder), SERIES), said.append).unsaved_count == 2
-    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved_count == 0
+    assert tasks.collect(str(folder), SERIES, False, said.append).unsaved_count == 2
+    assert tasks.collect(str(folder), SERIES, True, said.append).unsaved_count == 0
     said.clear()
-    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved_count == 0
+    assert tasks.collect(str(folder), SERIES, True, said.append).unsaved_count == 0
     assert said == []
 
 
 def test_a_synthetic_campaign_is_recorded_with_progress(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.presenters.campaign.work.plan_tests", lambda *given: plan_tests(*given)[:2])
+    monkeypatch.setattr("app.presenters.campaign.tasks.plan_tests", lambda *given: plan_tests(*given)[:2])
     said: list[Progress] = []
-    place = execute(SimulateCampaign(str(tmp_path)), said.append)
+    place = tasks.simulate(str(tmp_path), said.append)
     assert len(list(Path(place).glob("*.h5"))) == 2
     assert said[0].text.endswith("_1FFM0_002, 2 of 2")
     assert said[-1].fraction == 1.0
@@ -129,7 +121,6 @@ def test_a_synthetic_campaign_is_recorded_with_progress(
 
 def test_an_empty_folder_holds_a_campaign_without_runs(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "not-there"):
-        found: CampaignData = execute(CollectRuns(str(folder), SERIES), lambda _: None)
-        assert found.campaign.rows == ()
-        assert [row.runs for row in formatting.table_rows(found, SERIES)] == [0, 0]
-        assert {row.conclusion for row in formatting.effect_rows(found)} == {"cannot be told"}
+        found = tasks.collect(str(folder), SERIES, False, lambda _: None)
+        assert [row.runs for row in found.rows] == [(), ()]
+        assert {row.conclusion for row in found.effects} == {"cannot be told"}

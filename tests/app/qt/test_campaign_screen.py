@@ -8,13 +8,10 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import FakeWorker
+from stage import Call, FakeWorker
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.tasks import ExcludeRun, SimulateCampaign, UndoExclusion
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress
-from app.presenters.worker import CANCELLED
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 
@@ -43,13 +40,16 @@ class Stage:
     def show_record(self) -> None:
         self.went.append(("record",))
 
-    def say(self, *news: Any) -> None:
-        self.worker.news = list(news)
-        self.presenter.tick()
-        QApplication.processEvents()
+    @property
+    def last(self) -> Call:
+        return self.worker.calls[-1]
+
+    def asked(self) -> tuple[Any, ...]:
+        return (self.last.name, *self.last.arguments)
 
     def gathered(self, answer: Any = None) -> None:
-        self.say(TaskDone(self.worker.submitted[-1][1], answer or found()))
+        self.last.done(answer or found())
+        QApplication.processEvents()
 
     def button(self, text: str) -> QPushButton:
         named = [b for b in self.screen.findChildren(QPushButton) if b.text() == text and b.isVisible()]
@@ -66,13 +66,13 @@ def stage(theme: Theme, qtbot: QtBot) -> Stage:
 
 def test_what_goes_on_is_shown_before_anything_is_claimed_to_be_missing(stage: Stage) -> None:
     assert f"Looking through {FOLDER}." in stage.words().replace("\u200b", "")
-    stage.say(TaskProgress(stage.worker.submitted[-1][1], Progress("3 of 9 runs", 0.3)))
+    stage.last.progress(Progress("3 of 9 runs", 0.3))
     assert "3 of 9 runs" in stage.words()
     assert not [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Record" and b.isVisible()]
 
 
 def test_what_was_given_up_is_not_called_empty(stage: Stage) -> None:
-    stage.say(TaskFailed(stage.worker.submitted[-1][1], CANCELLED, is_cancelled=True))
+    stage.last.cancel()
     assert "have not been gathered. Refresh (F5) looks for them." in stage.words()
     assert "There are no runs" not in stage.words()
 
@@ -80,13 +80,11 @@ def test_what_was_given_up_is_not_called_empty(stage: Stage) -> None:
 def test_an_empty_folder_says_what_will_be_here_and_how_to_get_it(stage: Stage, qtbot: QtBot) -> None:
     stage.gathered(found([]))
     assert "There are no runs in" not in stage.words()  # a run that failed is there
-    empty = found([])
-    object.__setattr__(empty, "failures", ())
     stage.presenter.refresh()
-    stage.gathered(empty)
+    stage.gathered(found([], failures=()))
     assert "There are no runs in" in stage.words()
     qtbot.mouseClick(stage.button("Make the synthetic campaign"), Qt.MouseButton.LeftButton)
-    assert stage.worker.submitted[-1][1] == SimulateCampaign(FOLDER)
+    assert stage.asked() == ("simulate", FOLDER)
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
 
 
@@ -96,7 +94,7 @@ def test_a_campaign_is_drawn(stage: Stage) -> None:
     assert stage.screen._stack.currentIndex() == 0
     assert table.rowCount() == len(ALL_SERIES)
     assert table.horizontalHeaderItem(8).text() == "f_d\n"
-    assert table.item(0, 8).text() == stage.presenter.state.rows[0].cells[7].value
+    assert table.item(0, 8).text() == stage.presenter.state.summary.rows[0].cells[7].value
     assert "3 runs" in table.item(0, 0).toolTip()
     for expected in ("Campaign: 9 runs in 3 series", "1SSM1", "Contact", "found", "torn.h5: It is no run."):
         assert expected in stage.words()
@@ -122,7 +120,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     qtbot.keyClicks(stage.screen._chosen._reason, "touched")
     qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
     path = path_of("1FFM0", 1)
-    assert stage.worker.submitted[-1][1] == ExcludeRun(FOLDER, ALL_SERIES, path, "touched", "me")
+    assert stage.asked() == ("exclude_run", FOLDER, ALL_SERIES, path, "touched", "me")
     stage.gathered(found(excluded={path: "touched"}))
     assert stage.button("Take in").isVisible()
     assert "1FFM0_001.h5: Touched" in stage.words()
@@ -131,7 +129,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     stage.screen.activateWindow()
     qtbot.waitUntil(stage.screen._table.hasFocus)
     qtbot.keyClick(stage.screen, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert stage.worker.submitted[-1][1] == UndoExclusion(FOLDER, ALL_SERIES, path, "me")
+    assert stage.asked() == ("undo_exclusion", FOLDER, ALL_SERIES, path, "me")
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
