@@ -22,7 +22,9 @@ def export(options: ExportOptions) -> None:
         elif outcome.note:
             out.print_status(f"{outcome.run}: {outcome.note}")
     if options.as_json:
-        out.print_json(msgspec.to_builtins(outcomes))
+        texts = [{"error": str(outcome.error), "note": str(outcome.note)} for outcome in outcomes]
+        documents = [msgspec.to_builtins(outcome) for outcome in outcomes]
+        out.print_json([document | text for document, text in zip(documents, texts, strict=True)])
     else:
         for file in dict.fromkeys(file for outcome in outcomes for file in outcome.files):
             out.print_line(file)

@@ -35,7 +35,7 @@ def figures(options: FiguresOptions) -> None:
             out.print_line(f"{one.file}  {one.caption}")
     for note in notes:
         out.print_status(f"note: {note}")
-    exit_with_failures((failure.run, failure.reason) for failure in gathered.failures)
+    exit_with_failures((failure.run, str(failure.reason)) for failure in gathered.failures)
 
 
 def _numbers(wanted: list[str] | None) -> list[str]:

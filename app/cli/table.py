@@ -47,7 +47,7 @@ def table_content(gathered: CollectedRuns, campaign: Campaign, *, published: boo
     return TableContent(
         campaign,
         gathered.warnings,
-        tuple((failure.run, failure.reason) for failure in gathered.failures),
+        tuple((failure.run, str(failure.reason)) for failure in gathered.failures),
         _published(campaign) if published else None,
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from app.runs import schema
 from app.runs.columns import is_finished, sample_paths, signal_paths, stored_rows
 from app.runs.errors import DamagedRunError, NotARunError
-from messages.message import Message, message
+from messages.message import MessageError
 
 _OBJECTS_MAX = 50_000
 """A run has 200 objects and 60 more with each saved analysis."""
@@ -36,10 +36,21 @@ def validate_file(file: h5py.File) -> None:
     a run, but cannot be trusted).
     """
     _check_schema(file)
-    for dataset in _walk(file):
-        _check_dataset(dataset)
-    _check_columns(file)
-    _check_required(file)
+    try:
+        for dataset in _walk(file):
+            _check_dataset(dataset)
+        _check_columns(file)
+        _check_required(file)
+    except _StructureError as error:
+        raise DamagedRunError(
+            "{file} is damaged: {fault}. Restore a good copy, or recover it",
+            file=file.filename,
+            fault=error.message,
+        ) from None
+
+
+class _StructureError(MessageError):
+    """What is wrong with the structure of a file."""
 
 
 def _check_schema(file: h5py.File) -> None:
@@ -63,7 +74,7 @@ def _check_required(file: h5py.File) -> None:
             required += [f"{gauge}/{field.path}" for field in schema.GAUGE_FIELDS if field.required]
     for path in required:
         if path not in file:
-            raise _damaged(file, message("it lacks {path}", path=path))
+            raise _StructureError("it lacks {path}", path=path)
 
 
 def _walk(file: h5py.File) -> Iterator[h5py.Dataset]:
@@ -76,7 +87,7 @@ def _walk(file: h5py.File) -> Iterator[h5py.Dataset]:
             place = f"{path}/{name.decode('utf-8', 'replace')}"
             member = _member(group, name, place, seen)
             if len(seen) > _OBJECTS_MAX or depth >= _DEPTH_MAX:
-                raise _damaged(group, message("{path} lies too deep, or among too many objects", path=place))
+                raise _StructureError("{path} lies too deep, or among too many objects", path=place)
             if isinstance(member, h5py.h5d.DatasetID):
                 yield h5py.Dataset(member)
             else:
@@ -88,11 +99,11 @@ def _member(
 ) -> h5py.h5g.GroupID | h5py.h5d.DatasetID:
     """Open a member by the low-level API of h5py, several times faster than by the high-level one."""
     if group.id.links.get_info(name).type != h5py.h5l.TYPE_HARD:
-        raise _damaged(group, message("{path} is a link to elsewhere", path=place))
+        raise _StructureError("{path} is a link to elsewhere", path=place)
     member = h5py.h5o.open(group.id, name)
     address = h5py.h5o.get_info(member).addr
     if isinstance(member, h5py.h5t.TypeID) or address in seen:
-        raise _damaged(group, message("{path} is no plain group or dataset, or is reached twice", path=place))
+        raise _StructureError("{path} is no plain group or dataset, or is reached twice", path=place)
     seen.add(address)
     return member
 
@@ -100,31 +111,25 @@ def _member(
 def _check_dataset(dataset: h5py.Dataset) -> None:
     settings, dtype = dataset.id.get_create_plist(), dataset.dtype
     if settings.get_layout() == h5py.h5d.VIRTUAL or settings.get_external_count():
-        raise _damaged(dataset, message("{dataset} keeps its data in another file", dataset=dataset.name))
+        raise _StructureError("{dataset} keeps its data in another file", dataset=dataset.name)
     filters = {settings.get_filter(i)[0] for i in range(settings.get_nfilters())}
     if not filters <= _FILTERS:
-        raise _damaged(dataset, message("{dataset} is packed by an unknown filter", dataset=dataset.name))
+        raise _StructureError("{dataset} is packed by an unknown filter", dataset=dataset.name)
     if dtype.kind not in "iufbSO" or dataset.id.rank > 2 or dtype.itemsize > _TEXT_BYTES_MAX:
-        raise _damaged(
-            dataset,
-            message(
-                "{dataset} is of a type that runs do not have ({dtype})", dataset=dataset.name, dtype=dtype
-            ),
+        raise _StructureError(
+            "{dataset} is of a type that runs do not have ({dtype})", dataset=dataset.name, dtype=dtype
         )
     size = math.prod(dataset.id.shape)
     if dtype.kind == "O" and (h5py.check_string_dtype(dtype) is None or size > _TEXTS_MAX):
-        raise _damaged(dataset, message("{dataset} is of a type that runs do not have", dataset=dataset.name))
+        raise _StructureError("{dataset} is of a type that runs do not have", dataset=dataset.name)
     claimed = size * dtype.itemsize
     if claimed > _SMALL_BYTES and not _grows(dataset):
         room = dataset.id.get_storage_size() * (_GZIP_RATIO_MAX if filters else 1)
         if claimed > room:
-            raise _damaged(
-                dataset,
-                message(
-                    "{dataset} claims {claimed} bytes that the file does not hold",
-                    dataset=dataset.name,
-                    claimed=claimed,
-                ),
+            raise _StructureError(
+                "{dataset} claims {claimed} bytes that the file does not hold",
+                dataset=dataset.name,
+                claimed=claimed,
             )
 
 
@@ -143,33 +148,23 @@ def _check_columns(file: h5py.File) -> None:
         columns = [file[path] for path in sample_paths(file)]
         gauges = len(signal_paths(file))
     except (KeyError, TypeError, ValueError) as error:
-        raise DamagedRunError(
-            "{file} lacks a part of every run ({error}). Restore a copy",
-            file=file.filename,
-            error=error,
-        ) from None
+        raise _StructureError("it lacks a part of every run ({error})", error=error) from None
     if gauges > len(schema.GAUGES):
-        raise _damaged(file, message("it has {gauges} gauges", gauges=gauges))
+        raise _StructureError("it has {gauges} gauges", gauges=gauges)
     size = Path(file.filename).stat().st_size
     for column in columns:
         if not _is_plain(column):
-            raise _damaged(column, message("{column} is not a plain column of numbers", column=column.name))
+            raise _StructureError("{column} is not a plain column of numbers", column=column.name)
         if is_finished(file) and len(column) != rows:
-            raise _damaged(
-                column,
-                message(
-                    "{column} has {length} rows instead of {rows}",
-                    column=column.name,
-                    length=len(column),
-                    rows=rows,
-                ),
+            raise _StructureError(
+                "{column} has {length} rows instead of {rows}",
+                column=column.name,
+                length=len(column),
+                rows=rows,
             )
         if rows * column.dtype.itemsize > size:
-            raise _damaged(
-                column,
-                message(
-                    "{column} claims {rows} rows that the file does not hold", column=column.name, rows=rows
-                ),
+            raise _StructureError(
+                "{column} claims {rows} rows that the file does not hold", column=column.name, rows=rows
             )
         _check_chunks(column, rows, size)
 
@@ -190,14 +185,4 @@ def _check_chunks(column: h5py.Dataset, rows: int, size: int) -> None:
         column.id.chunk_iter(visit)
     (length,) = column.chunks
     if not all(first in present for first in range(0, rows, length)):
-        raise _damaged(
-            column, message("{column} lacks a part of its {rows} rows", column=column.name, rows=rows)
-        )
-
-
-def _damaged(where: h5py.Group | h5py.Dataset, fault: Message) -> DamagedRunError:
-    return DamagedRunError(
-        "{file} is damaged: {fault}. Restore a good copy, or recover it",
-        file=where.file.filename,
-        fault=fault,
-    )
+        raise _StructureError("{column} lacks a part of its {rows} rows", column=column.name, rows=rows)

@@ -30,7 +30,7 @@ def write_product(folder: str, product: Product, path: str, report: ReportProgre
     report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
         return _write_figures(target, runs, campaign, report)
-    failures = tuple((failure.run, failure.reason) for failure in runs.failures)
+    failures = tuple((failure.run, str(failure.reason)) for failure in runs.failures)
     content = TableContent(campaign, runs.warnings, failures)
     if product is Product.TABLE:
         _write_table(target, content)

@@ -24,10 +24,7 @@ from app.reports.table.content import (
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
 from app.runs.analysis_json import warning_documents
 from app.runs.disk import atomic_write
-from app.runs.exchange.csv_files import csv_cell
-from app.runs.exchange.json_files import json_value
-from app.runs.exchange.latex_files import escape
-from app.runs.exchange.xlsx_files import Sheet, write_sheets
+from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, write_sheets
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
@@ -67,7 +64,8 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
     }
     if content.published is not None:
         sheets["Published"] = published_grid(content)
-    write_sheets(sheets, path, replace)
+    with atomic_write(path, replace=replace) as made:
+        write_sheets(sheets, made)
 
 
 def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -125,7 +123,7 @@ def _latex(content: TableContent) -> str:
 
 def _latex_cell(text: str) -> str:
     """A cell with minus signs and ranges in LaTeX."""
-    shown = escape(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
+    shown = escape_latex(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
     if shown.startswith(("[", "*")):  # after the end of a row these would belong to it
         return f"{{{shown[0]}}}{shown[1:]}"
     return f"${shown[0]}$" + shown[1:] if shown.startswith("-") else shown or "--"
@@ -183,22 +181,19 @@ SCHEMA: Final = "slipstand-table/1"
 
 
 def table_document(content: TableContent) -> dict[str, Any]:
-    """JSON of the table; undetermined values are absent, values that are not finite null."""
+    """JSON of the table; undetermined values are absent."""
     campaign = content.campaign
-    document: dict[str, Any] = json_value(
-        {
-            "schema": SCHEMA,
-            "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
-            "effects": [_effect_document(effect) for effect in campaign.effects.effects],
-            "scatter_beyond_effects": campaign.effects.scatter,
-            "ratios": msgspec.to_builtins(campaign.ratios),
-            "msk64_degrees": list(campaign.msk64_degrees),
-            "excluded": msgspec.to_builtins(campaign.excluded),
-            "failures": [{"run": run, "error": error} for run, error in content.failures],
-            "warnings": warning_documents(content.all_warnings()),
-        }
-    )
-    return document
+    return {
+        "schema": SCHEMA,
+        "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
+        "effects": [_effect_document(effect) for effect in campaign.effects.effects],
+        "scatter_beyond_effects": campaign.effects.scatter,
+        "ratios": msgspec.to_builtins(campaign.ratios),
+        "msk64_degrees": list(campaign.msk64_degrees),
+        "excluded": msgspec.to_builtins(campaign.excluded),
+        "failures": [{"run": run, "error": error} for run, error in content.failures],
+        "warnings": warning_documents(content.all_warnings()),
+    }
 
 
 def _effect_document(effect: Effect) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
 
 def _summary(material: CampaignReportInput) -> Facts:
     gathered, campaign = material.gathered, material.content.campaign
-    facts = [gathered.details[run.name] for run in gathered.runs]
+    facts = [gathered.details[run.name].metadata for run in gathered.runs]
     days = sorted(one.start_time.date().isoformat() for one in facts)
     contacts = contact_names(gathered.stands.values())
     codes = dict.fromkeys(row.series.contact for row in campaign.rows)
@@ -187,15 +187,15 @@ def _runs(material: CampaignReportInput) -> Grid:
     ]
     rows: list[list[Cell]] = []
     for run in material.gathered.runs:
-        details, found = material.gathered.details[run.name], run.results.get(_FRICTION)
+        metadata, found = material.gathered.details[run.name].metadata, run.results.get(_FRICTION)
         rows.append(
             [
                 _local(run.name, material),
                 run.series.label,
-                details.start_time.strftime("%Y-%m-%d %H:%M"),
-                details.operator,
-                details.conditions.as_text(),
-                details.note,
+                metadata.start_time.strftime("%Y-%m-%d %H:%M"),
+                metadata.operator,
+                metadata.conditions.as_text(),
+                metadata.note,
                 "left out" if run.excluded else _VERDICTS[run.adequate],
                 "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print,
             ]

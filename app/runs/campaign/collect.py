@@ -1,26 +1,28 @@
 """Results of many runs from files and folders, with warnings of them together."""
 
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
 
 from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.series import RunResult
-from analysis.quantities import BudgetLine, ResultWarning
+from analysis.quantities import ResultWarning
 from app.runs.analyze import AnalysisRequest
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
-from app.runs.batch.tasks import map_runs
-from app.runs.campaign.run_result import CollectedRun, CollectTask, RunDetails, collect_run
+from app.runs.batch.tasks import AnalysisTask, map_runs
+from app.runs.campaign.run_result import CollectedRun, RunDetails, collect_run
 from app.runs.file_operations import list_trash
 from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
 from config.schema import ConfigError, Gauges, Stand
 from messages.message import Message, message
 
+Shared = TypeVar("Shared", Stand, Gauges)
 Progress = Callable[[float, str], None]
 
 
@@ -37,6 +39,9 @@ class CollectOptions(msgspec.Struct, frozen=True):
     the runs."""
 
 
+CountedRun = tuple[RunResult, RunDetails]
+
+
 class FailedRun(msgspec.Struct, frozen=True):
     """A run that gives no result, and why, in one line."""
 
@@ -44,9 +49,12 @@ class FailedRun(msgspec.Struct, frozen=True):
     error: Message
 
     @property
-    def reason(self) -> str:
-        """The error without the path that it begins with."""
-        return str(self.error).removeprefix(self.run).lstrip(": ")
+    def reason(self) -> Message:
+        """The error, in which the run is named without its folder."""
+        error = self.error
+        if error.values.get("path") != self.run:
+            return error
+        return Message(error.template, error.values | {"path": Path(self.run).name}, error.plural)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,12 +68,24 @@ class CollectedRuns:
     """What must be known of the runs together."""
     details: dict[str, RunDetails]
     """By the names of the runs."""
-    stands: dict[str, Stand]
-    """By `RunDetails.stand`."""
-    gauges: dict[str, Gauges]
-    """By `RunDetails.calibration`."""
     excluded: tuple[Excluded, ...] = ()
     """Runs without a result that are excluded in any case, with reasons."""
+
+    @property
+    def stands(self) -> dict[str, Stand]:
+        """By `RunResult.stand_id`."""
+        found: dict[str, Stand] = {}
+        for run in self.runs:
+            found.setdefault(run.stand_id, self.details[run.name].metadata.stand)
+        return found
+
+    @property
+    def gauges(self) -> dict[str, Gauges]:
+        """By `RunResult.calibration_id`."""
+        found: dict[str, Gauges] = {}
+        for run in self.runs:
+            found.setdefault(run.calibration_id, self.details[run.name].metadata.gauges)
+        return found
 
     def campaign(self) -> Campaign:
         """The campaign; excluded runs are listed, with a result or without."""
@@ -97,7 +117,7 @@ def iter_collected(
     files: Sequence[Path], options: CollectOptions, progress: Progress = lambda _share, _what: None
 ) -> Iterator[CollectedRun]:
     """Take what a campaign needs of each run, in the order given. Raises ExtraMissingError, ClusterError."""
-    tasks = [CollectTask(str(path), options.request, options.save) for path in files]
+    tasks = [AnalysisTask(str(path), options.request, options.save) for path in files]
     with open_executor(options.executor, len(tasks)) as executor:
         for came in map_runs(tasks, collect_run, executor, progress):
             yield CollectedRun(came.item.path, came.message) if isinstance(came, FailedItem) else came
@@ -108,59 +128,59 @@ class RunCollection:
 
     def __init__(self) -> None:
         self._collected: dict[str, CollectedRun] = {}
-        self._stands: dict[str, Stand] = {}
-        self._gauges: dict[str, Gauges] = {}
+        self._shared: dict[bytes, Any] = {}
 
     def update(self, collected: CollectedRun) -> None:
         """Take the result of a run in place of its earlier one."""
-        result, details, stand, gauges = (
-            collected.result,
-            collected.details,
-            collected.stand,
-            collected.gauges,
-        )
-        if result is not None and details is not None and stand is not None and gauges is not None:
-            self._stands.setdefault(details.stand, stand)
-            self._gauges.setdefault(details.calibration, gauges)
-            result = replace(result, budget=tuple(map(_shared, result.budget)))
-            collected = CollectedRun(collected.path, result=result, details=details)
+        result, details = collected.result, collected.details
+        if result is not None and details is not None:
+            budget = tuple(
+                replace(line, contribution_to=sys.intern(line.contribution_to)) for line in result.budget
+            )
+            metadata = details.metadata
+            metadata = metadata.replace(
+                stand=self._share(metadata.stand), gauges=self._share(metadata.gauges)
+            )
+            collected = msgspec.structs.replace(
+                collected,
+                result=replace(result, budget=budget),
+                details=msgspec.structs.replace(details, metadata=metadata),
+            )
         self._collected[collected.path] = collected
+
+    def _share(self, value: Shared) -> Shared:
+        """The first value that equals this one."""
+        shared: Shared = self._shared.setdefault(msgspec.json.encode(value), value)
+        return shared
 
     def exclude(self, path: str, reason: str) -> None:
         """Note why a run does not count any more; "" for one that does again."""
         collected = self._collected[path]
-        details = collected.details and msgspec.structs.replace(collected.details, excluded=reason)
-        excluded = "" if details else reason
-        self._collected[path] = msgspec.structs.replace(collected, details=details, excluded=excluded)
+        if collected.details is not None:
+            metadata = collected.details.metadata.replace(excluded=reason)
+            details = msgspec.structs.replace(collected.details, metadata=metadata)
+            self._collected[path] = msgspec.structs.replace(collected, details=details)
 
     def keep_only(self, paths: Iterable[str]) -> None:
         """Forget other runs, and take these in this order."""
         self._collected = {path: self._collected[path] for path in paths}
 
     def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
-        pairs = [(a.result, a.details) for a in self._collected.values() if a.result and a.details]
+        pairs = [(one.result, one.details) for one in self._collected.values() if one.result and one.details]
         runs = tuple(_with_reasons(pairs, options.excluded))
         details = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
-        stands = {its.stand: self._stands[its.stand] for its in details.values()}
-        gauges = {its.calibration: self._gauges[its.calibration] for its in details.values()}
-        counted = [run for run in runs if not run.excluded]
-        warnings = campaign_warnings(counted, details, stands, folders, saved=options.save)
-        failures, excluded_runs = self._without_result(options.excluded)
-        return CollectedRuns(runs, failures, warnings, details, stands, gauges, excluded_runs)
-
-    def _without_result(
-        self, reasons: Mapping[str, str]
-    ) -> tuple[tuple[FailedRun, ...], tuple[Excluded, ...]]:
-        """Runs that gave no result: those that should have, and those that do not count anyway."""
-        failures, excluded_runs = [], []
-        for collected in self._collected.values():
-            if collected.result is not None:
+        counted = [(run, details[run.name]) for run in runs if not run.excluded]
+        failures, excluded = [], []
+        for one in self._collected.values():
+            kept_reason = one.details.metadata.excluded if one.details else ""
+            if one.result is not None:
                 continue
-            if reason := reasons.get(collected.path) or collected.excluded:
-                excluded_runs.append(Excluded(collected.path, reason))
+            if reason := options.excluded.get(one.path) or kept_reason:
+                excluded.append(Excluded(one.path, reason))
             else:
-                failures.append(FailedRun(collected.path, collected.error))
-        return tuple(failures), tuple(excluded_runs)
+                failures.append(FailedRun(one.path, one.error))
+        warnings = tuple(campaign_warnings(counted, folders, saved=options.save))
+        return CollectedRuns(runs, tuple(failures), warnings, details, tuple(excluded))
 
 
 def _with_reasons(
@@ -169,15 +189,10 @@ def _with_reasons(
     """Runs with why they do not count; of the files of one recording the first that was not left out does."""
     first: dict[str, str] = {}
     for result, details in pairs:
-        reason = reasons.get(result.name) or details.excluded
+        reason = reasons.get(result.name) or details.metadata.excluded
         if not reason and (other := first.setdefault(details.identifier, result.name)) != result.name:
             reason = f"the same recording as {other}: leave one of the files out"
         yield replace(result, excluded=reason) if reason else result
-
-
-def _shared(line: BudgetLine) -> BudgetLine:
-    """A line whose names are held once for all runs."""
-    return BudgetLine(line.source, sys.intern(line.contribution_to), line.standard_uncertainty)
 
 
 _NAMED = 3
@@ -185,29 +200,20 @@ _NAMED = 3
 
 
 def campaign_warnings(
-    runs: Sequence[RunResult],
-    details: Mapping[str, RunDetails],
-    stands: Mapping[str, Stand],
-    folders: Sequence[Path],
-    *,
-    saved: bool,
-) -> tuple[ResultWarning, ...]:
-    """Warnings of runs together; `folders` are those that were searched."""
-    return (
-        *_different_stands(runs, details, stands),
-        *_contradictory_masses(runs, details, stands),
-        *_stale(runs, details, saved=saved),
-        *_series_without_runs(runs, details, stands),
-        *_left_out(folders),
-    )
-
-
-def _different_stands(
-    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+    runs: Sequence[CountedRun], folders: Sequence[Path], *, saved: bool
 ) -> Iterator[ResultWarning]:
+    """Warnings of runs together; `folders` are those that were searched."""
+    yield from _different_stands(runs)
+    yield from _contradictory_masses(runs)
+    yield from _stale(runs, saved=saved)
+    yield from _series_without_runs(runs)
+    yield from _left_out(folders)
+
+
+def _different_stands(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
     by_name: dict[str, list[str]] = defaultdict(list)
-    for run in runs:
-        by_name[stands[details[run.name].stand].name].append(run.name)
+    for run, details in runs:
+        by_name[details.metadata.stand.name].append(run.name)
     if len(by_name) > 1:
         listed = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
         yield ResultWarning(
@@ -221,18 +227,17 @@ def _different_stands(
         )
 
 
-def _contradictory_masses(
-    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
-) -> Iterator[ResultWarning]:
+def _contradictory_masses(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
     """Series whose runs say different masses, and runs whose plate has not the mass of their series."""
     by_series: dict[str, dict[tuple[float, float], list[str]]] = defaultdict(lambda: defaultdict(list))
-    for run in runs:
-        if run.series.code:
-            key = run.series
+    stands: dict[str, Stand] = {}
+    for run, details in runs:
+        key = run.series
+        if key.code:
             by_series[key.code][key.table_mass_kg, key.plate_mass_kg].append(run.name)
+            stands.setdefault(key.code, details.metadata.stand)
     remedy = message("Correct the wrong ones: slipstand edit RUN --plate-mass KG --table-mass KG.")
     for code, masses in by_series.items():
-        stand = stands[details[next(iter(masses.values()))[0]].stand]
         if len(masses) > 1:
             listed = "; ".join(
                 f"m1 = {table_kg:g} kg and m2 = {plate_kg:g} kg: {_listed(of_them)}"
@@ -247,7 +252,7 @@ def _contradictory_masses(
                     remedy=remedy,
                 ),
             )
-        elif (nominal_kg := _nominal_mass_kg(stand, code)) not in (None, *(m2 for _, m2 in masses)):
+        elif (nominal_kg := _nominal_mass_kg(stands[code], code)) not in (None, *(m2 for _, m2 in masses)):
             ((_, plate_kg), of_them) = next(iter(masses.items()))
             yield ResultWarning(
                 "mass-not-of-series",
@@ -270,10 +275,8 @@ def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
         return None
 
 
-def _stale(
-    runs: Sequence[RunResult], details: Mapping[str, RunDetails], *, saved: bool
-) -> Iterator[ResultWarning]:
-    stale = [run.name for run in runs if details[run.name].stale]
+def _stale(runs: Sequence[CountedRun], *, saved: bool) -> Iterator[ResultWarning]:
+    stale = [run.name for run, details in runs if details.stale]
     if stale:
         kept = message("the new results are kept") if saved else message("keep the new results with --save")
         yield ResultWarning(
@@ -287,15 +290,13 @@ def _stale(
         )
 
 
-def _series_without_runs(
-    runs: Sequence[RunResult], details: Mapping[str, RunDetails], stands: Mapping[str, Stand]
-) -> Iterator[ResultWarning]:
+def _series_without_runs(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
     """Series between those that have runs; a single series is no campaign that could lack any."""
-    codes = Counter(run.series.code for run in runs if run.series.code and not run.excluded)
-    names = {details[run.name].stand for run in runs}
-    if len(codes) < 2 or len(names) != 1:
+    codes = {run.series.code for run, _ in runs if run.series.code}
+    stands = {run.stand_id: details.metadata.stand for run, details in runs}
+    if len(codes) < 2 or len(stands) != 1:
         return
-    stand = stands[names.pop()]
+    (stand,) = stands.values()
     wanted = [
         f"{pullback}{contact}{mass}"
         for contact in stand.contacts

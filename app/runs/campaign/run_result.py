@@ -1,7 +1,6 @@
 """What a campaign takes of one run file: its newest result that still stands, else a new one."""
 
 import contextlib
-import datetime
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,15 @@ import msgspec
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
-from app.runs.analyze import AnalysisRequest, Progress, analyze_run
-from app.runs.batch.tasks import error_message, latest_valid_in_file, validate_and_count
-from app.runs.metadata import Conditions, RunMetadata
+from app.runs.analyze import Progress, analyze_run
+from app.runs.batch.tasks import AnalysisTask, error_message, latest_valid_in_file, validate_and_count
+from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
 from app.runs.saved_analyses import Document
 from app.runs.validator import Validator, shared_validator
-from config.schema import ConfigError, Gauges, Stand
-from messages.message import Message
+from config.schema import ConfigError, Gauges
+from messages.message import EMPTY, Message
 
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 _OF_CALIBRATION = (
@@ -35,79 +34,46 @@ _OF_CALIBRATION = (
 )
 
 
-class CollectTask(msgspec.Struct, frozen=True):
-    """A run to take; where no result is kept in it that still stands it is analysed, and kept with `save`."""
-
-    path: str
-    request: AnalysisRequest = AnalysisRequest(classical=False)
-    save: bool = False
-
-
 class RunDetails(msgspec.Struct, frozen=True):
     """What is known of a run beside its result."""
 
+    metadata: RunMetadata
     identifier: str
     """UUID given when it was recorded: the same under every name."""
-    start_time: datetime.datetime
-    series: str
-    """"" where not known."""
-    operator: str
-    note: str
-    source: str
-    conditions: Conditions
-    table_mass_kg: float
-    plate_mass_kg: float
-    stand: str
-    """Identities, see `CollectedRuns.stands` and `CollectedRuns.gauges`."""
-    calibration: str
     analysis: int | None = None
     """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
     stale: bool = False
     """A newer analysis is kept in the run that does not stand any more."""
-    truth: dict[str, float | int | str] = {}
-    """Of a simulated run."""
-    excluded: str = ""
-    """Why the run does not count, as kept in it; "" for one that does."""
 
 
 class CollectedRun(msgspec.Struct, frozen=True):
-    """What came of one run: its result with all that goes with it, or why there is none.
-
-    `excluded` is the reason of a run without a result that is excluded in any case.
-    """
+    """What came of one run: its result, or why there is none."""
 
     path: str
-    error: Message = Message("")
-    excluded: str = ""
-    result: RunResult | None = None
+    error: Message = EMPTY
     details: RunDetails | None = None
-    stand: Stand | None = None
-    gauges: Gauges | None = None
-
-
-class _Read(msgspec.Struct, frozen=True):
-    metadata: RunMetadata
-    identifier: str
-    document: Document | None
-    number: int | None
-    stale: bool
+    """None for a run that cannot be read."""
+    result: RunResult | None = None
 
 
 def collect_run(
-    task: CollectTask, progress: Progress | None = None, validator: Validator | None = None
+    task: AnalysisTask, progress: Progress | None = None, validator: Validator | None = None
 ) -> CollectedRun:
-    """Take what a campaign needs of a run. Never raises: what goes wrong is in the account."""
-    path, excluded = Path(task.path), ""
+    """Take what a campaign needs of a run: the newest result that still stands, else a new one.
+
+    Never raises: what goes wrong is in the outcome.
+    """
+    path, details = Path(task.path), None
     try:
         validate_and_count(path, validator or shared_validator())
-        read = read_file(path, _read)
-        document, number, excluded = read.document, read.number, read.metadata.excluded
+        details, document = read_file(path, _read)
         if document is None:
             analysis = analyze_run(path, task.request, save=task.save, progress=progress, trusted=True)
-            document, number = analysis.document, analysis.saved_as
-        return _account(path, read, document, number)
+            document = analysis.document
+            details = msgspec.structs.replace(details, analysis=analysis.saved_as)
+        return CollectedRun(task.path, details=details, result=run_result(path, details.metadata, document))
     except Exception as error:
-        return CollectedRun(task.path, error_message(error), excluded)
+        return CollectedRun(task.path, error_message(error), details)
 
 
 def calibration_identity(gauges: Gauges) -> str:
@@ -128,7 +94,7 @@ def result_quantities(document: Document) -> dict[str, Quantity]:
     return {name: read_quantity(value) for name, value in results if isinstance(value, dict)}
 
 
-def _read(file: h5py.File) -> _Read:
+def _read(file: h5py.File) -> tuple[RunDetails, Document | None]:
     metadata = read_metadata(file)
     saved, stale = latest_valid_in_file(
         file,
@@ -137,36 +103,8 @@ def _read(file: h5py.File) -> _Read:
             saved.document["kind"] == "two-mass" and not any(saved.settings.get(name) for name in _MASSES)
         ),
     )
-    return _Read(
-        metadata,
-        read_identifier(file),
-        saved.document if saved else None,
-        saved.number if saved else None,
-        stale,
-    )
-
-
-def _account(path: Path, read: _Read, document: Document, number: int | None) -> CollectedRun:
-    metadata = read.metadata
-    facts = RunDetails(
-        read.identifier,
-        metadata.start_time,
-        metadata.series or "",
-        metadata.operator,
-        metadata.note,
-        metadata.source,
-        metadata.conditions,
-        metadata.table_mass_kg,
-        metadata.plate_mass_kg,
-        stand_identity(metadata),
-        calibration_identity(metadata.gauges),
-        number,
-        read.stale,
-        metadata.truth,
-        metadata.excluded,
-    )
-    result = run_result(path, metadata, document)
-    return CollectedRun(str(path), result=result, details=facts, stand=metadata.stand, gauges=metadata.gauges)
+    details = RunDetails(metadata, read_identifier(file), saved.number if saved else None, stale)
+    return details, saved.document if saved else None
 
 
 def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResult:

@@ -21,17 +21,11 @@ class ForeignColumns:
     is absent."""
     names: list[str]
     """The columns, as named in messages."""
-    row_label: Callable[[int], str]
+    row_label: Callable[[int], Message]
     """Names a row of `values` as the file counts it: `line 4`."""
 
     def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
-        return ImportFileError(
-            "{path}, {row_label}, column {names}: {fault}",
-            path=self.path,
-            row_label=self.row_label(row),
-            names=self.names[column],
-            fault=fault,
-        )
+        return cell_fault(self.path, self.row_label(row), self.names[column], fault)
 
     def check(self) -> None:
         """Refuse what cannot be a record. Raises ImportFileError."""
@@ -45,11 +39,22 @@ class ForeignColumns:
             raise self.fault(absent[0], 0, message("the time is missing. Give it or delete the line"))
 
 
+def cell_fault(path: Path, row_label: Message, column: str, fault: Message) -> ImportFileError:
+    """Error in one cell of a foreign file."""
+    return ImportFileError(
+        "{path}, {row_label}, column {names}: {fault}",
+        path=path,
+        row_label=row_label,
+        names=column,
+        fault=fault,
+    )
+
+
 _OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
 
 
 def find_columns(path: Path, wanted: list[str], names: list[str], width: int) -> list[int]:
-    """Positions of the columns of time, gauge 1 and perhaps gauge 2, all different.
+    """Positions below `width` of the columns of time, gauge 1 and perhaps gauge 2, by name or number.
 
     Raises ImportFileError (there is no such column, or one is wanted for two).
     """
@@ -69,35 +74,20 @@ def find_columns(path: Path, wanted: list[str], names: list[str], width: int) ->
 
 
 def _find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
-    """Position of a column given by its name, or by its number below `width`. Raises ImportFileError."""
     name = wanted.strip().lstrip("\ufeff")
-    if names.count(name) > 1:
+    count = names.count(name)
+    if name and count > 1:
         raise ImportFileError(
             "{path} has {count} columns named {name!r}. Give its number, from 0",
             path=path,
-            count=names.count(name),
+            count=count,
             name=name,
         )
-    if name in names:
+    if name and count:
         return names.index(name)
     if name.isdecimal() and int(name) < width:
         return int(name)
-    there = ", ".join(names) if names else f"numbers 0 to {width - 1}"
+    there = ", ".join(filter(None, names)) or f"numbers 0 to {width - 1}"
     raise ImportFileError(
         "{path} has no column {wanted!r}. Choose from: {there}", path=path, wanted=wanted, there=there
     )
-
-
-def column_stack(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Put columns side by side. Raises ImportFileError where they differ in length or are empty."""
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise ImportFileError(
-            "{path}: the columns differ in length ({told}). Choose columns of one record",
-            path=path,
-            told=told,
-        )
-    if not next(iter(lengths.values())):
-        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
-    return np.column_stack(list(columns.values()))

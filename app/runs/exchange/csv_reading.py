@@ -5,17 +5,17 @@ import csv
 import io
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import ForeignColumns, find_columns
-from messages.message import Message, message, option
+from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
+from messages.message import Message, MessageError, message, option
 
 _SAMPLE_LINES = 20
 _WORDS = {"tab": "\t", "space": " "}
@@ -37,9 +37,13 @@ class CsvOptions(msgspec.Struct, frozen=True):
     """Lines left out before the header."""
     header: bool = True
 
+    @property
+    def wanted(self) -> list[str]:
+        """Columns of time, gauge 1 and perhaps gauge 2."""
+        return [name for name in (self.time, self.table, self.second) if name is not None]
 
-@dataclass(frozen=True, slots=True)
-class Line:
+
+class Line(NamedTuple):
     """A line of the file: its number counted from 1, its place in the text, and itself."""
 
     number: int
@@ -60,32 +64,19 @@ class CsvText:
     decimal: Literal[".", ","]
     names: list[str]
     """Column names; empty without a header."""
-    columns: list[int]
-    """Positions of time, table and, if asked for, the second gauge."""
-
-    def column_name(self, position: int) -> str:
-        return repr(self.names[position]) if position < len(self.names) else str(position)
-
-
-def open_csv(path: Path, layout: CsvOptions) -> CsvText:
-    """Read a CSV file as far as its header, and find the columns.
-
-    Lines that are blank or begin with `#` are left out; where no header stands above the numbers, the last
-    `#` line before them is taken for it if it has as many cells. Raises ImportFileError.
-    """
-    source = survey_csv(path, layout)
-    width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
-    wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
-    return replace(source, columns=find_columns(path, wanted, source.names, width))
 
 
 def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
-    """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError."""
+    """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError.
+
+    Lines that are blank or begin with `#` are left out; where no header stands above the numbers, the last
+    `#` line before them is taken for it if it has as many cells.
+    """
     text = _decoded(path)
     comment, lines = _head(path, text, layout.skip)
     delimiter = _delimiter(path, layout, lines)
     names, data = _header(path, layout, delimiter, comment, lines)
-    return CsvText(path, text, data, delimiter, layout.decimal, names, [])
+    return CsvText(path, text, data, delimiter, layout.decimal, names)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -244,35 +235,37 @@ def read_columns(path: Path, layout: CsvOptions) -> ForeignColumns:
 
     Raises ImportFileError, which names the line and column of a cell that is not a number, or a cut line.
     """
-    source = open_csv(path, layout)
-    values = _quick(source)
+    source = survey_csv(path, layout)
+    width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
+    positions = find_columns(path, layout.wanted, source.names, width)
+    names = [repr(source.names[i]) if i < len(source.names) else str(i) for i in positions]
+    values = _quick(source, positions)
     if values is None:
-        values = _thorough(source)
-    names = [source.column_name(i) for i in source.columns]
-    columns = ForeignColumns(path, values, names, lambda row: f"line {_data_lines(source)[row].number}")
+        values = _thorough(source, dict(zip(names, positions, strict=True)))
+    columns = ForeignColumns(path, values, names, lambda row: _label(_data_lines(source)[row]))
     columns.check()
     return columns
 
 
-def _quick(source: CsvText) -> NDArray[np.float64] | None:
+def _quick(source: CsvText, positions: list[int]) -> NDArray[np.float64] | None:
     """All numbers by numpy's own reader; None where it finds anything but numbers and empty cells."""
     body = source.text[source.data.offset :]
     if source.decimal == ",":
         if "." in body:
             return None
         body = body.replace(",", ".")
-    values = _load(source, body)
+    values = _load(body, source.delimiter, positions)
     if values is None and source.delimiter != " ":
-        values = _load(source, _with_nan(body, source.delimiter))
+        values = _load(_with_nan(body, source.delimiter), source.delimiter, positions)
     return None if values is None or np.isnan(values[:, 0]).any() else values
 
 
-def _load(source: CsvText, body: str) -> NDArray[np.float64] | None:
+def _load(body: str, delimiter: str, positions: list[int]) -> NDArray[np.float64] | None:
     try:
         return np.loadtxt(
             io.StringIO(body),
-            delimiter=None if source.delimiter == " " else source.delimiter,
-            usecols=source.columns,
+            delimiter=None if delimiter == " " else delimiter,
+            usecols=positions,
             comments=None,
             quotechar='"' if '"' in body else None,
             ndmin=2,
@@ -290,9 +283,27 @@ def _with_nan(body: str, delimiter: str) -> str:
     )
 
 
-def _thorough(source: CsvText) -> NDArray[np.float64]:
-    rows = [_row(source, line) for line in _data_lines(source)]
+class _CellError(MessageError):
+    """A cell that is absent or not a number."""
+
+
+def _thorough(source: CsvText, positions: dict[str, int]) -> NDArray[np.float64]:
+    """All numbers, cell by cell, of columns given by name. Raises ImportFileError."""
+    rows: list[list[float]] = []
+    for line in _data_lines(source):
+        cells = _cells(line.text, source.delimiter)
+        row: list[float] = []
+        rows.append(row)
+        for name, position in positions.items():
+            try:
+                row.append(_value(source, line, cells, position))
+            except _CellError as error:
+                raise cell_fault(source.path, _label(line), name, error.message) from None
     return np.array(rows, dtype=np.float64)
+
+
+def _label(line: Line) -> Message:
+    return message("line {line}", line=line.number)
 
 
 def _data_lines(source: CsvText) -> list[Line]:
@@ -301,32 +312,20 @@ def _data_lines(source: CsvText) -> list[Line]:
     return [line for line in lines if is_data(line.text) and line.text.strip(f"{blank} \t")]
 
 
-def _row(source: CsvText, line: Line) -> list[float]:
-    cells = _cells(line.text, source.delimiter)
-    values = []
-    for position in source.columns:
-        name = source.column_name(position)
-        if position >= len(cells):
-            fault = message("the line has only {cells} cells. Complete it or delete it", cells=len(cells))
-            raise _fault(source, line.number, name, fault)
-        values.append(_value(source, line, name, cells[position].strip()))
-    return values
-
-
 def _cells(text: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return text.split()
     return next(csv.reader([text], delimiter=delimiter)) if '"' in text else text.split(delimiter)
 
 
-def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
-    if not cell:
-        return math.nan
+def _value(source: CsvText, line: Line, cells: list[str], position: int) -> float:
+    if position >= len(cells):
+        raise _CellError("the line has only {cells} cells. Complete it or delete it", cells=len(cells))
+    cell = cells[position].strip()
     try:
-        return to_number(cell, source.decimal)
+        return to_number(cell, source.decimal) if cell else math.nan
     except ValueError:
-        pass
-    remedy = message("Correct it, or leave the cell empty if there is no reading")
+        remedy = message("Correct it, or leave the cell empty if there is no reading")
     if "," in cell and source.decimal == ".":
         remedy = message("If that is a decimal comma, add {option} ,", option=option("--decimal"))
     elif line.number == source.data.number:
@@ -336,15 +335,4 @@ def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
             skip_option=option("--skip"),
             number=line.number,
         )
-    fault = message("{cell!r} is not a number. {remedy}", cell=cell, remedy=remedy)
-    raise _fault(source, line.number, name, fault)
-
-
-def _fault(source: CsvText, line: int, column: str, fault: Message) -> ImportFileError:
-    return ImportFileError(
-        "{path}, line {line}, column {column}: {fault}",
-        path=source.path,
-        line=line,
-        column=column,
-        fault=fault,
-    )
+    raise _CellError("{cell!r} is not a number. {remedy}", cell=cell, remedy=remedy)

@@ -1,7 +1,6 @@
 """From run files to exported ones: what to read, whether to analyse, and where it goes."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -10,67 +9,29 @@ import msgspec
 from analysis.record import AnalysisError
 from app.runs.analysis_input import to_record
 from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.disk import atomic_write
 from app.runs.errors import RunError, UnsuitableRunError
-from app.runs.exchange import (
-    csv_files,
-    json_files,
-    latex_files,
-    mat_files,
-    parquet_files,
-    uff58_files,
-    xlsx_files,
-)
 from app.runs.exchange.content import ExportedRun, sample_columns
+from app.runs.exchange.export_formats import FORMATS, ExportFormat, write_csv_coefficients
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
-from messages.message import option
-
-WriteRun = Callable[..., None]
-WriteCoefficients = Callable[..., None]
+from messages.message import EMPTY, Message, message, message_of, option
 
 
-@dataclass(frozen=True, slots=True)
-class ExportFormat:
-    """How a format is written."""
+def write_exported_run(name: str, exported: ExportedRun, path: Path, *, replace: bool = False) -> list[Path]:
+    """Write a run in a format; coefficients go into a second file beside a CSV file. Returns the files.
 
-    suffix: str
-    write_run: WriteRun
-    """Takes an `ExportedRun`, a path and `replace`."""
-    write_coefficients: WriteCoefficients | None
-    """Takes several `ExportedRun`, a path and `replace`; None where the format holds samples alone."""
-    holds_samples: bool = True
-
-
-def formats() -> dict[str, ExportFormat]:
-    """All formats, by the names of the command line."""
-    return {
-        "csv": ExportFormat(".csv", _csv_pair, csv_files.write_coefficients),
-        "json": ExportFormat(".json", json_files.write_run, json_files.write_coefficients),
-        "parquet": ExportFormat(".parquet", parquet_files.write_run, parquet_files.write_coefficients),
-        "mat": ExportFormat(".mat", mat_files.write_run, mat_files.write_coefficients),
-        "uff58": ExportFormat(".uff", uff58_files.write_run, None),
-        "xlsx": ExportFormat(".xlsx", xlsx_files.write_run, xlsx_files.write_coefficients),
-        "latex": ExportFormat(
-            ".tex", latex_files.write_run, latex_files.write_coefficients, holds_samples=False
-        ),
-    }
-
-
-def output_files(name: str, path: Path, exported: ExportedRun) -> list[Path]:
-    """Files that `write_run` of a format makes for `path`."""
-    return [path, coefficients_path(path)] if name == "csv" and exported.analysis else [path]
-
-
-def coefficients_path(path: Path) -> Path:
-    """Where the coefficients go that a CSV file of samples has no room for."""
-    return path.with_name(f"{path.stem}.coefficients{path.suffix}")
-
-
-def _csv_pair(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
-    csv_files.write_samples(exported.samples, path, replace=replace)
-    if exported.analysis is not None:
-        csv_files.write_coefficients([exported], coefficients_path(path), replace=replace)
+    Raises UnsuitableRunError, ExtraMissingError, RunExistsError, DiskFullError, WriteError.
+    """
+    with atomic_write(path.absolute(), replace=replace) as made:
+        FORMATS[name].write_run(exported, made)
+    if name != "csv" or exported.analysis is None:
+        return [path]
+    beside = path.with_name(f"{path.stem}.coefficients{path.suffix}")
+    with atomic_write(beside.absolute(), replace=replace) as made:
+        write_csv_coefficients([exported], made)
+    return [path, beside]
 
 
 def unique_names(exported: Iterable[str]) -> list[str]:
@@ -86,6 +47,7 @@ def unique_names(exported: Iterable[str]) -> list[str]:
     return names
 
 
+Progress = Callable[[int, str], None]
 Content = Literal["both", "samples", "coefficients"]
 
 
@@ -98,7 +60,7 @@ class ExportRequest(msgspec.Struct, frozen=True):
 
     @property
     def writer(self) -> ExportFormat:
-        return formats()[self.format]
+        return FORMATS[self.format]
 
     @property
     def is_one_file(self) -> bool:
@@ -111,12 +73,12 @@ class ExportOutcome(msgspec.Struct, frozen=True):
 
     run: str
     files: list[str] = []
-    error: str = ""
-    note: str = ""
-    """What was left out, in a sentence."""
+    error: Message = EMPTY
+    note: Message = EMPTY
+    """What was left out, and why."""
 
 
-def load_exported_run(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, str]:
+def _load(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, Message]:
     """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
 
     Returns the run, and why there are no coefficients where they were wanted beside samples. Raises
@@ -125,13 +87,13 @@ def load_exported_run(path: Path, content: Content, validator: Validator) -> tup
     run = open_run(path, validator=validator)
     samples = () if content == "coefficients" else sample_columns(run)
     if content == "samples":
-        return ExportedRun(run, None, samples), ""
+        return ExportedRun(run, None, samples), EMPTY
     try:
-        return ExportedRun(run, _document(run), samples), ""
+        return ExportedRun(run, _document(run), samples), EMPTY
     except (AnalysisError, UnsuitableRunError) as error:
         if content == "coefficients":
             raise
-        return ExportedRun(run, None, samples), f"no coefficients: {error}"
+        return ExportedRun(run, None, samples), message("no coefficients: {reason}", reason=error)
 
 
 def export_runs(
@@ -139,7 +101,7 @@ def export_runs(
     output: Path,
     request: ExportRequest,
     *,
-    progress: Callable[[int, str], None] = lambda _done, _name: None,
+    progress: Progress = lambda _done, _name: None,
 ) -> list[ExportOutcome]:
     """Export runs, in the order given; one that fails is reported and does not stop the rest.
 
@@ -183,13 +145,11 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
 def _export_one(path: Path, target: Path, request: ExportRequest, validator: Validator) -> ExportOutcome:
     name = str(path.absolute())
     try:
-        exported, note = load_exported_run(path, request.content, validator)
-        request.writer.write_run(exported, target, replace=request.replace)
+        exported, note = _load(path, request.content, validator)
+        files = write_exported_run(request.format, exported, target, replace=request.replace)
     except RunError as error:
-        return ExportOutcome(name, error=str(error))
-    return ExportOutcome(
-        name, [str(file) for file in output_files(request.format, target, exported)], note=note
-    )
+        return ExportOutcome(name, error=error.message)
+    return ExportOutcome(name, list(map(str, files)), note=note)
 
 
 def _into_one(
@@ -197,20 +157,21 @@ def _into_one(
     output: Path,
     request: ExportRequest,
     validator: Validator,
-    progress: Callable[[int, str], None],
+    progress: Progress,
 ) -> list[ExportOutcome]:
     found: list[ExportedRun] = []
     outcomes = []
     for done, path in enumerate(paths):
         progress(done, path.name)
         try:
-            found.append(load_exported_run(path, "coefficients", validator)[0])
+            found.append(_load(path, "coefficients", validator)[0])
             outcomes.append(ExportOutcome(str(path.absolute()), [str(output.absolute())]))
         except (RunError, AnalysisError) as error:
-            outcomes.append(ExportOutcome(str(path.absolute()), error=str(error)))
+            outcomes.append(ExportOutcome(str(path.absolute()), error=message_of(error)))
     write = request.writer.write_coefficients
     if found and write is not None:
-        write(found, output, replace=request.replace)
+        with atomic_write(output.absolute(), replace=request.replace) as made:
+            write(found, made)
     return outcomes
 
 

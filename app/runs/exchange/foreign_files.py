@@ -4,22 +4,32 @@ import contextlib
 import math
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.errors import ExtraMissingError, ImportFileError
-from app.runs.exchange.columns import ForeignColumns, column_stack, find_columns
+from app.runs.errors import ExtraMissingError, ImportFileError, one_line
+from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_reading import CsvOptions, read_columns
-from messages.message import option
+from messages.message import Message, message, option
 
-Reader = Callable[[Path, CsvOptions], ForeignColumns]
-Result = TypeVar("Result")
 _LARGEST_BYTES = 4 << 30
 """A file that unpacks to more than this is refused before it is unpacked."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """A file that is open."""
+
+    names: list[str]
+    """Of all columns; "" where a column has none."""
+    column: Callable[[int], NDArray[np.float64]]
+    """Reads a column by its number. Raises ImportFileError."""
+    row_label: Callable[[int], Message] = lambda row: message("row {row}", row=row)
 
 
 def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
@@ -27,13 +37,27 @@ def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
 
     Raises ExtraMissingError, and ImportFileError, which names file, row or column, and remedy.
     """
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
+    if is_csv(path):
         return read_columns(path, layout)
     _check_layout(path, layout)
-    columns = _reading(path, lambda: reader(path, layout))
-    columns.check()
-    return columns
+    with _faults_named(path):
+        table = _OPENERS[path.suffix.lower()](path, layout)
+        positions = find_columns(path, layout.wanted, table.names, len(table.names))
+        columns = {table.names[at] or str(at): table.column(at) for at in positions}
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise ImportFileError(
+            "{path}: the columns differ in length ({told}). Choose columns of one record",
+            path=path,
+            told=told,
+        )
+    if not any(lengths.values()):
+        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
+    values = np.column_stack(list(columns.values()))
+    found = ForeignColumns(path, values, list(columns), table.row_label)
+    found.check()
+    return found
 
 
 def list_columns(path: Path, layout: CsvOptions) -> list[str]:
@@ -41,31 +65,32 @@ def list_columns(path: Path, layout: CsvOptions) -> list[str]:
 
     Raises ImportFileError, ExtraMissingError.
     """
-    return _reading(path, lambda: _LISTERS[path.suffix.lower()](path, layout))
+    with _faults_named(path):
+        return _OPENERS[path.suffix.lower()](path, layout).names
 
 
 def is_csv(path: Path) -> bool:
     """Tell whether `read_foreign` reads a file as CSV."""
-    return path.suffix.lower() not in _READERS
+    return path.suffix.lower() not in _OPENERS
 
 
-def _reading(path: Path, read: Callable[[], Result]) -> Result:
+@contextlib.contextmanager
+def _faults_named(path: Path) -> Iterator[None]:
     """Put into words whatever these libraries raise on a damaged file. Raises ImportFileError."""
     if not path.is_file():
         raise ImportFileError(
             "{path}: there is no such file. Give the path of a {suffix} file", path=path, suffix=path.suffix
         )
     try:
-        return read()
+        yield
     except (ImportFileError, ExtraMissingError):
         raise
     except Exception as error:
-        fault = " ".join(str(error).split())[:120] or type(error).__name__
         raise ImportFileError(
             "{path} cannot be read as {suffix} ({fault}). Export it again",
             path=path,
             suffix=path.suffix,
-            fault=fault,
+            fault=one_line(error)[:120] or type(error).__name__,
         ) from error
 
 
@@ -87,57 +112,32 @@ def _check_layout(path: Path, layout: CsvOptions) -> None:
         )
 
 
-def _wanted(layout: CsvOptions) -> list[str]:
-    return [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
-
-
-# --- Parquet -----------------------------------------------------------------------------
-
-
-def _read_parquet(path: Path, layout: CsvOptions) -> ForeignColumns:
+def _open_parquet(path: Path, layout: CsvOptions) -> _Table:
     file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
     names = list(file.schema_arrow.names)
-    chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
-    if file.metadata.num_rows * 8 * len(chosen) > _LARGEST_BYTES:
+    rows = file.metadata.num_rows
+    if rows * 8 * len(layout.wanted) > _LARGEST_BYTES:
         raise ImportFileError(
-            "{path} holds {num_rows} rows, too many to load. Export a part",
-            path=path,
-            num_rows=file.metadata.num_rows,
+            "{path} holds {num_rows} rows, too many to load. Export a part", path=path, num_rows=rows
         )
-    table = file.read(columns=chosen)
-    columns = {name: _parquet_column(path, name, table.column(name)) for name in chosen}
-    return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+
+    def column(at: int) -> NDArray[np.float64]:
+        stored = file.read(columns=[names[at]]).column(names[at])
+        values = stored.to_numpy()
+        if values.dtype.kind not in "iuf":
+            raise ImportFileError(
+                "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds",
+                path=path,
+                name=names[at],
+                type=stored.type,
+            )
+        return np.asarray(values, dtype=np.float64)
+
+    return _Table(names, column)
 
 
-def _list_parquet(path: Path, _layout: CsvOptions) -> list[str]:
-    return list(import_optional("pyarrow.parquet", "Parquet").ParquetFile(path).schema_arrow.names)
-
-
-def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
-    values = column.to_numpy()
-    if values.dtype.kind not in "iuf":
-        raise ImportFileError(
-            "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds",
-            path=path,
-            name=name,
-            type=column.type,
-        )
-    return np.asarray(values, dtype=np.float64)
-
-
-# --- MATLAB ------------------------------------------------------------------------------
-
-
-def _read_mat(path: Path, layout: CsvOptions) -> ForeignColumns:
+def _open_mat(path: Path, _layout: CsvOptions) -> _Table:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
-    vectors = _load_mat(path)
-    names = list(vectors)
-    chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
-    columns = {name: vectors[name] for name in chosen}
-    return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
-
-
-def _load_mat(path: Path) -> dict[str, NDArray[np.float64]]:
     from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
 
     with path.open("rb") as file:
@@ -146,7 +146,9 @@ def _load_mat(path: Path) -> dict[str, NDArray[np.float64]]:
     if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > _LARGEST_BYTES:
         raise ImportFileError("{path} holds more numbers than can be loaded. Save a part of them", path=path)
     content = loadmat(path, simplify_cells=True)
-    return dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
+    vectors = dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
+    values = list(vectors.values())
+    return _Table(list(vectors), values.__getitem__)
 
 
 def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -160,39 +162,31 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
             yield from ((f"{name}:{i}", value[:, i].astype(np.float64)) for i in range(value.shape[1]))
 
 
-# --- Excel -------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _open_book(path: Path) -> Iterator[Any]:
+def _open_xlsx(path: Path, layout: CsvOptions) -> _Table:
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
             raise ImportFileError("{path} unpacks to more than can be loaded. Export it as CSV", path=path)
     book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
-    try:
-        yield book
-    finally:
-        book.close()
-
-
-def _list_xlsx(path: Path, layout: CsvOptions) -> list[str]:
-    with _open_book(path) as book:
-        _, header, rows = _sheet(path, book, layout)
-    width = max(len(header), *(len(row) for row in rows))
-    return [*header, *[""] * (width - len(header))]
-
-
-def _read_xlsx(path: Path, layout: CsvOptions) -> ForeignColumns:
-    with _open_book(path) as book:
+    with contextlib.closing(book):
         sheet, header, rows = _sheet(path, book, layout)
-        width = max(len(header), *(len(row) for row in rows))
-        chosen = find_columns(path, _wanted(layout), header, width)
-        names = [header[i] if i < len(header) else str(i) for i in chosen]
-        first = layout.skip + (2 if layout.header else 1)
-        values = np.array(
-            [[_xlsx_number(path, sheet, first + n, i, row) for i in chosen] for n, row in enumerate(rows)]
-        )
-    return ForeignColumns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
+    width = max(len(header), *(len(row) for row in rows))
+    names = [*header, *[""] * (width - len(header))]
+    first = layout.skip + (2 if layout.header else 1)
+
+    def row_label(row: int) -> Message:
+        return message("sheet {sheet}, row {row}", sheet=sheet, row=first + row)
+
+    def number(row: int, at: int) -> float:
+        cell = rows[row][at] if at < len(rows[row]) else None
+        if cell is None:
+            return math.nan
+        if isinstance(cell, bool) or not isinstance(cell, int | float):
+            remedy = message("Correct it, or leave the cell empty if there is no reading")
+            fault = message("{cell!r} is not a number. {remedy}", cell=str(cell)[:40], remedy=remedy)
+            raise cell_fault(path, row_label(row), names[at] or str(at), fault)
+        return float(cell)
+
+    return _Table(names, lambda at: np.array([number(row, at) for row in range(len(rows))]), row_label)
 
 
 def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], list[tuple[Any, ...]]]:
@@ -200,15 +194,14 @@ def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], l
     found = []
     for sheet in book.worksheets:
         rows = list(sheet.iter_rows(min_row=layout.skip + 1, values_only=True))
-        header = (
-            ["" if cell is None else str(cell).strip() for cell in rows[0]] if layout.header and rows else []
-        )
+        head = rows[0] if layout.header and rows else ()
+        header = ["" if cell is None else str(cell).strip() for cell in head]
         rows = rows[1:] if layout.header else rows
         while rows and all(cell is None for cell in rows[-1]):
             rows.pop()
         if rows:
             found.append((str(sheet.title), header, rows))
-        if rows and all(name.strip() in header for name in _wanted(layout)):
+        if rows and all(name.strip() in header for name in layout.wanted):
             return found[-1]
     if not found:
         raise ImportFileError(
@@ -219,26 +212,8 @@ def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], l
     return found[0]
 
 
-def _xlsx_number(path: Path, sheet: str, row_number: int, column: int, row: tuple[Any, ...]) -> float:
-    cell = row[column] if column < len(row) else None
-    if cell is None:
-        return math.nan
-    if isinstance(cell, bool) or not isinstance(cell, int | float):
-        raise ImportFileError(
-            "{path}, sheet {sheet}, row {row_number}, column {column}: {cell!r} is not a"
-            " number. Correct it, or leave the cell empty if there is no reading",
-            path=path,
-            sheet=sheet,
-            row_number=row_number,
-            column=column,
-            cell=str(cell)[:40],
-        )
-    return float(cell)
-
-
-_READERS: dict[str, Reader] = {".parquet": _read_parquet, ".mat": _read_mat, ".xlsx": _read_xlsx}
-_LISTERS: dict[str, Callable[[Path, CsvOptions], list[str]]] = {
-    ".parquet": _list_parquet,
-    ".mat": lambda path, _layout: list(_load_mat(path)),
-    ".xlsx": _list_xlsx,
+_OPENERS: dict[str, Callable[[Path, CsvOptions], _Table]] = {
+    ".parquet": _open_parquet,
+    ".mat": _open_mat,
+    ".xlsx": _open_xlsx,
 }

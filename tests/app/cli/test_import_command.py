@@ -9,8 +9,8 @@ import pytest
 from cli_kit import assert_one_error_line
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.exchange.content import sample_columns
-from app.runs.exchange.csv_files import write_samples
+from app.runs.exchange.content import ExportedRun, sample_columns
+from app.runs.exchange.exporting import write_exported_run
 from app.runs.reader import open_run
 from config.files import published_row
 
@@ -50,7 +50,7 @@ def test_a_foreign_record_gives_what_the_run_itself_gives(slipstand: Any, tmp_pa
     german = ["--skip", 1, "--decimal", ",", "--time-unit", "ms", "--unit", "mm"]
     columns = ["--time", "Zeit", "--table", 1, "--relative", "Platte"]
     assert slipstand("import", csv, *columns, *german, *common, first).code == 0
-    write_samples(sample_columns(open_run(first)), exported)
+    write_exported_run("csv", ExportedRun(open_run(first), None, sample_columns(open_run(first))), exported)
     columns = ["--time", 0, "--table", "table_displacement_m", "--relative", "relative_displacement_m"]
     assert slipstand("import", exported, *columns, *common, second).code == 0
     one, two = slipstand("analyze", first, second, "--json").json

@@ -47,7 +47,7 @@ def test_results_are_kept_once_and_taken_from_there(folder, monkeypatch):
     assert [Path(run.name).name for run in first.runs] == ["a.h5", "b.h5"]
     assert [run.series.code for run in first.runs] == ["1FFM0", "2SSM1"]
     assert [run.series.contact for run in first.runs] == ["FF", "SS"]
-    assert first.details[first.runs[0].name].truth["friction_dynamic"] == 0.1
+    assert first.details[first.runs[0].name].metadata.truth["friction_dynamic"] == 0.1
     monkeypatch.setattr("app.runs.campaign.run_result.analyze_run", None)
     again = taken(folder)
     assert [run.results for run in again.runs] == [run.results for run in first.runs]

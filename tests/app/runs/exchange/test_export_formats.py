@@ -19,9 +19,9 @@ from app.runs.analysis_input import to_record
 from app.runs.blocks import BlockLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.csv_files import csv_cell as csv_cell
 from app.runs.exchange.csv_reading import CsvOptions
-from app.runs.exchange.exporting import ExportRequest, export_runs, formats
+from app.runs.exchange.export_formats import FORMATS, csv_cell
+from app.runs.exchange.exporting import ExportRequest, export_runs, write_exported_run
 from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.saved_analyses import inputs_hash, save_analysis
@@ -29,6 +29,7 @@ from app.runs.writer import write_run
 from config.files import load_stand
 from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
+from messages.message import EMPTY
 
 CHANNELS = ("time_s", "table_displacement_m", "relative_displacement_m")
 
@@ -52,8 +53,8 @@ def run(request, tmp_path, metadata):
 
 
 def exported_file(run, name):
-    path = run.path.parent / f"out{formats()[name].suffix}"
-    formats()[name].write_run(ExportedRun(run, ANALYSIS, sample_columns(run)), path)
+    path = run.path.parent / f"out{FORMATS[name].suffix}"
+    write_exported_run(name, ExportedRun(run, ANALYSIS, sample_columns(run)), path)
     return path
 
 
@@ -180,7 +181,7 @@ def test_several_runs_go_into_a_folder_under_names_that_do_not_meet(run, tmp_pat
     outcomes = export_runs(
         [run.path, tmp_path / "b" / run.path.name], tmp_path / "out", ExportRequest("parquet")
     )
-    assert [outcome.error for outcome in outcomes] == ["", ""]
+    assert [outcome.error for outcome in outcomes] == [EMPTY, EMPTY]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["=run-2.parquet", "=run.parquet"]
 
 
@@ -189,19 +190,19 @@ def test_a_run_that_fails_does_not_stop_the_rest(run, tmp_path):
     outcomes = export_runs(
         [tmp_path / "bad.h5", run.path], tmp_path / "c.json", ExportRequest("json", "coefficients")
     )
-    assert "not an HDF5 file" in outcomes[0].error
+    assert "not an HDF5 file" in str(outcomes[0].error)
     assert len(json.loads((tmp_path / "c.json").read_text())["coefficients"]) == 3
 
 
 @pytest.mark.parametrize("name", ["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"])
 def test_nothing_is_overwritten_unless_asked(run, name):
-    path = run.path.parent / f"out{formats()[name].suffix}"
+    path = run.path.parent / f"out{FORMATS[name].suffix}"
     path.write_text("mine")
-    write = formats()[name].write_run
+    exported = ExportedRun(run, ANALYSIS, sample_columns(run))
     with pytest.raises(RunExistsError):
-        write(ExportedRun(run, ANALYSIS, sample_columns(run)), path)
+        write_exported_run(name, exported, path)
     assert path.read_text() == "mine"
-    write(ExportedRun(run, ANALYSIS, sample_columns(run)), path, replace=True)
+    write_exported_run(name, exported, path, replace=True)
     assert path.read_bytes() != b"mine"
     assert not [p for p in path.parent.iterdir() if p.name.startswith(".")]
 
@@ -212,7 +213,7 @@ def test_a_failure_leaves_nothing_behind(run, monkeypatch):
 
     monkeypatch.setattr("scipy.io.savemat", full)
     (outcome,) = export_runs([run.path], run.path.parent / "out.mat", ExportRequest("mat"))
-    assert "full" in outcome.error
+    assert "full" in str(outcome.error)
     assert [p.name for p in run.path.parent.iterdir()] == [run.path.name]
 
 

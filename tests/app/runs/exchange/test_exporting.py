@@ -4,9 +4,9 @@ from runs_kit import ENDING, block
 
 from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
-from app.runs.exchange.content import sample_columns
-from app.runs.exchange.csv_files import write_samples
+from app.runs.exchange.content import ExportedRun, sample_columns
 from app.runs.exchange.csv_reading import CsvOptions
+from app.runs.exchange.exporting import write_exported_run
 from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.writer import write_run
@@ -23,7 +23,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     write_run(tmp_path / "run.h5", metadata, rows, ENDING.replace(time_base=TimeBase()))
     run = open_run(tmp_path / "run.h5", trusted=True)
 
-    write_samples(sample_columns(run), tmp_path / "run.csv")
+    write_exported_run("csv", ExportedRun(run, None, sample_columns(run)), tmp_path / "run.csv")
     layout = CsvOptions("time_s", "table_displacement_m", "relative_displacement_m")
     import_csv(tmp_path / "run.csv", CsvImport(layout), tmp_path / "again.h5", load_stand(), series="1FFM1")
     again = to_record(open_run(tmp_path / "again.h5", trusted=True))
@@ -33,7 +33,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
         assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
     assert (again.masses, again.pullback_m) == (record.masses, record.pullback_m)
     with pytest.raises(RunExistsError):
-        write_samples(sample_columns(run), tmp_path / "run.csv")
+        write_exported_run("csv", ExportedRun(run, None, sample_columns(run)), tmp_path / "run.csv")
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,15 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
 )
 def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, unit, name):
     write_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
-    write_samples(sample_columns(open_run(tmp_path / "run.h5", trusted=True)), tmp_path / "run.csv")
+    write_exported_run(
+        "csv",
+        ExportedRun(
+            open_run(tmp_path / "run.h5", trusted=True),
+            None,
+            sample_columns(open_run(tmp_path / "run.h5", trusted=True)),
+        ),
+        tmp_path / "run.csv",
+    )
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
     assert (
         header
@@ -54,6 +62,6 @@ def test_replacing_is_asked_for(tmp_path, metadata):
     write_run(tmp_path / "run.h5", metadata, block(0, 3), ENDING)
     run = open_run(tmp_path / "run.h5", trusted=True)
     (tmp_path / "run.csv").write_text("old")
-    write_samples(sample_columns(run), tmp_path / "run.csv", replace=True)
+    write_exported_run("csv", ExportedRun(run, None, sample_columns(run)), tmp_path / "run.csv", replace=True)
     assert (tmp_path / "run.csv").read_text().startswith("time_s,")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.h5"]

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.disk import atomic_write
 from app.runs.exchange.content import ExportedRun, SampleColumn
 
 _TIME_RESPONSE = 1
@@ -21,14 +20,11 @@ _DATA_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12}
 """Codes of the format for what an ordinate is: displacement, velocity, acceleration."""
 
 
-def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
-    """Write a dataset a gauge, in the unit of the run; absent readings are NaN.
-
-    Raises RunExistsError, DiskFullError, WriteError.
-    """
+def write_run(exported: ExportedRun, path: Path) -> None:
+    """Write a dataset a gauge, in the unit of the run; absent readings are NaN."""
     time, *others = exported.samples
     channels = [column for column in others if column.unit == exported.run.metadata.unit]
-    with atomic_write(path.absolute(), replace=replace) as made, made.open("xb") as file:
+    with path.open("xb") as file:
         for number, channel in enumerate(channels, start=1):
             file.writelines(_dataset(exported, number, time.values, channel))
 
@@ -59,17 +55,15 @@ def _dataset(
 def _identification(exported: ExportedRun, channel: SampleColumn) -> tuple[str, ...]:
     metadata = exported.run.metadata
     f_d = (exported.analysis or {}).get("results", {}).get("friction_dynamic")
-    found = (
-        ""
-        if f_d is None
-        else f"f_d = {f_d['value']:.6g}, standard uncertainty {f_d['standard_uncertainty']:.2g}"
-    )
+    friction = "NONE"
+    if f_d is not None:
+        friction = f"f_d = {f_d['value']:.6g}, standard uncertainty {f_d['standard_uncertainty']:.2g}"
     return (
         metadata.title,
         channel.name,
         metadata.start_time.strftime("%d-%b-%y    %H:%M:%S"),
         f"{exported.name} {metadata.series or ''}".strip(),
-        found or "NONE",
+        friction,
     )
 
 

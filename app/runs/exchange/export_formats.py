@@ -1,0 +1,328 @@
+"""Formats of exported runs: each writes the samples of a run, or a table of coefficients, to a new file."""
+
+import csv
+import itertools
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from analysis.catalogue import Place, QuantityDefinition, definition
+from analysis.formatting import format_value
+from app.runs.errors import UnsuitableRunError
+from app.runs.exchange import uff58
+from app.runs.exchange.content import (
+    COEFFICIENT_COLUMNS,
+    ExportedRun,
+    SampleColumn,
+    coefficient_documents,
+    coefficient_rows,
+    import_optional,
+    run_metadata_document,
+)
+
+# --- CSV ---------------------------------------------------------------------------------
+
+_ROWS_AT_ONCE = 10_000
+_FORMULA = re.compile(
+    r"^(?=[\t\r\n])|(?:^|(?<=[;\t\r\n]))(?=(?:[^\S\t\r\n]|[\ufeff\u200b])*[=+\-@＝＋－＠−﹢﹣﹦﹫])"
+)
+"""Where a spreadsheet could begin to read a formula: at the beginning, behind blanks that it may leave out,
+and behind what it may take for the end of a cell; full-width signs count as signs in some countries."""
+
+
+def write_csv_samples(exported: ExportedRun, path: Path) -> None:
+    """Samples with all their digits; absent readings are empty."""
+    columns = exported.samples
+    with path.open("x", encoding="utf-8", newline="") as file:
+        file.write(",".join(column.name for column in columns) + "\n")
+        for first in range(0, len(columns[0].values), _ROWS_AT_ONCE):
+            cells = [_csv_numbers(column, slice(first, first + _ROWS_AT_ONCE)) for column in columns]
+            file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+
+
+def write_csv_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
+    """Write a line a quantity."""
+    with path.open("x", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COEFFICIENT_COLUMNS)
+        for exported in runs:
+            writer.writerows([csv_cell(value) for value in row] for row in coefficient_rows(exported))
+
+
+def csv_cell(value: Any) -> str:
+    """Text that no spreadsheet takes for a formula; numbers with all their digits."""
+    if value is None:
+        return ""
+    return _FORMULA.sub("'", value) if isinstance(value, str) else repr(value)
+
+
+def _csv_numbers(column: SampleColumn, rows: slice) -> list[str]:
+    values = column.values[rows]
+    if values.dtype.kind != "f":
+        return [str(x) for x in values.tolist()]
+    return ["" if x != x else repr(x) for x in values.astype(np.float64).tolist()]
+
+
+# --- JSON --------------------------------------------------------------------------------
+
+
+def _write_json_run(exported: ExportedRun, path: Path) -> None:
+    """Numbers that are absent or not finite are null."""
+    samples = {
+        column.name: {"unit": column.unit, "values": column.values.tolist()} for column in exported.samples
+    }
+    facts = run_metadata_document(exported.run)
+    _write_json(
+        path,
+        {"schema": "slipstand-run/1", "name": exported.name}
+        | facts
+        | {"samples": samples, "analysis": exported.analysis},
+    )
+
+
+def _write_json_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
+    rows = coefficient_documents(runs)
+    _write_json(path, {"schema": "slipstand-coefficients/1", "coefficients": rows})
+
+
+def _write_json(path: Path, document: dict[str, Any]) -> None:
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
+
+
+# --- Parquet -----------------------------------------------------------------------------
+
+
+def _write_parquet_run(exported: ExportedRun, path: Path) -> None:
+    """Absent readings are null; the facts are JSON under `slipstand` in the metadata of the table."""
+    pa = import_optional("pyarrow", "Parquet")
+    facts = run_metadata_document(exported.run) | {"analysis": exported.analysis}
+    fields = [
+        pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), metadata={"units": column.unit})
+        for column in exported.samples
+    ]
+    arrays = [pa.array(column.values, from_pandas=True) for column in exported.samples]
+    schema = pa.schema(fields, metadata={"slipstand": msgspec.json.encode(facts)})
+    _write_parquet(pa.Table.from_arrays(arrays, schema=schema), path)
+
+
+def _write_parquet_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
+    pa = import_optional("pyarrow", "Parquet")
+    numbers = ("value", "standard_uncertainty", "interval_95_low", "interval_95_high")
+    kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string()) | dict.fromkeys(numbers, pa.float64())
+    schema = pa.schema(list((kinds | {"adequate": pa.bool_()}).items()))
+    _write_parquet(pa.Table.from_pylist(coefficient_documents(runs), schema=schema), path)
+
+
+def _write_parquet(table: Any, path: Path) -> None:
+    import_optional("pyarrow.parquet", "Parquet").write_table(table, path)
+
+
+# --- MATLAB ------------------------------------------------------------------------------
+
+_MAT_NAME_LENGTH = 63
+
+
+def _write_mat_run(exported: ExportedRun, path: Path) -> None:
+    """A column vector a channel, and the structs `units`, `run`, `coefficients` and `analysis`.
+
+    `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array.
+    """
+    named = {_mat_name(column.name): column for column in exported.samples}
+    variables: dict[str, Any] = {name: column.values for name, column in named.items()}
+    variables["units"] = {name: column.unit for name, column in named.items()}
+    variables["run"] = _mat_value(run_metadata_document(exported.run) | {"name": exported.name})
+    if exported.analysis is not None:
+        variables["coefficients"] = _mat_value(exported.analysis["results"])
+        variables["analysis"] = _mat_value({k: v for k, v in exported.analysis.items() if k != "results"})
+    _write_mat(variables, path)
+
+
+def _write_mat_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
+    """The struct array `coefficients`, one element a quantity of a run."""
+    _write_mat({"coefficients": [_mat_value(row) for row in coefficient_documents(runs)]}, path)
+
+
+def _write_mat(variables: dict[str, Any], path: Path) -> None:
+    from scipy.io import savemat  # a third of a second that only this format needs
+
+    savemat(path, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
+
+
+def _mat_value(value: Any) -> Any:
+    """MATLAB knows no null: what is absent is an empty array; names that it cannot have are mended."""
+    if isinstance(value, dict):
+        return {_mat_name(key): _mat_value(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_mat_value(item) for item in value]
+    return [] if value is None else value
+
+
+def _mat_name(key: str) -> str:
+    """As MATLAB's own `makeValidName` does it: letters, digits, underscores, a letter first."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", str(key))[: _MAT_NAME_LENGTH - 1]
+    return name if name[:1].isalpha() else f"x{name}"
+
+
+# --- Excel -------------------------------------------------------------------------------
+
+Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
+"""Header and rows."""
+
+_SHEET_ROWS = 1_048_576
+_CELL_CHARACTERS = 32_767
+_COLUMN_WIDTH = 22
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""What XML cannot hold."""
+
+
+def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
+    """The sheets Coefficients, Samples and Run. Raises UnsuitableRunError for more than a sheet holds."""
+    if len(exported.run) >= _SHEET_ROWS and exported.samples:
+        raise UnsuitableRunError(
+            "{path} has {count} samples, a sheet of xlsx at most {sheet_rows}. Export it as parquet or csv",
+            path=exported.run.path,
+            count=len(exported.run),
+            sheet_rows=_SHEET_ROWS - 1,
+        )
+    samples = zip(*(column.values.tolist() for column in exported.samples), strict=True)
+    sheets: dict[str, Sheet] = {
+        "Coefficients": (COEFFICIENT_COLUMNS, coefficient_rows(exported)),
+        "Samples": ([column.name for column in exported.samples], samples),
+        "Run": (("fact", "value"), _flat_facts("", run_metadata_document(exported.run))),
+    }
+    write_sheets(sheets, path)
+
+
+def _write_xlsx_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
+    rows = (row for exported in runs for row in coefficient_rows(exported))
+    write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path)
+
+
+def write_sheets(sheets: Mapping[str, Sheet], path: Path) -> None:
+    """Write a workbook, sheet after sheet, row after row. Texts are texts: no cell becomes a formula.
+
+    Raises ExtraMissingError.
+    """
+    openpyxl = import_optional("openpyxl", "Excel")
+    cell_type = import_optional("openpyxl.cell", "Excel").WriteOnlyCell
+    letter = import_optional("openpyxl.utils", "Excel").get_column_letter
+    book = openpyxl.Workbook(write_only=True)
+    for name, (header, rows) in sheets.items():
+        sheet = book.create_sheet(name)
+        sheet.freeze_panes = "A2"
+        for column in range(1, len(header) + 1):
+            sheet.column_dimensions[letter(column)].width = _COLUMN_WIDTH
+        for row in itertools.chain((header,), rows):
+            sheet.append([_xlsx_cell(cell_type, sheet, value) for value in row])
+    book.save(path)
+
+
+def _flat_facts(prefix: str, facts: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Facts with dotted names, as `metadata.table_mass_kg`."""
+    for name, value in facts.items():
+        if isinstance(value, dict):
+            yield from _flat_facts(f"{prefix}{name}.", value)
+        elif isinstance(value, list | tuple):
+            yield f"{prefix}{name}", msgspec.json.encode(value).decode()
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _xlsx_cell(cell_type: Any, sheet: Any, value: Any) -> Any:
+    """A number, truth, nothing, or a text that stays one even where it begins with an equals sign."""
+    if value is None or value != value:
+        return None
+    if isinstance(value, bool):
+        return value
+    is_text = isinstance(value, str)
+    cell = cell_type(sheet, _CONTROL.sub("\ufffd", value)[:_CELL_CHARACTERS] if is_text else repr(value))
+    cell.data_type = "s" if is_text else "n"  # of itself openpyxl writes 16 digits, which are one too few
+    return cell
+
+
+# --- LaTeX -------------------------------------------------------------------------------
+
+_LATEX_COLUMNS = tuple(
+    definition(name)
+    for name in (
+        "period_s", "log_decrement", "damping_n1_per_s", "damping_n2_per_s", "stiffness_n_per_m",
+        "residual_displacement_m", "friction_static", "friction_dynamic",
+    )
+)  # fmt: skip
+_LATEX_ESCAPES = str.maketrans({
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%",
+    "_": r"\_", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": " ", "\r": " ",
+})  # fmt: skip
+
+
+def _write_latex(runs: Iterable[ExportedRun], path: Path) -> None:
+    """A table to paste into a paper, a row a run: value and standard uncertainty, a dash where absent.
+
+    A run whose model does not fit bears a dagger.
+    """
+    header = ("Run", "Series", *(column.latex_heading(Place.TERMINAL) for column in _LATEX_COLUMNS))
+    lines = [
+        "% by slipstand, for \\usepackage{booktabs}; standard uncertainties; dagger: the model does not fit",
+        rf"\begin{{tabular}}{{ll{'r' * len(_LATEX_COLUMNS)}}}",
+        r"\toprule",
+        " & ".join(header) + r" \\",
+        r"\midrule",
+        *(" & ".join(_latex_row(exported)) + r" \\" for exported in runs),
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def escape_latex(text: str) -> str:
+    """Text that LaTeX sets as it is."""
+    return text.translate(_LATEX_ESCAPES)
+
+
+def _latex_row(exported: ExportedRun) -> Iterator[str]:
+    analysis = exported.analysis or {}
+    results, model = analysis.get("results", {}), analysis.get("model") or {}
+    yield escape_latex(exported.name) + ("" if model.get("adequate", True) else r"$^\dagger$")
+    yield escape_latex(exported.run.metadata.series or "--")
+    for column in _LATEX_COLUMNS:
+        yield _latex_cell(column, results.get(column.name))
+
+
+def _latex_cell(column: QuantityDefinition, result: dict[str, Any] | None) -> str:
+    if result is None:
+        return "--"
+    scale = column.unit_at(Place.TERMINAL).scale
+    return format_value(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale).latex
+
+
+# --- All formats -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ExportFormat:
+    """How a format is written."""
+
+    suffix: str
+    write_run: Callable[[ExportedRun, Path], None]
+    write_coefficients: Callable[[Iterable[ExportedRun], Path], None] | None
+    """None where the format holds samples alone."""
+    holds_samples: bool = True
+
+
+FORMATS = {
+    "csv": ExportFormat(".csv", write_csv_samples, write_csv_coefficients),
+    "json": ExportFormat(".json", _write_json_run, _write_json_coefficients),
+    "parquet": ExportFormat(".parquet", _write_parquet_run, _write_parquet_coefficients),
+    "mat": ExportFormat(".mat", _write_mat_run, _write_mat_coefficients),
+    "uff58": ExportFormat(".uff", uff58.write_run, None),
+    "xlsx": ExportFormat(".xlsx", _write_xlsx_run, _write_xlsx_coefficients),
+    "latex": ExportFormat(
+        ".tex", lambda exported, path: _write_latex([exported], path), _write_latex, holds_samples=False
+    ),
+}
+"""By the names of the command line."""
