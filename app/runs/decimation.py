@@ -37,11 +37,7 @@ class DecimatedRun:
 
 
 def open_decimated(
-    path: Path | str,
-    spans: int,
-    *,
-    before_release_s: float = np.inf,
-    validator: Validator | None = None,
+    path: Path | str, spans: int, *, before_release_s: float = np.inf, validator: Validator | None = None
 ) -> DecimatedRun:
     """Read a run as it is drawn small.
 

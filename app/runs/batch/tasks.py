@@ -152,10 +152,7 @@ def analyze_runs(
 
 
 def map_runs(
-    tasks: Sequence[Task],
-    work: Callable[..., Outcome],
-    executor: Executor,
-    progress: Progress,
+    tasks: Sequence[Task], work: Callable[..., Outcome], executor: Executor, progress: Progress
 ) -> Iterator[Outcome | FailedItem[Task]]:
     """Do `work(task)` on runs by an executor; in this process `work(task, progress)`."""
     done = 0

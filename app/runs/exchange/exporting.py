@@ -153,11 +153,7 @@ def _export_one(path: Path, target: Path, request: ExportRequest, validator: Val
 
 
 def _into_one(
-    paths: Sequence[Path],
-    output: Path,
-    request: ExportRequest,
-    validator: Validator,
-    progress: Progress,
+    paths: Sequence[Path], output: Path, request: ExportRequest, validator: Validator, progress: Progress
 ) -> list[ExportOutcome]:
     found: list[ExportedRun] = []
     outcomes = []

@@ -159,9 +159,7 @@ def _impossible(gain: float, plan: CsvImport) -> Message:
         )
     if not math.isfinite(plan.offset):
         return message(
-            "{option} {value:g} cannot be. Give a finite number",
-            option=option("--offset"),
-            value=plan.offset,
+            "{option} {value:g} cannot be. Give a finite number", option=option("--offset"), value=plan.offset
         )
     return message(
         "{option} {value} cannot be. Give a finite share of the gain, 0 or above",
