@@ -24,11 +24,9 @@ CLOCK_TOLERANCE = 1e-3
 
 
 def to_record(run: "Run", *, metres_only: bool = True) -> Record:
-    """Readings, masses and calibration of a run as a record; absent samples are NaN.
+    """Readings, masses and calibration as a record; absent samples are NaN. Raises UnsuitableRunError.
 
-    `metres_only` refuses readings that are not displacements in metres. An analysis of free decay alone takes
-    any unit; its results are then in `run.metadata.unit`. Raises UnsuitableRunError (the run holds no
-    samples, or readings of another kind).
+    `metres_only` refuses other readings than displacements in metres, in which friction needs them.
     """
     if not len(run):
         raise UnsuitableRunError("{path} holds no samples. Record the run again", path=run.path)
@@ -80,10 +78,7 @@ def build_record(
 
 
 def combine_clock_scale(time_base: TimeBase) -> tuple[float, float]:
-    """Scale of the device's clock and its uncertainty: as timed against the host, and as made.
-
-    A short run on a busy host times the clock worse than its maker did (docs/decisions/0006).
-    """
+    """Scale of the device's clock and its uncertainty, as timed and as made (docs/decisions/0006)."""
     scale, timed = time_base.scale, time_base.scale_standard_uncertainty
     if timed == 0.0:
         return scale, 0.0

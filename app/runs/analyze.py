@@ -59,10 +59,7 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Analysis:
-    """What an identification took and gave; `document` is the JSON object of INTERFACE.
-
-    `saved_as` is NNN of the `/entry/analysis_NNN` that keeps it.
-    """
+    """What an identification took and gave; `document` is what `analyze --json` says."""
 
     run: Run
     record: Record
@@ -80,12 +77,10 @@ def analyze_run(
     validator: Validator | None = None,
     trusted: bool = False,
 ) -> Analysis:
-    """Identify one run, and keep the result in it with `save`.
+    """Identify one run, and keep the result in it with `save`. Raises RunError, AnalysisError.
 
     `progress` is called with the share done (0 to 1) and what is being done. `validator` is to be given
     for many runs, else one is started. `trusted`: the caller has validated the file.
-    Raises RunError (the run cannot be read or written), AnalysisError (it cannot
-    be identified).
     """
     run = open_run(path, validator=validator, trusted=trusted)
     record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
@@ -148,10 +143,7 @@ def _with_masses(record: Record, request: AnalysisRequest) -> Record:
 
 
 def repeat_saved_analysis(path: Path, validator: Validator | None = None) -> Analysis:
-    """Identify a run in the way of its newest analysis that still stands, else in the usual way.
-
-    Raises RunError (the run cannot be read), AnalysisError (it cannot be identified).
-    """
+    """Identify a run as its newest analysis that still stands did. Raises RunError, AnalysisError."""
     run = open_run(path, validator=validator)
     in_metres = run.metadata.unit == "m" and run.metadata.quantity == "displacement"
     kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))

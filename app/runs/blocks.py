@@ -24,7 +24,6 @@ class BlockLayout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def of(cls, block: "RunBlock") -> "BlockLayout":
-        """Layout that fits a block."""
         counts = "" if block.counts is None else block.counts.dtype.name
         return msgspec.convert({"channels": block.readings.shape[1], "counts": counts}, cls)
 
@@ -112,7 +111,6 @@ class CalibratedBlock:
         return self.readings[:, 0]
 
     def between(self, first_index: int, end_index: int) -> "CalibratedBlock":
-        """The rows with first_index <= index < end_index."""
         start = min(max(first_index - self.first_index, 0), len(self))
         part = slice(start, max(start, end_index - self.first_index))
         return CalibratedBlock(

@@ -62,9 +62,7 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetail
 def read_points(path: Path) -> CalibrationPoints:
     """Read a CSV file with the columns counts and dial_mm, in the order in which they were taken.
 
-    Separated by comma, semicolon (with decimal commas, too) or tab. With both columns direction and round
-    these are taken, else they are seen from the dial. Raises PointsError (the file, a column or a value
-    cannot be read), CalibrationError (the readings cannot be right).
+    Columns direction and round are taken too, else seen from the dial. Raises PointsError, CalibrationError.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()

@@ -1,8 +1,7 @@
 """Columns of an open run file: their paths, the rows to trust, and their checksums.
 
-A flipped bit on a disk must not pass for a reading. HDF5 has checksums only for datasets with filters, and
-those do not survive a `kill -9` while they grow (docs/decisions/0016). So the CRC-32 of each column is kept
-in the file when the run is closed.
+HDF5 has checksums only for datasets with filters, and those do not survive a `kill -9` while they grow
+(docs/decisions/0016). So the CRC-32 of each column is kept in the file when the run is closed.
 """
 
 import zlib
@@ -68,10 +67,7 @@ def store_checksum(file: h5py.File, column: str, value: int) -> None:
 
 
 def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:
-    """Read rows of a column; all rows of a finished run are checked against the stored checksum.
-
-    Raises DamagedRunError (the checksums differ).
-    """
+    """Read rows of a column; all rows are checked by their checksum. Raises DamagedRunError."""
     values: NDArray[Any] = dataset[rows]
     if len(values) == len(dataset) and is_finished(dataset.file):
         check_column(dataset, zlib.crc32(values.data), dataset.file.filename)
@@ -79,11 +75,7 @@ def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:
 
 
 def check_column(dataset: h5py.Dataset, value: int, run: Path | str) -> None:
-    """Compare the checksum `value` of a column of a finished run with the stored one.
-
-    `run` names the file in the message. Runs from before there were checksums pass. Raises DamagedRunError
-    (the checksums differ).
-    """
+    """Compare the checksum of a column of the finished `run` with the stored one. Raises DamagedRunError."""
     stored = read_number(dataset.file, schema.checksum_path(dataset.name.lstrip("/")))
     if stored is not None and stored != value:
         raise DamagedRunError(

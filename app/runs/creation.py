@@ -1,9 +1,8 @@
-"""Create a run file: all groups and datasets under a temporary name, then the final name, then open for rows.
+"""Create a run file under a temporary name, then give it the final name and open it for rows.
 
-HDF5 writes the head of a file at once and the objects that it points to much later. A process that is killed
-meanwhile leaves a file that nothing can open (docs/decisions/0018). Objects made while recording can be lost
-by a `kill -9` inside a flush, and take others with them. So every object exists before the first sample, and
-values that are known at the end only are filled in place.
+A process that is killed before HDF5 has written all objects leaves a file that nothing can open
+(docs/decisions/0018). Objects made while recording can be lost by a `kill -9` inside a flush. So every object
+exists before the first sample, and values that are known at the end only are filled in place.
 """
 
 import contextlib
@@ -47,11 +46,7 @@ _METADATA_CACHED_BYTES = 1 << 16
 
 
 def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "") -> h5py.File:
-    """Create a run file without samples and leave it open.
-
-    Raises OSError and RuntimeError of HDF5, MetadataError, DiskFullError,
-    WriteError.
-    """
+    """Create a run file and leave it open. Raises RunError, OSError and RuntimeError of HDF5."""
     if path.exists():
         raise FileExistsError(str(path))
     check_free_space(path.parent, MARGIN_BYTES)

@@ -39,11 +39,7 @@ class DecimatedRun:
 def open_decimated(
     path: Path | str, spans: int, *, before_release_s: float = np.inf, validator: Validator | None = None
 ) -> DecimatedRun:
-    """Read a run as it is drawn small.
-
-    `spans` is the number of equal spans of rows, about. Rows earlier than `before_release_s` before a known
-    release are left out. Raises RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError.
-    """
+    """Read a run in about so many spans, from `before_release_s` before a known release. Raises RunError."""
     return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
 
 

@@ -22,9 +22,8 @@ _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.E
 def reserve_space(path: Path, size: int, more: int) -> None:
     """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
 
-    HDF5 can crash after a failed write, and leaves a file that states a greater length than it has. So no
-    write of HDF5 may be the first to find the disk full. Linux claims the blocks behind the end of the
-    file, which also respects quotas; HDF5 accepts such a file.
+    HDF5 can crash after a failed write, so none of its writes may be the first to find the disk full. Linux
+    claims the blocks behind the end of the file, which also respects quotas; HDF5 accepts such a file.
     """
     try:
         if sys.platform == "linux":
@@ -113,10 +112,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring new names in a folder to disk, where the system can.
-
-    Some network shares cannot, nor can a folder that this user may write to but not read.
-    """
+    """Bring new names in a folder to disk, where system, network share and rights allow it."""
     if sys.platform == "win32":
         return
     try:
@@ -132,11 +128,7 @@ def sync_folder(folder: Path) -> None:
 
 @contextmanager
 def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; the file written there becomes `path` at the end.
-
-    Raises RunExistsError (`path` exists, and `replace` is False), DiskFullError, WriteError (nothing is left
-    behind).
-    """
+    """Yield a temporary path; its file becomes `path` in the end. Raises RunExistsError, WriteError."""
     temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
     claimed = False
     try:

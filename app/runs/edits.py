@@ -25,11 +25,7 @@ from config.schema import Stand
 
 
 def edit_run(path: Path, author: str, **fields: Any) -> Change:
-    """Give some fields of `RunMetadata` new values; the old ones stay in the file.
-
-    Raises MetadataError (a field that cannot be edited, or a value that cannot be), RunError (the file could
-    not be replaced; it is as it was).
-    """
+    """Give fields of `RunMetadata` new values; the old ones stay in the file. Raises RunError."""
     change = Change(_now(), author, msgspec.to_builtins(fields))
     return _append(path, lambda _file: change)
 
@@ -41,10 +37,9 @@ def series_fields(stand: Stand, code: str) -> dict[str, Any]:
 
 
 def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Change:
-    """Give back what stood there before the last edit that is not undone yet; the edit stays in the history.
+    """Give back what stood there before the last edit of one of `fields` that is not undone yet.
 
-    Only an edit of one of `fields` is undone. What was edited again since stays as it is. Raises
-    UnsuitableRunError (there is nothing to undo), RunError (the file could not be replaced; it is as it was).
+    The edit stays in the history; what was edited again since stays as it is. Raises RunError.
     """
 
     def back(file: h5py.File) -> Change:

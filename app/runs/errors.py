@@ -46,7 +46,6 @@ class ConditionError(MetadataError):
 
     @property
     def name(self) -> str:
-        """Field of `Conditions`, or name of another condition."""
         return str(self.message.values["name"])
 
     @property

@@ -33,10 +33,7 @@ def write_fields(group: h5py.Group, fields: Sequence[Field], value: Any, unit: s
 
 
 def read_fields(group: h5py.Group, fields: Sequence[Field]) -> dict[str, Any]:
-    """Read fields into nested dicts of JSON values, as `msgspec.convert` takes them.
-
-    Raises DamagedRunError (a field is of another kind).
-    """
+    """Read fields into nested dicts of JSON values, for `msgspec.convert`. Raises DamagedRunError."""
     raw: dict[str, Any] = {}
     for field in fields:
         if field.attribute:

@@ -38,10 +38,7 @@ _ROWS_AT_ONCE = 1 << 20
 
 
 def copy_run_into(path: Path, folder: Path) -> Path:
-    """Copy a run into a folder under its own name, or the next that is free. Returns the new path.
-
-    Raises RunError (the file is not a readable run, is in that folder already, or cannot be written there).
-    """
+    """Copy a run into a folder under the next name that is free. Returns the path. Raises RunError."""
     path = path.absolute()
     check_openable(path)
     if path.parent == folder.absolute():
@@ -60,11 +57,7 @@ def copy_run_into(path: Path, folder: Path) -> Path:
 
 
 def move_to_trash(path: Path) -> Path:
-    """Move a run to the trash of its folder. Returns the new path.
-
-    Raises RunNotFoundError, BeingRecordedError, WriteError, UnsuitableRunError (it is in the trash already,
-    is a link, or does not have the suffix of a run).
-    """
+    """Move a run to the trash of its folder. Returns the new path. Raises RunError."""
     path = path.absolute()
     if path.parent.name == TRASH:
         raise UnsuitableRunError(
@@ -86,10 +79,7 @@ def move_to_trash(path: Path) -> Path:
 
 
 def restore_from_trash(path: Path) -> Path:
-    """Move a run from the trash back to its folder. Returns the new path.
-
-    Raises RunNotFoundError, WriteError, UnsuitableRunError (it is not in a trash folder).
-    """
+    """Move a run from the trash back to its folder. Returns the new path. Raises RunError."""
     path = path.absolute()
     if path.parent.name != TRASH:
         raise UnsuitableRunError(
@@ -100,10 +90,7 @@ def restore_from_trash(path: Path) -> Path:
 
 
 def list_trash(folder: Path) -> list[Path]:
-    """Runs in the trash of a folder and of those below it, the last one moved there first.
-
-    Raises RunNotFoundError (there is no such folder).
-    """
+    """Runs in the trash of a folder and of those below it, the latest first. Raises RunNotFoundError."""
     check_folder_exists(folder)
     found = [path.absolute() for path in folder.rglob(f"{TRASH}/*{schema.SUFFIX}")]
     return sorted(found, key=lambda path: path.stat().st_ctime, reverse=True)
@@ -150,10 +137,7 @@ def inspect_run(path: Path) -> ExistingRun | None:
 
 
 def contains_all_samples(rebuilt: Path, other: Path) -> bool:
-    """Tell whether a run begins with all samples of another one, bit for bit.
-
-    Both files must have been validated or written by this program.
-    """
+    """Tell whether a sound run begins with all samples of another sound one, bit for bit."""
     with (
         h5py.File(rebuilt, "r", locking="best-effort") as ours,
         h5py.File(other, "r", locking="best-effort") as theirs,
@@ -182,11 +166,7 @@ def move_to_free_name(rebuilt: Path, target: Path) -> Path:
 
 
 def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
-    """Replace an earlier file by a recovered one.
-
-    `keep` moves the earlier file aside first and returns its new path. Raises RunError (both files are where
-    they were, or the earlier one is aside).
-    """
+    """Replace a file by a recovered one; `keep` moves it aside and returns its path. Raises RunError."""
     aside = _aside_name(target) if keep else None
     try:
         with recording_lock(target), editing_lock(target):  # also removes the lock file of a dead writer

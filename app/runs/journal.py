@@ -1,7 +1,6 @@
-"""Layout of a journal: received bytes with arrival times, each record with its length and checksum.
+"""Layout of a journal: `MAGIC`, then received bytes with arrival times, each record with length and checksum.
 
-A journal begins with `MAGIC`; records follow. A record that was cut short or does not match its
-checksum ends the journal: nothing behind it is trusted.
+A record that was cut short or does not match its checksum ends the journal: nothing behind it is trusted.
 """
 
 import struct
@@ -71,10 +70,7 @@ def encode_record(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WI
 
 
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
-    """Records of a journal from byte `start` (0: its beginning) to its end or first torn record.
-
-    Raises OSError (the file cannot be read), ValueError (it is not a journal).
-    """
+    """Records of a journal from byte `start` to its end or first torn record. Raises OSError, ValueError."""
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise ValueError(f"{path} is not a Slipstand journal")

@@ -41,8 +41,7 @@ class FileState(msgspec.Struct, frozen=True, gc=False):
 class SummaryCache:
     """Summaries by path, with the state of the file that each was made from. Use it in a `with` statement.
 
-    A cache that is damaged, or of another version, is begun anew; one that cannot be written is kept in
-    memory for this time.
+    A cache that is damaged or of another version is begun anew; one that cannot be written is kept in memory.
     """
 
     def __init__(self, path: str) -> None:
@@ -57,7 +56,6 @@ class SummaryCache:
 
     @classmethod
     def open(cls, folder: Path) -> Self:
-        """Open the cache of a library folder, or make it."""
         path = index_path(folder)
         for _ in range(2):
             try:
@@ -155,7 +153,6 @@ class RunFilter(msgspec.Struct, frozen=True):
     text: str | None = None
     """Occurs in file name, title, note, operator, series or source, whatever the case."""
     stale: bool | None = None
-    """Whose newest analysis is stale, or is not."""
 
     def matches(self, run: RunSummary) -> bool:
         return (
@@ -173,9 +170,8 @@ def list_runs(
 ) -> list[RunSummary]:
     """Summaries of all runs in a folder and those below it, oldest first, files with a fault last.
 
-    What has not changed since the last time comes from an index. `folder` is by default the recordings
-    folder, which counts as empty while it does not exist. `progress` is called with the number
-    of new files examined, and of all of them. Raises RunNotFoundError (there is no such folder).
+    `folder` is by default the recordings folder, which need not exist. `progress` is called with the numbers
+    of new files examined and of all. Raises RunNotFoundError.
     """
     if folder is not None:
         check_folder_exists(folder)
@@ -185,10 +181,7 @@ def list_runs(
 
 
 def resolve_run_files(given: Iterable[Path]) -> list[Path]:
-    """Run files in the order given, each once; of a folder those in it and below, by name.
-
-    Raises RunNotFoundError (there are none).
-    """
+    """Run files in the order given, each once; of a folder those in it and below. Raises RunNotFoundError."""
     paths = [path.expanduser().absolute() for path in given]
     found = [file for path in paths for file in (sorted(find_run_files(path)) if path.is_dir() else [path])]
     if not found:
@@ -260,7 +253,6 @@ def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
 
 
 def _validate_changed(files: list[_File], index: SummaryCache, progress: Progress) -> Iterator[RunSummary]:
-    """Look new and changed files over, and remember what was found."""
     fresh: list[tuple[FileState, RunSummary]] = []
     with Validator() as validator:
         for done, file in enumerate(files):

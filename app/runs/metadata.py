@@ -93,11 +93,7 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
 
     @classmethod
     def parse(cls, facts: dict[str, str]) -> "Conditions":
-        """Sort `name: text` pairs into typed conditions; names not known go to `other`.
-
-        Raises MetadataError (a temperature, humidity or run-in number that is not a number; a name that
-        cannot be one).
-        """
+        """Sort `name: text` pairs into typed conditions; others go to `other`. Raises MetadataError."""
         known: dict[str, Any] = {}
         for name, text in facts.items():
             if name in cls.__struct_fields__ and name != "other":
@@ -141,7 +137,6 @@ class RunMetadata(_FrozenStruct, frozen=True):
     """Nominal samples a second; None where there is none (uneven imported records)."""
     host: str = ""
     quantity: Quantity = "displacement"
-    """What the gauges read."""
     unit: str = "m"
     """Unit of the calibrated readings."""
     source: str = ""
@@ -216,8 +211,7 @@ def create_metadata(
     """Combine stand, series code and what overrides them into the metadata of one run.
 
     A series code brings pullback and plate mass; without one the plate carries no added mass. `facts` are the
-    remaining fields of `RunMetadata`. Raises SeriesError (the series code is not one of the stand),
-    MetadataError (a value that cannot be).
+    remaining fields of `RunMetadata`. Raises SeriesError, MetadataError.
     """
     of_series = stand.series(series) if series else None
     if of_series:

@@ -57,10 +57,7 @@ def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "")
 
 
 def read_metadata(file: h5py.File) -> RunMetadata:
-    """Read the metadata of a run with all edits applied.
-
-    Raises DamagedRunError (a field is missing or of the wrong kind).
-    """
+    """Read the metadata of a run with all edits applied. Raises DamagedRunError."""
     try:
         metadata = read_recorded_metadata(file)
         for change in read_changes(file):

@@ -1,7 +1,4 @@
-"""What is to be recorded next in a folder of runs: the series plan, and what is known of the next tests.
-
-Kept as `next-tests.json` beside the runs that it counts, so that it goes where they go.
-"""
+"""What is to be recorded next in a folder of runs, kept there as `next-tests.json`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -32,7 +29,6 @@ class NextTests(msgspec.Struct, frozen=True):
 
     plan: tuple[PlannedSeries, ...] = ()
     series: str = ""
-    """Chosen last."""
     operator: str = ""
     conditions: Conditions = Conditions()
 
@@ -41,10 +37,7 @@ class NextTests(msgspec.Struct, frozen=True):
 
 
 def load_next_tests(folder: Path) -> NextTests:
-    """Read what was kept of a folder; nothing is planned where nothing was.
-
-    Raises MetadataError (the file cannot be read, or holds something else).
-    """
+    """Read what was kept of a folder; nothing is planned where nothing was. Raises MetadataError."""
     path = folder / FILE_NAME
     try:
         return msgspec.json.decode(path.read_bytes(), type=NextTests)

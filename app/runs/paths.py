@@ -16,10 +16,7 @@ RECORDINGS = "SLIPSTAND_RECORDINGS"
 
 
 def journal_fallback_folders() -> list[Path]:
-    """Folders that a journal moves to when the folder of its run fails; they need not exist yet.
-
-    In the user's data folder, else where temporary files are.
-    """
+    """Folders that a journal moves to when the folder of its run fails: data folder, then temporary files."""
     return [
         platformdirs.user_data_path("Slipstand", appauthor=False) / "journals",
         Path(tempfile.gettempdir()) / f"slipstand-journals-{getpass.getuser()}",
@@ -32,11 +29,10 @@ def journal_folders(runs: Path) -> list[Path]:
 
 
 def recordings_directory(settings: Settings | None = None) -> Path:
-    """Folder of the runs; it need not exist yet.
+    """Folder of the runs, which need not exist yet. Raises ConfigError.
 
-    `SLIPSTAND_RECORDINGS` if set; the folder of the person's settings, read unless given; `recordings/`
-    when run from a checkout; else `Slipstand/recordings` in the user's documents. Raises ConfigError on
-    settings that cannot be read.
+    `SLIPSTAND_RECORDINGS`, else the folder of the settings, else `recordings/` when run from a checkout, else
+    `Slipstand/recordings` in the user's documents.
     """
     override = os.environ.get(RECORDINGS)
     if override:

@@ -17,10 +17,7 @@ Document = dict[str, Any]
 def build_planned_test(
     parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **facts: float
 ) -> PlannedTest:
-    """A test on a stand with these gauges; `facts` are further fields of `PlannedTest`.
-
-    Raises AnalysisError for a value that cannot be.
-    """
+    """A test on a stand with these gauges; `facts` are fields of `PlannedTest`. Raises AnalysisError."""
     return PlannedTest(
         parameters=parameters,
         table_mass_uncertainty_kg=stand.table_mass_standard_uncertainty_kg,
@@ -34,10 +31,7 @@ def build_planned_test(
 
 
 def plan_document(test: PlannedTest) -> Document:
-    """JSON object of what a test will show, and of what would halve the uncertainty of f_d.
-
-    Raises AnalysisError for a test that cannot be.
-    """
+    """JSON of what a test will show, and of what would halve the uncertainty of f_d. Raises AnalysisError."""
     found, parts = plan(test), uncertainty_parts(test)
     motion = found.motion
     return {

@@ -34,10 +34,7 @@ class RawBytes:
 
 
 def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
-    """Append the raw bytes of a journal to an open run file.
-
-    Returns the CRC-32 of the bytes. Raises UnreadableJournalError (the file then holds no raw bytes).
-    """
+    """Append a journal's raw bytes to an open file. Returns their CRC-32. Raises UnreadableJournalError."""
     checksum = 0
     try:
         for records in _batches(_records(journal)):

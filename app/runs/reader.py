@@ -52,8 +52,7 @@ class Run:
     table_reading: NDArray[np.float64]
     """(n,) float64: gauge 1, in `metadata.unit`; NaN where absent."""
     relative_reading: NDArray[np.float64] | None
-    """(n,) float64 or None: gauge 2, plate against table or against base as its calibration says; None
-    without one."""
+    """(n,) float64 or None: gauge 2, against table or base as its calibration says; None without one."""
     status: NDArray[np.uint8]
     """(n,) uint8: `drivers.samples.SampleStatus` flags."""
     analyses: tuple[SavedAnalysis, ...]
@@ -78,7 +77,6 @@ class Fingerprint(msgspec.Struct, frozen=True):
     """Hash, identifier and checksums of one run file."""
 
     name: str
-    """File name without folder."""
     size_bytes: int
     sha256: str
     """Of the whole file. It changes with every analysis or edit that is added to the run."""
@@ -137,10 +135,7 @@ def validate_and_read(
 
 
 def check_openable(path: Path) -> None:
-    """Refuse, without HDF5, what is visibly no closed or abandoned run.
-
-    Raises RunNotFoundError, BeingRecordedError, NotARunError.
-    """
+    """Refuse, without HDF5, what is visibly no closed or abandoned run. Raises RunError."""
     try:
         if path.is_dir():
             raise NotARunError("{path} is a folder. Give a run file in it", path=path)
@@ -174,10 +169,7 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
 def reading_columns(
     file: h5py.File, metadata: RunMetadata, changes: Sequence[Change]
 ) -> Callable[[slice], list[NDArray[np.float64]]]:
-    """Return a function that reads some rows of each gauge: as stored, or by a later calibration.
-
-    Where the rows are all rows, their checksums are verified.
-    """
+    """Return a function that reads some rows of each gauge: as stored, or by a later calibration."""
     if not _is_recalibrated(file, changes):
         signals = [file[path] for path in signal_paths(file)]
         return lambda rows: [read_column(column, rows) for column in signals]

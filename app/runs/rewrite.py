@@ -25,10 +25,8 @@ _REPLACE_S = 5.0
 def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     """Replace a closed run by a changed copy of itself, all at once or not at all.
 
-    `change` adds to the copy. The samples and raw bytes are compared afterwards and must be the same. Raises
-    RunNotFoundError, BeingRecordedError, UnsuitableRunError (the run was never closed, or is being changed by
-    another program), DamagedRunError (samples or raw bytes differ from those that were stored when the run
-    was closed), DiskFullError, WriteError (the run is unchanged).
+    `change` adds to the copy; samples and raw bytes must be the same afterwards. Raises RunNotFoundError,
+    BeingRecordedError, UnsuitableRunError, DamagedRunError, DiskFullError, WriteError (the run is unchanged).
     """
     path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):

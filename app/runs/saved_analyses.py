@@ -80,11 +80,9 @@ def latest_valid(analyses: tuple[SavedAnalysis, ...], record: Record) -> SavedAn
 
 
 def save_analysis(path: Path, document: Document, inputs: str, settings: dict[str, Any] | None = None) -> int:
-    """Keep an analysis in its run, beside earlier ones.
+    """Keep an analysis in its run. Returns the NNN of `/entry/analysis_NNN`. Raises RunError.
 
-    Returns the NNN of `/entry/analysis_NNN`. `inputs` is the `inputs_hash` of the analysed record; `settings`
-    say how it was analysed: model asked for, overridden masses, ... Raises RunError (the run is then as it
-    was).
+    `inputs` is the `inputs_hash` of the analysed record; `settings` say how it was analysed.
     """
     number = 0
 
@@ -203,10 +201,9 @@ def _or_none(value: float) -> float | None:
 
 
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
-    """Hash of all that an analysis takes of a run beside its samples, which never change.
+    """Hash of all that an analysis takes of a run beside its samples. Raises DamagedRunError.
 
-    `metadata` spares reading it again. `masses_kg` are `table_mass_kg` and `plate_mass_kg` that replaced
-    those of the run in the analysis. Raises DamagedRunError.
+    `masses_kg` are `table_mass_kg` and `plate_mass_kg` that replaced those of the run in the analysis.
     """
     metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}
@@ -243,9 +240,6 @@ _ABOUT = (
 
 
 def _calibration(gauge: Gauge) -> list[object]:
-    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number.
-
-    A line adds nothing for its polynomial, so that analyses from before there were any still stand.
-    """
+    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number."""
     about = _ABOUT if gauge.polynomial else (*_ABOUT, "polynomial")
     return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in about]

@@ -1,8 +1,7 @@
 """The run file declared once: groups, columns and metadata fields of HDF5 with type, unit and meaning.
 
-Template, writer, reader, validation, recovery and docs/reference/run-file.md all read these tables. Paths
-are relative to the root of the file, except those of `GAUGE_FIELDS` and `CHECK_FIELDS`. The attribute of a
-field is its dotted path in `RunMetadata`, `EndMetadata`, `Gauge` or `GaugeCheck`; a field without one is
+Paths are relative to the root of the file, except those of `GAUGE_FIELDS` and `CHECK_FIELDS`. The attribute
+of a field is its dotted path in `RunMetadata`, `EndMetadata`, `Gauge` or `GaugeCheck`; a field without one is
 written by the program itself.
 """
 
@@ -75,9 +74,7 @@ class Field:
     """One metadata field."""
 
     path: str
-    """Where it is stored."""
     description: str
-    """One line for people."""
     attribute: str = ""
     """Dotted path of the value in memory; "" where the program writes the field by itself."""
     kind: Kind = Kind.NUMBER
@@ -101,14 +98,12 @@ class Column:
     description: str
     dtype: str
     attributes: dict[str, str]
-    """Attributes of HDF5."""
     fill: float = 0.0
     """Value of rows that are not written."""
     chunk: int = 0
     """Rows a chunk; 0 is `CHUNK`."""
     compressed: bool = False
-    """Only datasets that are written when the run is closed are: a `kill -9` can make a compressed dataset
-    that grows unreadable."""
+    """For datasets written when the run is closed: a `kill -9` can make a growing one unreadable."""
 
 
 def _text(path: str, description: str, attribute: str = "", **more: Any) -> Field:
@@ -229,8 +224,7 @@ RUN_FIELDS: Final = (
     _text(f"{ACQUISITION}/host", "name of the computer", "host"),
     Field(f"{ACQUISITION}/rate_nominal", "nominal sampling rate", "rate_hz", unit="Hz"),
 )  # fmt: skip
-"""Fields of `app.runs.metadata.RunMetadata`, written before the first sample. An empty text and an unknown
-number are left out."""
+"""Fields of `app.runs.metadata.RunMetadata`. An empty text and an unknown number are left out."""
 
 GAUGE_FIELDS: Final = (
     _text("serial_number", "serial number of the gauge", "serial_number"),

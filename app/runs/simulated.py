@@ -38,11 +38,7 @@ def write_simulated_run(
     plateau_s: float = PLATEAU_S,
     replace: bool = False,
 ) -> StoredRun:
-    """Store a simulated motion as a run: held at the pullback for `plateau_s`, then released.
-
-    The run's nominal pullback is the size alone, as of a recorded one; its truth holds the side too. Raises
-    RunError, ConfigError.
-    """
+    """Store a simulated motion, held at the pullback for `plateau_s` first. Raises RunError, ConfigError."""
     held = round(plateau_s * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
     table, relative = motion.sample_displacements((np.arange(count) - held) / rate_hz)

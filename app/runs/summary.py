@@ -15,10 +15,9 @@ from messages.message import Message
 
 
 class RunSummary(msgspec.Struct, frozen=True, gc=False):
-    """One line of the library. Where `fault` is set, the rest could not be read.
+    """One line of the library; where `fault` is set, the rest could not be read.
 
-    Ten thousand are listed at once. Without `gc=False` the garbage collector visits each and slows that by
-    half.
+    Without `gc=False` the garbage collector slows a listing of ten thousand by half.
     """
 
     path: str

@@ -1,7 +1,6 @@
 """Validate that a file is a whole and harmless run, before anything reads it (see `app.runs.validator`).
 
-A run consists of groups and plain datasets, each reached by one path. Links to elsewhere, data outside the
-file, cycles, unknown filters, shapes that the file does not fill and missing required fields are refused.
+A run consists of groups and plain datasets, each reached by one path. Anything else is refused.
 """
 
 import math
@@ -30,11 +29,7 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 
 
 def validate_file(file: h5py.File) -> None:
-    """Check the structure of an open file.
-
-    Raises NotARunError (it is not a run, or a run of a later program), DamagedRunError (it states that it is
-    a run, but cannot be trusted).
-    """
+    """Check the structure of an open file. Raises NotARunError, DamagedRunError."""
     _check_schema(file)
     try:
         for dataset in _walk(file):

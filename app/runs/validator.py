@@ -1,7 +1,4 @@
-"""Validate files, which may crash or hang HDF5, in a child process before this one opens them.
-
-The process is `python -m app.runs.validator`.
-"""
+"""Validate files, which may crash or hang HDF5, in a child process: `python -m app.runs.validator`."""
 
 import atexit
 import contextlib
@@ -78,10 +75,7 @@ decode_validator_event: Callable[[bytes], ValidatorEvent] = json_decoder(Validat
 
 
 class Validator:
-    """Validates any number of files, one after another. A file that crashes the process is damaged.
-
-    Several threads may share one; they wait for each other.
-    """
+    """Validates files, one after another, for several threads. A file that crashes the process is damaged."""
 
     def __init__(self) -> None:
         self._child: _Child | None = None
@@ -94,11 +88,7 @@ class Validator:
         return validator
 
     def validate(self, path: Path) -> RunSummary:
-        """Validate a file as `app.runs.validation` says, and return its summary.
-
-        Raises NotARunError, BeingRecordedError, DamagedRunError, ValidationTimeoutError (no answer came in
-        time; the file may be sound).
-        """
+        """Validate a file as `app.runs.validation` says, and return its summary. Raises RunError."""
         with self._turn:
             self._child = self._child or _Child()
             try:
@@ -139,10 +129,7 @@ class Validator:
 
 @functools.cache
 def shared_validator() -> Validator:
-    """The validator that this process keeps, started at the first call.
-
-    Starting one takes longer than validating and reading a run of an hour.
-    """
+    """The validator that this process keeps: starting one takes longer than reading a run of an hour."""
     validator = Validator.start()
     atexit.register(validator.stop)
     return validator
@@ -207,10 +194,7 @@ class _Child:
 
 
 def main() -> None:
-    """Validate paths in this process until stdin ends: one a line as JSON, with one reply a line on stdout.
-
-    Memory and processor time are limited where the system can, so that a hostile file ends only this process.
-    """
+    """Validate paths until stdin ends: one a line as JSON, with one reply a line on stdout."""
     start_log("validator")
     ignore_session_signals()
     _limit_memory()
@@ -236,10 +220,7 @@ def _limit_memory() -> None:
 
 
 def _limit_time(seconds: float) -> None:
-    """Let the system end this process after so much processor time; 0 lifts the limit.
-
-    Windows measures no processor time here: five times as long by the clock, as a disk may be slow.
-    """
+    """End this process after so much processor time (Windows: five times that by the clock); 0: never."""
     if sys.platform != "win32":
         signal.setitimer(signal.ITIMER_PROF, seconds)
     elif seconds:  # a thread that needs no interpreter lock, so that a hung HDF5 cannot hold it up

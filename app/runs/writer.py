@@ -1,8 +1,7 @@
 """Write run files while they are recorded, so that a crash at any moment leaves them readable.
 
-The writer is a process of its own, `python -m app.runs.writer`, fed by `WriterClient`: HDF5 can crash the
-process that it runs in, above all at the close after a full disk, and the engine and its journal must
-survive. When stdin ends, the engine is gone: the run is closed as interrupted and the process ends.
+The writer is a process of its own, `python -m app.runs.writer`: HDF5 can crash the process that it runs in,
+above all at the close after a full disk, and the engine and its journal must survive.
 """
 
 import datetime
@@ -50,10 +49,7 @@ def create_run_in(
     journal: JournalSpan | None = None,
     identifier: str = "",
 ) -> "RunWriter":
-    """Create a run under the next free name in `folder`, like `20261121T143205_1FFM0_001.h5`.
-
-    Raises MetadataError, DiskFullError, WriteError.
-    """
+    """Create a run under the next free name in `folder`: `20261121T143205_1FFM0_001.h5`. Raises RunError."""
     make_folder(folder)
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
     stem = f"{began}_{metadata.series}" if metadata.series else began
@@ -75,11 +71,9 @@ def create_run(
     journal: JournalSpan | None = None,
     identifier: str = "",
 ) -> "RunWriter":
-    """Create a run file with everything that is known before the first sample.
+    """Create a run file with everything that is known before the first sample. Raises RunError.
 
-    `path` is the final name and must not exist. The raw bytes of `journal` are copied into the file at the
-    end. `identifier` is the UUID of the run, a new one if empty. Raises RunExistsError, MetadataError,
-    DiskFullError, WriteError.
+    The raw bytes of `journal` are copied into it at the end. `identifier` is the UUID, a new one if empty.
     """
     path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
@@ -101,10 +95,7 @@ def create_run(
 def write_run(
     path: Path, metadata: RunMetadata, block: RunBlock, end: EndMetadata, *, replace: bool = False
 ) -> StoredRun:
-    """Write a whole run at once, imported or simulated, or no file.
-
-    `path` must not exist unless `replace`. Raises RunExistsError, MetadataError, DiskFullError, WriteError.
-    """
+    """Write a whole run at once, or no file; `path` must not exist unless `replace`. Raises RunError."""
     path = path.absolute()
     target = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") if replace else path
     writer = create_run(target, metadata, BlockLayout.of(block))
@@ -154,8 +145,7 @@ class RunWriter:
     def append(self, block: RunBlock) -> None:
         """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
 
-        Raises DiskFullError (no room for the rows; while the writer is `usable` the run can be closed without
-        them), WriteError (HDF5 failed), ValueError (the block does not fit the layout of the run).
+        Raises DiskFullError (a `usable` writer can be closed without the rows), WriteError, ValueError.
         """
         columns = block.columns(self._layout)
         pending_bytes = self._pending_bytes + sum(column.nbytes for column in columns)
@@ -184,10 +174,7 @@ class RunWriter:
         self._flushed_at = time.monotonic()
 
     def close(self, end: EndMetadata) -> StoredRun:
-        """Complete the file, verify it by reading it again, and bring it to disk.
-
-        Raises WriteError (the file could not be completed, or does not read back: keep the journal).
-        """
+        """Complete the file, read it back, bring it to disk. Raises WriteError: keep the journal then."""
         try:
             raw_bytes_stored = self._copy_raw_bytes()
             self.flush()
@@ -284,10 +271,7 @@ class WriterServer:
         self._writer: RunWriter | None = None
 
     def serve(self) -> None:
-        """Work until the input ends. A failure ends the process at once.
-
-        Python would close the file on its way out; where HDF5 has failed that can crash or hang.
-        """
+        """Work until the input ends. After a failure Python must not close the file: HDF5 can hang."""
         try:
             while not self._commands.is_closed:
                 self._step(self._commands.take(_IDLE_S))
@@ -299,7 +283,6 @@ class WriterServer:
         self._replies.close()
 
     def _step(self, command: WriterCommand | None) -> None:
-        """Execute a command; bring older rows to disk while none comes."""
         if command is not None:
             self._execute(command)
         elif self._writer is not None:

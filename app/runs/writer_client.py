@@ -1,7 +1,4 @@
-"""The run writer as a child process: its messages, and the client that hands it rows without waiting.
-
-Commands carry arrays and are frames of bytes; replies are lines of JSON.
-"""
+"""The run writer as a child process: commands are frames of bytes with arrays, replies lines of JSON."""
 
 import struct
 import subprocess
@@ -178,8 +175,7 @@ _STOP_S = 60.0
 class WriterClient:
     """One writer process. Runs are written one after another; after a failure start a new client.
 
-    `open` and `close` return futures that hold the result, or the error. No call waits for the disk:
-    when the writer falls behind by more than the queue holds, `append` raises.
+    `open` and `close` return futures. No call waits for the disk: `append` raises when the queue is full.
     """
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
@@ -206,15 +202,10 @@ class WriterClient:
         return self._failure
 
     def open(self, request: OpenRun) -> "Future[Path]":
-        """Begin a run; the future holds the path of its file."""
         return self._ask(request, self._opening)
 
     def append(self, block: RunBlock) -> None:
-        """Hand rows over.
-
-        Raises WriterBehindError (the queue is full; the run can still be closed), DiskFullError, WriteError
-        (the writer failed earlier), ValueError (the block does not fit the layout of the run).
-        """
+        """Hand rows over. Raises WriteError; WriterBehindError where the queue is full; ValueError."""
         if self._failure:
             raise self._failure
         if not self._child.send(block):
@@ -224,7 +215,6 @@ class WriterClient:
             )
 
     def close(self, ending: EndMetadata) -> "Future[StoredRun]":
-        """Complete the run; the future holds what was stored."""
         return self._ask(ending, self._closing)
 
     def stop(self) -> None:

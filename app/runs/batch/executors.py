@@ -45,10 +45,7 @@ class Executor(Protocol):
     def workers(self) -> int: ...
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
-        """Hand over one item; both arguments must be picklable, `work` by its name.
-
-        The future fails with `concurrent.futures.BrokenExecutor` where a worker died.
-        """
+        """Hand over a picklable item; its future fails with BrokenExecutor where a worker died."""
 
     def renew(self) -> None: ...
 
@@ -75,10 +72,7 @@ class FailedItem(Generic[Item]):
 
 @contextmanager
 def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
-    """Open an executor for this many runs; an error in the block cancels its work.
-
-    Raises ExtraMissingError, ClusterError.
-    """
+    """Open an executor; an error in the block cancels its work. Raises ExtraMissingError, ClusterError."""
     executor = _choose(options, runs)
     try:
         yield executor
@@ -190,11 +184,7 @@ class ProcessExecutor:
 
 
 class DaskExecutor:
-    """Workers of a Dask cluster, on computers that see the same run files.
-
-    Raises ExtraMissingError (dask's `distributed` is not installed), ClusterError (the scheduler does not
-    answer, has no workers, or they have another version of Slipstand).
-    """
+    """Workers of a Dask cluster, on computers that see the same run files."""
 
     def __init__(self, address: str) -> None:
         self._address = address
@@ -213,7 +203,6 @@ class DaskExecutor:
         return max(1, sum(threads.values()))
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
-        """Hand over one item; where a worker dies, Dask gives the item to another one."""
         future: Future[Answer] = self._executor.submit(work, item)
         return future
 
@@ -221,7 +210,6 @@ class DaskExecutor:
         """Dask replaces its workers itself."""
 
     def close(self, *, now: bool) -> None:
-        """Leave the cluster; items that wait there are cancelled."""
         self._executor.shutdown(wait=not now)
         self._client.close()
 

@@ -21,11 +21,10 @@ _GRACE_S = 2.0
 
 
 def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
-    """Have this process end, in the middle of whatever it does, when its owner closes the lifeline or dies.
+    """End this process, whatever it does, when its owner closes the lifeline or dies.
 
-    Called in the main thread, where `SystemExit` is raised then: half-written copies are cleared away,
-    executors are closed, as far as `grace_s` allows. A process with an executor needs longer than its
-    workers.
+    `SystemExit` is raised in the main thread, which calls this: `grace_s` is left to clear away copies and
+    executors.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
     signal.signal(signal.SIGTERM, _leave)

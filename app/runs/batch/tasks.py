@@ -40,7 +40,6 @@ class AnalysisOutcome(msgspec.Struct, frozen=True):
     document: Document | None = None
     """As `analyze --json` says it; None where the run could not be analysed."""
     error: Message = Message("")
-    """Reason why not; empty otherwise."""
     up_to_date: bool = False
     """The document is the one that was kept in the run."""
     unit: str = "m"
@@ -85,10 +84,7 @@ def validate_and_count(path: Path, validator: Validator) -> int:
 def latest_valid_in_file(
     file: h5py.File, metadata: RunMetadata, wanted: Callable[[SavedAnalysis], bool]
 ) -> tuple[SavedAnalysis | None, bool]:
-    """Newest analysis kept in an open run that is wanted and not stale; and whether newer ones are stale.
-
-    Masses that were given for an analysis count as those of the run.
-    """
+    """Newest analysis kept in a run that is wanted and not stale; and whether newer ones are stale."""
     stale = False
     for saved in reversed(read_analyses(file)):
         if not wanted(saved):
@@ -140,8 +136,7 @@ def analyze_runs(
 ) -> Iterator[AnalysisOutcome]:
     """Analyse runs; one that fails has its error as outcome and does not stop the rest.
 
-    A caller cancels by asking for no more outcomes and closing the executor. `progress` is called with the
-    share done (0 to 1) and what is being done.
+    A caller cancels by asking for no more outcomes and closing the executor.
     """
     for outcome in map_runs(tasks, analyze_one, executor, progress):
         yield (

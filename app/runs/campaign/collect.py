@@ -31,12 +31,10 @@ class CollectOptions(msgspec.Struct, frozen=True):
 
     executor: ExecutorOptions = ExecutorOptions()
     save: bool = False
-    """Keep new results in their runs."""
     request: AnalysisRequest = AnalysisRequest(classical=False)
     """How to analyse runs whose result does not stand."""
     excluded: dict[str, str] = {}
-    """Why runs do not count, by their absolute paths: reasons of whoever asks, beside those that are kept in
-    the runs."""
+    """Why runs do not count, by absolute path, beside the reasons that are kept in the runs."""
 
 
 CountedRun = tuple[RunResult, RunDetails]
@@ -67,7 +65,6 @@ class CollectedRuns:
     warnings: tuple[ResultWarning, ...]
     """What must be known of the runs together."""
     details: dict[str, RunDetails]
-    """By the names of the runs."""
     excluded: tuple[Excluded, ...] = ()
     """Runs without a result that are excluded in any case, with reasons."""
 
@@ -99,10 +96,9 @@ def collect_runs(
     options: CollectOptions | None = None,
     progress: Progress = lambda _share, _what: None,
 ) -> CollectedRuns:
-    """Collect runs: the newest result of each that still stands, else a new one.
+    """Collect run files and folders: the newest result of each run that still stands, else a new one.
 
-    `paths` are run files, and folders with runs in them and below, except in the trash. `progress` is called
-    with the share done (0 to 1) and what is being done. Raises RunNotFoundError (there are no runs there),
+    `progress` is called with the share done (0 to 1) and what is being done. Raises RunNotFoundError,
     ExtraMissingError, ClusterError.
     """
     options = options or CollectOptions()

@@ -59,10 +59,7 @@ class CollectedRun(msgspec.Struct, frozen=True):
 def collect_run(
     task: AnalysisTask, progress: Progress | None = None, validator: Validator | None = None
 ) -> CollectedRun:
-    """Take what a campaign needs of a run: the newest result that still stands, else a new one.
-
-    Never raises: what goes wrong is in the outcome.
-    """
+    """Take what a campaign needs of a run. Never raises: what goes wrong is in the outcome."""
     path, details = Path(task.path), None
     try:
         validate_and_count(path, validator or shared_validator())

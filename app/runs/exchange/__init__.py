@@ -1,1 +1,1 @@
-"""Runs for other programs: one module a format, all of them on `ExportedRun`, chosen in `formats`."""
+"""Foreign records in and exports out: CSV, JSON, MATLAB, Excel, Parquet, UFF 58, LaTeX."""

@@ -17,8 +17,7 @@ class ForeignColumns:
 
     path: Path
     values: NDArray[np.float64]
-    """(n, 2 or 3) float64: time, table and, if asked for, the second gauge, as written; NaN where a reading
-    is absent."""
+    """(n, 2 or 3) float64: time, table and perhaps the second gauge, as written; NaN where absent."""
     names: list[str]
     """The columns, as named in messages."""
     row_label: Callable[[int], Message]
@@ -54,10 +53,7 @@ _OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
 
 
 def find_columns(path: Path, wanted: list[str], names: list[str], width: int) -> list[int]:
-    """Positions below `width` of the columns of time, gauge 1 and perhaps gauge 2, by name or number.
-
-    Raises ImportFileError (there is no such column, or one is wanted for two).
-    """
+    """Positions of the columns of time, gauge 1 and perhaps gauge 2. Raises ImportFileError."""
     found: list[int] = []
     for one, name in zip(_OF_TIME_AND_GAUGES, wanted, strict=False):
         at = _find_column(path, name, names, width)

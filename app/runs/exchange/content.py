@@ -50,10 +50,9 @@ class ExportedRun:
 
 
 def sample_columns(run: Run) -> tuple[SampleColumn, ...]:
-    """All samples of a run: time, calibrated readings, status flags, counts as received. Raises RunError.
+    """Time, calibrated readings, status flags and counts of a run, all its samples. Raises RunError.
 
-    Named `time_s`, `table_displacement_m`, `relative_displacement_m` (`plate_...` where gauge 2 measures
-    against the base; other quantities and units by their names), `status`, `table_count`, `relative_count`.
+    Named as `time_s`, `table_displacement_m`, `plate_velocity_m_per_s`, `status`, `table_count`.
     """
     unit = run.metadata.unit
     readings = (
@@ -73,10 +72,7 @@ def sample_columns(run: Run) -> tuple[SampleColumn, ...]:
 
 
 def coefficient_rows(exported: ExportedRun) -> Iterator[tuple[Any, ...]]:
-    """Rows in the order of `COEFFICIENT_COLUMNS`; None where something is absent or not a number.
-
-    Words such as the MSK-64 degree stand under `label`, so that `value` holds numbers alone.
-    """
+    """Rows of `COEFFICIENT_COLUMNS`: numbers under `value`, words under `label`, None where absent."""
     analysis = exported.analysis
     if analysis is None:
         return

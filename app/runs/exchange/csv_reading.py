@@ -29,7 +29,6 @@ class CsvOptions(msgspec.Struct, frozen=True):
     time: str
     table: str
     second: str | None = None
-    """Column of gauge 2, if there is one."""
     delimiter: str | None = None
     """A character, `tab` or `space` (any run of blanks); None finds it out."""
     decimal: Literal[".", ","] = "."
@@ -39,7 +38,6 @@ class CsvOptions(msgspec.Struct, frozen=True):
 
     @property
     def wanted(self) -> list[str]:
-        """Columns of time, gauge 1 and perhaps gauge 2."""
         return [name for name in (self.time, self.table, self.second) if name is not None]
 
 
@@ -59,7 +57,6 @@ class CsvText:
     text: str
     """The whole file, its lines ended by single newlines."""
     data: Line
-    """First line of data."""
     delimiter: str
     decimal: Literal[".", ","]
     names: list[str]
@@ -67,10 +64,9 @@ class CsvText:
 
 
 def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
-    """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError.
+    """Read a CSV file as far as its header. Raises ImportFileError.
 
-    Lines that are blank or begin with `#` are left out; where no header stands above the numbers, the last
-    `#` line before them is taken for it if it has as many cells.
+    Where no header stands above the numbers, the last `#` line before them is it if it has as many cells.
     """
     text = _decoded(path)
     comment, lines = _head(path, text, layout.skip)
@@ -231,10 +227,7 @@ def _header(
 
 
 def read_columns(path: Path, layout: CsvOptions) -> ForeignColumns:
-    """Read time and gauges from a CSV file.
-
-    Raises ImportFileError, which names the line and column of a cell that is not a number, or a cut line.
-    """
+    """Read time and gauges from a CSV file. Raises ImportFileError, which names line and column."""
     source = survey_csv(path, layout)
     width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
     positions = find_columns(path, layout.wanted, source.names, width)

@@ -128,10 +128,7 @@ _MAT_NAME_LENGTH = 63
 
 
 def _write_mat_run(exported: ExportedRun, path: Path) -> None:
-    """A column vector a channel, and the structs `units`, `run`, `coefficients` and `analysis`.
-
-    `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array.
-    """
+    """A column vector a channel, and the structs `units`, `run`, `coefficients`, `analysis`."""
     named = {_mat_name(column.name): column for column in exported.samples}
     variables: dict[str, Any] = {name: column.values for name, column in named.items()}
     variables["units"] = {name: column.unit for name, column in named.items()}
@@ -204,10 +201,7 @@ def _write_xlsx_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
 
 
 def write_sheets(sheets: Mapping[str, Sheet], path: Path) -> None:
-    """Write a workbook, sheet after sheet, row after row. Texts are texts: no cell becomes a formula.
-
-    Raises ExtraMissingError.
-    """
+    """Write a workbook; texts are texts, no cell becomes a formula. Raises ExtraMissingError."""
     openpyxl = import_optional("openpyxl", "Excel")
     cell_type = import_optional("openpyxl.cell", "Excel").WriteOnlyCell
     letter = import_optional("openpyxl.utils", "Excel").get_column_letter
@@ -261,10 +255,7 @@ _LATEX_ESCAPES = str.maketrans({
 
 
 def _write_latex(runs: Iterable[ExportedRun], path: Path) -> None:
-    """A table to paste into a paper, a row a run: value and standard uncertainty, a dash where absent.
-
-    A run whose model does not fit bears a dagger.
-    """
+    """A table with a row a run: value and standard uncertainty; a dagger where the model does not fit."""
     header = ("Run", "Series", *(column.latex_heading(Place.TERMINAL) for column in _LATEX_COLUMNS))
     lines = [
         "% by slipstand, for \\usepackage{booktabs}; standard uncertainties; dagger: the model does not fit",

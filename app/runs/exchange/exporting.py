@@ -20,10 +20,7 @@ from messages.message import EMPTY, Message, message, message_of, option
 
 
 def write_exported_run(name: str, exported: ExportedRun, path: Path, *, replace: bool = False) -> list[Path]:
-    """Write a run in a format; coefficients go into a second file beside a CSV file. Returns the files.
-
-    Raises UnsuitableRunError, ExtraMissingError, RunExistsError, DiskFullError, WriteError.
-    """
+    """Write a run, and its coefficients beside a CSV file. Returns the files. Raises RunError."""
     with atomic_write(path.absolute(), replace=replace) as made:
         FORMATS[name].write_run(exported, made)
     if name != "csv" or exported.analysis is None:
@@ -79,10 +76,9 @@ class ExportOutcome(msgspec.Struct, frozen=True):
 
 
 def _load(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, Message]:
-    """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
+    """Read a run with its newest valid or new coefficients, or why there are none beside samples.
 
-    Returns the run, and why there are no coefficients where they were wanted beside samples. Raises
-    RunError, AnalysisError (coefficients alone are wanted, and there are none).
+    Raises RunError, AnalysisError (coefficients alone are wanted, and there are none).
     """
     run = open_run(path, validator=validator)
     samples = () if content == "coefficients" else sample_columns(run)
@@ -105,9 +101,8 @@ def export_runs(
 ) -> list[ExportOutcome]:
     """Export runs, in the order given; one that fails is reported and does not stop the rest.
 
-    `output` is the file to write, or a folder, made if absent, for the samples of several runs. `progress` is
-    called with the number done and the name of the next run. Raises RunError (nothing can be written at all:
-    no such format content, output in the way).
+    `output` is the file to write, or a folder for the samples of several runs. `progress` is called with the
+    number done and the name of the next run. Raises RunError where nothing can be written at all.
     """
     if request.content == "coefficients" and request.writer.write_coefficients is None:
         raise UnsuitableRunError(

@@ -33,10 +33,7 @@ class _Table:
 
 
 def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
-    """Read the columns of `layout` from a .mat, .xlsx or .parquet file; any other ending is read as CSV.
-
-    Raises ExtraMissingError, and ImportFileError, which names file, row or column, and remedy.
-    """
+    """Read columns from a .mat, .xlsx or .parquet file, any other as CSV. Raises RunError."""
     if is_csv(path):
         return read_columns(path, layout)
     _check_layout(path, layout)
@@ -61,10 +58,7 @@ def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
 
 
 def list_columns(path: Path, layout: CsvOptions) -> list[str]:
-    """Names of the columns of a .mat, .xlsx or .parquet file, empty where a column has none.
-
-    Raises ImportFileError, ExtraMissingError.
-    """
+    """Names of the columns of a .mat, .xlsx or .parquet file, "" where one has none. Raises RunError."""
     with _faults_named(path):
         return _OPENERS[path.suffix.lower()](path, layout).names
 

@@ -42,11 +42,7 @@ _LONGEST_S = 1e9
 
 
 class CsvImport(msgspec.Struct, frozen=True):
-    """Which columns of a CSV file are what, and in which unit.
-
-    The reading of a gauge is `gain * cell + offset`, in `unit_name`; without a gain the cells are in
-    `unit`.
-    """
+    """Which columns of a CSV file are what, and in which unit. A reading is `gain * cell + offset`."""
 
     layout: CsvOptions
     measures: Literal["relative", "plate"] = "relative"
@@ -71,10 +67,9 @@ class CsvImport(msgspec.Struct, frozen=True):
 def import_csv(
     path: Path, plan: CsvImport, output: Path, stand: Stand, *, replace: bool = False, **facts: Any
 ) -> StoredRun:
-    """Make a run of a CSV file.
+    """Make a run of a foreign file. Raises RunError, ConfigError.
 
-    `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ... Raises
-    ImportFileError, which names file, line or column, and remedy; RunError, ConfigError.
+    `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
     """
     gauge, start_s, block = read_record(path, plan)
     metadata = create_metadata(
@@ -92,10 +87,7 @@ def import_csv(
 
 
 def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
-    """Read a foreign file as it would be imported: calibration, its own time of the first row (s), samples.
-
-    Raises ImportFileError.
-    """
+    """Read a foreign file as it would be imported: calibration, its time of the first row (s), samples."""
     gauge = _gauge(plan)
     columns = read_foreign(path, plan.layout)
     with np.errstate(over="ignore"):  # what is too large is refused
