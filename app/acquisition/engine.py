@@ -12,29 +12,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from app.acquisition import messages
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
 from app.acquisition.live_client import LiveIdentifier
-from app.acquisition.messages import (
-    Arm,
-    Command,
-    Connect,
-    Connected,
-    EndReason,
-    Event,
-    Failed,
-    Health,
-    LiveResult,
-    PortSettings,
-    PullbackState,
-    Quit,
-    Reconnecting,
-    RunEnded,
-    RunSettings,
-    StateChanged,
-    Stop,
-    decode_command,
-)
 from app.acquisition.pullback.plan import ObservedSlip
 from app.acquisition.recording import Latency, Recording, RecordingContext
 from app.acquisition.ring import RingWriter, create_ring, live_folder, ring_capacity
@@ -116,13 +97,13 @@ class Engine:
 
     def __init__(
         self,
-        port: PortSettings,
+        port: messages.PortSettings,
         stand: Stand,
         gauges: Gauges,
         stream: LiveStream,
         ring: RingWriter,
-        commands: CommandReader[Command],
-        events: EventSender[Event],
+        commands: CommandReader[messages.Command],
+        events: EventSender[messages.Event],
         *,
         low_latency: bool = False,
     ) -> None:
@@ -163,7 +144,7 @@ class Engine:
             self._finish(error.reason, message_of(error))
             raise
         except BaseException as error:
-            self._finish(EndReason.WRITE_ERROR, message_of(error))
+            self._finish(messages.EndReason.WRITE_ERROR, message_of(error))
             raise
         finally:
             self._space.stop()
@@ -184,7 +165,7 @@ class Engine:
             self._execute(command)
         if self._is_asked_to_quit:
             self._is_quitting = True
-            self._end_all(EndReason.STOPPED)
+            self._end_all(messages.EndReason.STOPPED)
         elif self._commands.is_closed:
             self._continue_alone()
         self._follow_recording()
@@ -216,7 +197,7 @@ class Engine:
                 self._events.send(event)
             if self._recording is None:
                 self._send_idle(event.message)
-            elif isinstance(event, Reconnecting):
+            elif isinstance(event, messages.Reconnecting):
                 self._recording.show_note(event.message)
             else:
                 self._recording.add_note(event.message)
@@ -224,44 +205,45 @@ class Engine:
         if fault is not None and self._recording is not None:
             self._end_all(fault.reason, fault.message)
 
-    def _execute(self, command: Command) -> None:
+    def _execute(self, command: messages.Command) -> None:
         match command:
-            case Arm(run, count):
+            case messages.Arm(run, count):
                 self._begin(run, count)
-            case Stop(reason):
+            case messages.Stop(reason):
                 self._end_all(reason)
-            case Quit():
+            case messages.Quit():
                 self.ask_to_quit()
-            case Connect():
+            case messages.Connect():
                 raise AcquisitionError("this engine is connected already: start another one for another port")
 
-    def _begin(self, run: RunSettings, count: int) -> None:
+    def _begin(self, run: messages.RunSettings, count: int) -> None:
         if self._recording is not None:
             self._recording.show_note(message("A run is being recorded already: stop it before the next one"))
         elif self._stream.is_disconnected:
             self._refuse(
-                EndReason.DEVICE_LOST, message("the device is away: plug it in, and record when it is back")
+                messages.EndReason.DEVICE_LOST,
+                message("the device is away: plug it in, and record when it is back"),
             )
         elif self._try_to_arm(run):
             self._sequence.begin(run, count)
 
-    def _try_to_arm(self, run: RunSettings) -> bool:
+    def _try_to_arm(self, run: messages.RunSettings) -> bool:
         """Arm a run; report it, and return False, when there is no place for it."""
         try:
             self._arm(run)
         except DiskSpaceError as error:
-            self._refuse(EndReason.DISK_FULL, message_of(error))
+            self._refuse(messages.EndReason.DISK_FULL, message_of(error))
         except JournalError as error:
             self._refuse(end_reason(error), message_of(error))
         return self._recording is not None
 
-    def _refuse(self, reason: EndReason, message: Message) -> None:
+    def _refuse(self, reason: messages.EndReason, message: Message) -> None:
         _log.warning("run refused (%s): %s", reason, message)
         self._sequence.stop()
-        self._events.send(RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
+        self._events.send(messages.RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
         self._send_idle()
 
-    def _arm(self, run: RunSettings) -> None:
+    def _arm(self, run: messages.RunSettings) -> None:
         check_run_settings(run)
         folder = Path(run.directory).absolute()
         demand = self._disk_demand()
@@ -285,7 +267,7 @@ class Engine:
         if note:
             self._recording.show_note(note)
 
-    def _end_all(self, reason: EndReason, message: Message = EMPTY) -> None:
+    def _end_all(self, reason: messages.EndReason, message: Message = EMPTY) -> None:
         """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
         self._sequence.stop()
         if self._recording is not None:
@@ -296,7 +278,7 @@ class Engine:
         self._is_quitting = True
         self._sequence.stop()
         if self._recording is not None and not self._recording.is_unattended:
-            self._end_all(EndReason.INTERRUPTED, message("the program that recorded ended"))
+            self._end_all(messages.EndReason.INTERRUPTED, message("the program that recorded ended"))
 
     def _follow_recording(self) -> None:
         recording = self._recording
@@ -328,7 +310,7 @@ class Engine:
             if result.is_enough:
                 recording.end_if_enough()
 
-    def _finish(self, reason: EndReason, message: Message) -> None:
+    def _finish(self, reason: messages.EndReason, message: Message) -> None:
         self._sequence.stop()
         if self._recording is not None:
             self._recording.end(reason, message)
@@ -339,8 +321,9 @@ class Engine:
 
     def _send_idle(self, note: Message = EMPTY) -> None:
         """Nothing is recorded: report whether anything could be."""
-        state = PullbackState.CONNECTING if self._stream.is_disconnected else PullbackState.IDLE
-        self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
+        is_away, states = self._stream.is_disconnected, messages.PullbackState
+        state = states.CONNECTING if is_away else states.IDLE
+        self._events.send(messages.StateChanged(state, self._history.next_index / self._rate_hz, note))
 
     def _send_health(self) -> None:
         """Twice a second, check the disk and report the state of the stream."""
@@ -351,7 +334,7 @@ class Engine:
         self._follow_disk()
         clock, losses = self._stream.recent_clock(), self._stream.losses
         self._events.send(
-            Health(
+            messages.Health(
                 rate_hz=self._rate_hz if clock is None else clock.rate_hz,
                 samples=losses.samples,
                 missing=losses.missing,
@@ -373,7 +356,7 @@ class Engine:
             return
         _log.warning("%s", warning.note)
         if warning.must_end:
-            self._end_all(EndReason.DISK_FULL, warning.note)
+            self._end_all(messages.EndReason.DISK_FULL, warning.note)
         else:
             recording.add_note(warning.note)
 
@@ -381,12 +364,14 @@ class Engine:
         return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
 
 
-def serve(commands: CommandReader[Command], events: EventSender[Event], folder: Path) -> None:
+def serve(
+    commands: CommandReader[messages.Command], events: EventSender[messages.Event], folder: Path
+) -> None:
     """Execute the first command, `Connect`, and run the engine; the ring is made in `folder`."""
     connect = commands.take(timeout_s=_CONNECT_S)
-    if not isinstance(connect, Connect):
+    if not isinstance(connect, messages.Connect):
         raise AcquisitionError("an engine is told what to connect to first: send Connect")
-    events.send(StateChanged(PullbackState.CONNECTING, 0.0))
+    events.send(messages.StateChanged(messages.PullbackState.CONNECTING, 0.0))
     stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
     port = complete_port_settings(connect.port, gauges.device)
     with (
@@ -397,8 +382,8 @@ def serve(commands: CommandReader[Command], events: EventSender[Event], folder: 
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_quit())
         device = stream.identity
         _log.info("connected: %s %s, %g Hz", device.name, device.firmware, stream.rate_hz)
-        events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
-        events.send(StateChanged(PullbackState.IDLE, 0.0))
+        events.send(messages.Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
+        events.send(messages.StateChanged(messages.PullbackState.IDLE, 0.0))
         engine.run()
 
 
@@ -407,15 +392,15 @@ def main() -> int:
     start_log("engine")
     ignore_session_signals()
     sys.setswitchinterval(_SWITCH_S)
-    events: EventSender[Event] = EventSender(
-        reserve_stdout(), lambda event: isinstance(event, Health | LiveResult)
+    events: EventSender[messages.Event] = EventSender(
+        reserve_stdout(), lambda event: isinstance(event, messages.Health | messages.LiveResult)
     )
     try:
         with live_folder() as folder:
-            serve(CommandReader(0, LineDecoder(decode_command)), events, folder)
+            serve(CommandReader(0, LineDecoder(messages.decode_command)), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
         _log.error("engine failed: %s", error)
-        events.send(Failed(message_of(error)))
+        events.send(messages.Failed(message_of(error)))
         return 1
     except Exception as error:
         _log.exception("engine failed")
@@ -424,7 +409,7 @@ def main() -> int:
             kind=type(error).__name__,
             error=error,
         )
-        events.send(Failed(failure))
+        events.send(messages.Failed(failure))
         raise
     finally:
         events.close()

@@ -10,24 +10,8 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Self
 
+from app.acquisition import messages
 from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
-from app.acquisition.messages import (
-    Arm,
-    Command,
-    Connect,
-    Connected,
-    EndReason,
-    Event,
-    Failed,
-    Health,
-    LiveResult,
-    PortSettings,
-    Quit,
-    RunEnded,
-    RunSettings,
-    Stop,
-    decode_event,
-)
 from app.acquisition.ring import RingReader, RingRows, open_ring
 from app.child_process import ChildProcess, encode_line, spawn
 from messages.message import Message, message
@@ -52,39 +36,39 @@ class EngineClient:
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
         self.process_id = process.pid
-        self._events: queue.Queue[Event] = queue.Queue()
+        self._events: queue.Queue[messages.Event] = queue.Queue()
         self._has_failed = False
         self._ring: RingReader | None = None
         self._ring_folder: Path | None = None
         self._next_row = 0
         self._run_folder = ""
-        self._child: ChildProcess[Command, Event] = ChildProcess(
-            process, encode_line, decode_event, self._on_event, self._on_exit
+        self._child: ChildProcess[messages.Command, messages.Event] = ChildProcess(
+            process, encode_line, messages.decode_event, self._on_event, self._on_exit
         )
 
     @classmethod
     def start(
-        cls, port: PortSettings, stand_file: str, gauges_file: str, *, low_latency: bool = False
+        cls, port: messages.PortSettings, stand_file: str, gauges_file: str, *, low_latency: bool = False
     ) -> Self:
         """Start an engine and let it connect; `Connected` or `Failed` will be among its events.
 
         With `low_latency`, new rows are in the ring within about 20 ms, else within 0.14 s at less cost.
         """
         engine = cls(spawn("app.acquisition.engine"))
-        engine.send(Connect(port, stand_file, gauges_file, low_latency))
+        engine.send(messages.Connect(port, stand_file, gauges_file, low_latency))
         return engine
 
     @property
     def has_ended(self) -> bool:
         return self._child.has_ended and self._events.empty()
 
-    def send(self, command: Command) -> None:
+    def send(self, command: messages.Command) -> None:
         """Give a command. An engine that has ended has sent the reason as an event."""
-        if isinstance(command, Arm):
+        if isinstance(command, messages.Arm):
             self._run_folder = command.run.directory
         self._child.send(command, self._SEND_S)
 
-    def poll(self) -> list[Event]:
+    def poll(self) -> list[messages.Event]:
         """Events since the last call; the last one of an engine is `Failed` unless it was closed."""
         events = []
         with contextlib.suppress(queue.Empty):
@@ -92,7 +76,7 @@ class EngineClient:
                 events.append(self._events.get_nowait())
         return events
 
-    def wait(self, timeout_s: float) -> Event | None:
+    def wait(self, timeout_s: float) -> messages.Event | None:
         with contextlib.suppress(queue.Empty):
             return self._events.get(timeout=timeout_s)
         return None
@@ -108,7 +92,7 @@ class EngineClient:
 
     def close(self) -> None:
         """Finish a run that is being recorded, and end the engine. Harmless when it has ended."""
-        self.send(Quit())
+        self.send(messages.Quit())
         self._child.stop(self._CLOSE_S, wait_while_active=True)
         if self._ring is not None:
             self._ring.close()
@@ -122,15 +106,16 @@ class EngineClient:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _on_event(self, event: Event) -> None:
-        self._has_failed = self._has_failed or isinstance(event, Failed)
-        if isinstance(event, Connected):
+    def _on_event(self, event: messages.Event) -> None:
+        self._has_failed = self._has_failed or isinstance(event, messages.Failed)
+        if isinstance(event, messages.Connected):
             self._ring_folder = Path(event.ring_path).parent
             with contextlib.suppress(RingError):  # the engine has ended meanwhile, and sends the reason
                 self._ring = open_ring(event.ring_path)
-        elif isinstance(event, RunEnded):
+        elif isinstance(event, messages.RunEnded):
             self._run_folder = ""
-        if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS:
+        is_transient = isinstance(event, messages.Health | messages.LiveResult)
+        if not is_transient or self._events.qsize() < self._QUEUE_EVENTS:
             self._events.put(event)
 
     def _on_exit(self, code: int) -> None:
@@ -138,7 +123,7 @@ class EngineClient:
             died = message(
                 "the engine ended by itself (code {code}). {remedy}", code=code, remedy=self._remedy()
             )
-            self._events.put(Failed(died))
+            self._events.put(messages.Failed(died))
 
     def _remedy(self) -> Message:
         if not self._run_folder:
@@ -149,14 +134,14 @@ class EngineClient:
 
 
 def record_runs(
-    port: PortSettings,
-    run: RunSettings,
+    port: messages.PortSettings,
+    run: messages.RunSettings,
     stand_file: str,
     gauges_file: str,
-    on_event: Callable[[Event], None] | None = None,
+    on_event: Callable[[messages.Event], None] | None = None,
     on_rows: Callable[[RingRows], None] | None = None,
     count: int = 1,
-) -> Generator[RunEnded]:
+) -> Generator[messages.RunEnded]:
     """Record up to `count` runs one after another over one connection, yielding each at its end.
 
     Ctrl-C (or SIGTERM) ends the run that is being recorded and keeps it; no further run follows. A run
@@ -173,21 +158,21 @@ def record_runs(
             if on_rows is not None and (rows := engine.new_rows()) is not None and len(rows):
                 on_rows(rows)
             match event:
-                case RunEnded(remaining=remaining):
+                case messages.RunEnded(remaining=remaining):
                     yield event
                     if not remaining:
                         return
-                case Failed(message):
+                case messages.Failed(message):
                     raise EngineFailedError(message)
-                case Connected():
-                    engine.send(Arm(run, count))
+                case messages.Connected():
+                    engine.send(messages.Arm(run, count))
                     is_armed = True
                 case None if engine.has_ended:
                     raise EngineDiedError("the engine ended without a word. Record again")
             if interrupted.is_set() and not is_stopped:
                 if not is_armed:
                     raise KeyboardInterrupt
-                engine.send(Stop(EndReason.INTERRUPTED))
+                engine.send(messages.Stop(messages.EndReason.INTERRUPTED))
                 is_stopped = True
 
 

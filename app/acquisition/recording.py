@@ -20,7 +20,7 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.acquisition.pullback.plan import ObservedSlip, PullbackPlan
-from app.acquisition.pullback.trigger import create_trigger
+from app.acquisition.pullback.trigger import Trigger
 from app.acquisition.run_file import RunFile, end_reason, sentences, start_time
 from app.acquisition.stream.connection import RawRead, ReadQueue
 from app.acquisition.stream.live_stream import DecodedRead, ReadHistory, merge_reads
@@ -87,7 +87,7 @@ class Recording:
         self._history = context.history
         self._armed_index = context.history.next_index
         plan = _plan(metadata, rate_hz, last_slip)
-        self._trigger = create_trigger(settings, plan, self._armed_index, context.history)
+        self._trigger = Trigger(settings, plan, self._armed_index, context.history)
         self._checkpoints = CheckpointWriter(journal, self._armed_index, rate_hz, context.time_base)
         self._tap = JournalTap(journal)
         self._pending: list[DecodedRead] = []

@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import os
-import queue
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,50 +19,23 @@ _ROOM_BYTES = 32 << 20
 """Least free space of a fallback folder beyond what is copied: with less it would be full as soon."""
 
 
-class Syncer:
-    """Syncs one file after another; the thread begins with the first of them and ends with `stop`."""
+class FileSync(threading.Thread):
+    """A sync of a file, which begins at once; the file may be closed meanwhile."""
 
-    def __init__(self) -> None:
-        self._handles: queue.SimpleQueue[int | None] = queue.SimpleQueue()
-        self._is_idle = threading.Event()
-        self._is_idle.set()
-        self._failure: OSError | None = None
-        self._thread: threading.Thread | None = None
+    def __init__(self, descriptor: int) -> None:
+        super().__init__(name="journal sync", daemon=True)
+        self.failure: OSError | None = None
+        """Known when the thread has ended."""
+        self._descriptor = os.dup(descriptor)
+        self.start()
 
-    @property
-    def is_idle(self) -> bool:
-        return self._is_idle.is_set()
-
-    def begin(self, descriptor: int) -> None:
-        """Begin to sync a file, which may be closed after this call. Only when idle."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="journal sync", daemon=True)
-            self._thread.start()
-        self._is_idle.clear()
-        self._handles.put(os.dup(descriptor))
-
-    def wait(self) -> None:
-        self._is_idle.wait()
-
-    def take_failure(self) -> OSError | None:
-        """Error of a sync since the last call; None if none has failed."""
-        failure, self._failure = self._failure, None
-        return failure
-
-    def stop(self, *, wait: bool = True) -> None:
-        self._handles.put(None)
-        if self._thread is not None and wait:
-            self._thread.join()
-
-    def _work(self) -> None:
-        while (handle := self._handles.get()) is not None:
-            try:
-                os.fsync(handle)
-            except OSError as error:
-                self._failure = error
-            finally:
-                os.close(handle)
-                self._is_idle.set()
+    def run(self) -> None:
+        try:
+            os.fsync(self._descriptor)
+        except OSError as error:
+            self.failure = error
+        finally:
+            os.close(self._descriptor)
 
 
 class JournalFile:
@@ -88,7 +60,7 @@ class JournalFile:
         """Bytes of all whole records."""
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
-        self._syncer = Syncer()
+        self._sync: FileSync | None = None
 
     def append(self, record: bytes) -> None:
         """Write a record. Raises OSError where no folder takes it."""
@@ -106,26 +78,28 @@ class JournalFile:
 
         Does nothing while the last one is not done. Raises OSError where no folder takes the records.
         """
-        if self._syncer.is_idle:
-            self._check_sync()
-            self._syncer.begin(self._file.fileno())
+        if self._sync is None or not self._sync.is_alive():
+            self._finish_sync()
+            self._sync = FileSync(self._file.fileno())
 
     def sync(self) -> None:
         """Bring everything to disk, and wait for it. Raises OSError where no folder takes it."""
-        self._syncer.wait()
-        self._check_sync()
+        self._finish_sync()
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
             self._move(error)
 
-    def _check_sync(self) -> None:
-        failure = self._syncer.take_failure()
-        if failure is not None:
-            self._move(failure)
+    def _finish_sync(self) -> None:
+        sync, self._sync = self._sync, None
+        if sync is not None:
+            sync.join()
+            if sync.failure is not None:
+                self._move(sync.failure)
 
     def close(self) -> None:
-        self._syncer.stop()
+        if self._sync is not None:
+            self._sync.join()
         self._file.close()
 
     def remove(self) -> None:
@@ -157,8 +131,7 @@ class JournalFile:
         if is_copied:  # its run file may need the space
             self.remove()
         self.release()
-        self._syncer.stop(wait=False)  # a sync of the old file that fails now does not concern the new one
-        self._syncer = Syncer()
+        self._sync = None  # one of the old file that fails now does not concern the new one
         self.path, self._file, self._lock = path, file, lock
 
     def _copy_to(self, file: IO[bytes]) -> bool:

@@ -7,7 +7,6 @@ rest again. All times are sample indices, so that the machine works alike live, 
 import math
 
 from app.acquisition.messages import EndReason, PullbackState, StandPosition
-from app.acquisition.pullback import operator_messages
 from app.acquisition.pullback.averages import (
     BinAverager,
     BinAverages,
@@ -20,7 +19,34 @@ from app.acquisition.pullback.averages import (
 from app.acquisition.pullback.free_motion import FreeMotion, Hold, HoldReference
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
 from drivers.arrays import Floats
-from messages.message import EMPTY, Message
+from messages.message import EMPTY, Message, message
+
+NOT_HELD_NOTE = message(
+    "The table came back without being held still. Pull back again and hold it for a moment"
+)
+ALREADY_PULLED_NOTE = message(
+    "The table was already pulled back when armed, so its zero before the pull is not known"
+)
+NOT_RECENTRED_NOTE = message(
+    "The plate was not pushed back before the pull: its slip may leave the range of gauge 2"
+)
+RESTLESS_NOTE = message("The table has not come to rest yet, so its zero cannot be taken. Still it")
+NO_READING_NOTE = message("Gauge 1 gives no reading. Check its cable, and whether it is overloaded")
+_TIMEOUT_CAUSES = {
+    PullbackState.RECENTRE: message(
+        "the plate was not pushed back. Push it to where the next slip fits gauge 2"
+    ),
+    PullbackState.ZERO: message(
+        "the table never came to rest, or gauge 1 gave no reading. Still it, check the gauge"
+    ),
+    PullbackState.PULLING: message(
+        "the table was never held at the pullback. Pull back, hold still, let go at once"
+    ),
+    PullbackState.HELD: message(
+        "the table was held, but never steadily. Hold it without drift and let go at once"
+    ),
+    PullbackState.ARMED: message("the table was held and never let go. Let go at once when armed"),
+}
 
 _TICK_S = 0.02
 """Interval of slow checks; the release is looked for at each bin."""
@@ -177,7 +203,7 @@ class PullbackStateMachine:
         is_first = not self._rest.has_levels and self.measurement.zero_m is None
         if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
-            self._enter(PullbackState.PULLING, index, operator_messages.ALREADY_PULLED_NOTE, is_stored=True)
+            self._enter(PullbackState.PULLING, index, ALREADY_PULLED_NOTE, is_stored=True)
             return
         if self._is_plate_moving(index):
             self._rest.reset()
@@ -218,7 +244,7 @@ class PullbackStateMachine:
         self._is_pulled = True
         self._moved_at = index
         if self.state is PullbackState.RECENTRE:
-            self._enter(PullbackState.PULLING, index, operator_messages.NOT_RECENTRED_NOTE, is_stored=True)
+            self._enter(PullbackState.PULLING, index, NOT_RECENTRED_NOTE, is_stored=True)
         elif self.state is PullbackState.ZERO:
             self._enter(PullbackState.PULLING, index)
 
@@ -289,7 +315,7 @@ class PullbackStateMachine:
         self._farthest_m = 0.0
         self._rest.reset()
         if was_pulled or self.state is not PullbackState.PULLING:
-            self._enter(PullbackState.ZERO, index, operator_messages.NOT_HELD_NOTE)
+            self._enter(PullbackState.ZERO, index, NOT_HELD_NOTE)
 
     def _release(self, hold: Hold, index: float) -> None:
         remark = self._remark(hold, index)
@@ -300,8 +326,15 @@ class PullbackStateMachine:
         if self.state is PullbackState.ARMED:
             return EMPTY
         if self.state is PullbackState.PULLING and self._plan.target_m is not None:
-            return operator_messages.off_target_note(abs(self.measurement.pulled_m), self._plan.target_m)
-        return operator_messages.not_steady_note((index - hold.since) / self._plan.rate_hz)
+            return message(
+                "Released from {pulled_mm:.2f} mm instead of {planned_mm:g} mm",
+                pulled_mm=1e3 * abs(self.measurement.pulled_m),
+                planned_mm=1e3 * self._plan.target_m,
+            )
+        return message(
+            "Released before it was armed, {held_s:.1f} s after the pull. Hold still until it says armed",
+            held_s=(index - hold.since) / self._plan.rate_hz,
+        )
 
     # --- released ---
 
@@ -329,13 +362,17 @@ class PullbackStateMachine:
 
     def _keep_waiting(self, end_index: int) -> None:
         if end_index >= self._timeout_index:
-            note = operator_messages.timeout_note(self.state, self._plan.trigger_timeout_s)
+            note = message(
+                "no release within {timeout_s:g} s: {cause}",
+                timeout_s=self._plan.trigger_timeout_s,
+                cause=_TIMEOUT_CAUSES[self.state],
+            )
             reason = EndReason.TRIGGER_TIMEOUT
             self._add(Transition(PullbackState.CLOSING, round(self._timeout_index), note, True, reason))
             return
         is_late = end_index >= self._timeout_index - self._span(self._warning_s)
-        warning = operator_messages.timeout_warning(self._warning_s) if is_late else EMPTY
-        for kind, hint in enumerate((self._hint(end_index), warning)):
+        warning = message("No release yet: the run ends without one in {left_s:g} s", left_s=self._warning_s)
+        for kind, hint in enumerate((self._hint(end_index), warning if is_late else EMPTY)):
             if hint and kind not in self._hinted:
                 self._hinted.add(kind)
                 self._transitions.append(Transition(self.state, end_index, hint))
@@ -346,12 +383,19 @@ class PullbackStateMachine:
             return EMPTY
         if self.state is PullbackState.ZERO:
             is_silent = now - self._last_reading > self._span(_SILENT_S)
-            return operator_messages.NO_READING_NOTE if is_silent else operator_messages.RESTLESS_NOTE
+            return NO_READING_NOTE if is_silent else RESTLESS_NOTE
         if self.state is PullbackState.HELD:
             drift_m_per_s = self._readings.table.drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
             if drift_m_per_s or now >= self._filled_index:
-                return operator_messages.drift_hint(drift_m_per_s)
-            return operator_messages.filling_hint(self._plan.pretrigger_s)
+                return message(
+                    "The table drifts by {drift_mm_per_s:.2f} mm/s. Hold it still",
+                    drift_mm_per_s=1e3 * abs(drift_m_per_s),
+                )
+            return message(
+                "The {pretrigger_s:g} s that are kept from before the release are not there yet. Go on"
+                " holding",
+                pretrigger_s=self._plan.pretrigger_s,
+            )
         return EMPTY
 
     def _enter(

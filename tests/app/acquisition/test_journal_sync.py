@@ -1,4 +1,4 @@
-"""Files are brought to disk one after another by a thread that ends when it is told to."""
+"""A file is brought to disk by a thread while others write to it."""
 
 import errno
 import os
@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from app.acquisition.journal.file import Syncer
+from app.acquisition.journal.file import FileSync
 
 
 @pytest.fixture
@@ -23,38 +23,22 @@ def test_a_file_may_be_closed_while_it_is_synced(file, monkeypatch):
         synced.append(os.fstat(handle).st_ino)
 
     monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
-    syncer, inode = Syncer(), os.fstat(file.fileno()).st_ino
-    syncer.begin(file.fileno())
+    inode = os.fstat(file.fileno()).st_ino
+    sync = FileSync(file.fileno())
     file.close()
-    assert not syncer.is_idle
+    assert sync.is_alive()
     may_go_on.set()
-    syncer.wait()
-    assert syncer.is_idle
+    sync.join()
     assert synced == [inode]
-    assert syncer.take_failure() is None
-    syncer.stop()
-    assert not any(thread.name == "journal sync" for thread in threading.enumerate())
+    assert sync.failure is None
 
 
-def test_a_failure_is_told_once_and_the_next_sync_is_tried_all_the_same(file, monkeypatch):
-    failures = [OSError(errno.EIO, "injected")]
-
+def test_a_failure_is_known_afterwards(file, monkeypatch):
     def fsync(handle: int) -> None:
-        if failures:
-            raise failures.pop()
+        raise OSError(errno.EIO, "injected")
 
     monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
-    syncer = Syncer()
-    syncer.begin(file.fileno())
-    syncer.wait()
-    failure = syncer.take_failure()
-    assert failure is not None
-    assert failure.errno == errno.EIO
-    syncer.begin(file.fileno())
-    syncer.wait()
-    assert syncer.take_failure() is None
-    syncer.stop()
-
-
-def test_one_that_never_synced_has_nothing_to_end():
-    Syncer().stop()
+    sync = FileSync(file.fileno())
+    sync.join()
+    assert sync.failure is not None
+    assert sync.failure.errno == errno.EIO

@@ -9,7 +9,7 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.operator_messages import NOT_RECENTRED_NOTE
+from app.acquisition.pullback.state_machine import NOT_RECENTRED_NOTE
 from app.acquisition.pullback.plan import (
     Excursion,
     ObservedSlip,
@@ -17,7 +17,7 @@ from app.acquisition.pullback.plan import (
     allowed_plate_range,
     default_excursion,
 )
-from app.acquisition.pullback.trigger import create_trigger
+from app.acquisition.pullback.trigger import Trigger
 from app.acquisition.stream.live_stream import ReadHistory
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
@@ -157,9 +157,9 @@ def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder()
     _, turns, _ = follow(plan, table, relative)
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert notes(turns) == []
-    trigger = create_trigger(RunSettings("/runs"), plan, 0, ReadHistory(1000))
+    trigger = Trigger(RunSettings("/runs"), plan, 0, ReadHistory(1000))
     assert str(trigger.note) == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
-    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == EMPTY
+    assert Trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == EMPTY
 
 
 def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():

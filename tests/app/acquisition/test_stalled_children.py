@@ -126,10 +126,10 @@ def test_a_sync_of_the_old_file_that_fails_late_moves_a_journal_only_once(tmp_pa
 
     monkeypatch.setattr(os, "fsync", failing_sync)
     journal.begin_sync()
-    old = journal._syncer
+    old = journal._sync
     journal._move(OSError(28, "injected"))
     goes_on.set()
-    old.wait()
+    old.join()
     monkeypatch.setattr(os, "fsync", sync)
     journal.append(encode_record(b"came", 1))
     journal.begin_sync()
