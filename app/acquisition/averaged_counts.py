@@ -1,23 +1,31 @@
 """Counts of a gauge averaged over a window, for a calibration or a check."""
 
+import math
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from app.acquisition.errors import AcquisitionError
+from app.acquisition.ring import RingRows, timed_rows
 from drivers.arrays import Floats
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
-    from app.acquisition.stream.live_stream import DecodedRead, LiveStream
+    from app.acquisition.stream.live_stream import LiveStream
 
 TIMEOUT_S = 5.0
+WINDOW_S = 1.0
+"""Length of an averaging window: 1 s averages whole periods of 50 and 60 Hz hum."""
+MAX_WINDOWS = 5
+"""A reading waits at most this many windows until the gauge is at rest, then it is taken with a warning."""
+OVERLOAD_FLAGS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _STALE_S = 0.1
 """Samples that were sent before the request may still be under way for so long."""
-OVERLOAD_FLAGS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _VALID_FRACTION = 0.5
 """Least fraction of valid samples in a window: below it the gauge is hardly in range."""
 _STEADY = 6.0
@@ -42,6 +50,10 @@ class AveragedCounts:
         return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
 
+class NoAverageError(AcquisitionError):
+    """A window without an average."""
+
+
 def compute_average(counts: Floats) -> AveragedCounts:
     """Average of the samples (n,) of a window, n >= 2."""
     half = len(counts) // 2
@@ -49,8 +61,105 @@ def compute_average(counts: Floats) -> AveragedCounts:
     return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
 
 
-class NoAverageError(AcquisitionError):
-    """A window without an average."""
+def average_counts(rows: RingRows, channel: int) -> AveragedCounts:
+    """Average the counts of gauge 1 (channel 0) or gauge 2 (channel 1). Raises NoAverageError."""
+    valid = (rows.status & int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])) == 0
+    counts = rows.counts[valid, channel].astype(np.float64)
+    if len(counts) < max(_VALID_FRACTION * len(rows), 2):
+        raise NoAverageError(
+            "gauge {gauge} is overloaded or its samples are damaged: {invalid} of {samples}. Move it"
+            " back into its range, or check the cable",
+            gauge=channel + 1,
+            invalid=len(rows) - len(counts),
+            samples=len(rows),
+        )
+    return compute_average(counts)
+
+
+class RecentSamples:
+    """The newest rows of a stream, `seconds` long."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._parts: deque[RingRows] = deque()
+
+    @property
+    def end_s(self) -> float:
+        """Time of the newest row; NaN without any."""
+        return float(self._parts[-1].time_s[-1]) if self._parts else math.nan
+
+    @property
+    def length_s(self) -> float:
+        """Time from the oldest row to the newest; 0 without any."""
+        return self.end_s - float(self._parts[0].time_s[0]) if self._parts else 0.0
+
+    def append(self, rows: RingRows) -> None:
+        if not len(rows):
+            return
+        self._parts.append(rows)
+        while rows.time_s[-1] - self._parts[0].time_s[-1] > self._seconds:
+            self._parts.popleft()
+
+    def clear(self) -> None:
+        self._parts.clear()
+
+    def since(self, start_s: float) -> RingRows | None:
+        """Rows from a time on, concatenated; None without any."""
+        parts = [rows for rows in self._parts if rows.time_s[-1] >= start_s]
+        if not parts:
+            return None
+        names = ("counts", "readings", "relative_m", "status", "time_s")
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(rows, name) for rows in parts]) for name in names
+        }
+        skipped = int(np.searchsorted(columns["time_s"], start_s))
+        return RingRows(
+            parts[0].first_index + skipped, **{name: column[skipped:] for name, column in columns.items()}
+        )
+
+
+class ReadingAverager:
+    """Averages one reading of recent samples once the gauge is at rest."""
+
+    def __init__(
+        self, recent: RecentSamples, window_s: float = WINDOW_S, max_windows: int = MAX_WINDOWS
+    ) -> None:
+        self._recent = recent
+        self._window_s = window_s
+        self._max_windows = max_windows
+        self._since_s = math.nan
+        self._windows = 0
+
+    @property
+    def is_active(self) -> bool:
+        return self._windows > 0
+
+    def start(self) -> bool:
+        """Begin a reading; False without samples."""
+        if not math.isfinite(self._recent.end_s):
+            return False
+        self._windows, self._since_s = 1, self._recent.end_s + _STALE_S
+        return True
+
+    def stop(self) -> None:
+        self._windows = 0
+
+    def poll(self, gauge: int) -> AveragedCounts | None:
+        """Evaluate the current window once it is complete; None before. Raises NoAverageError.
+
+        The reading is taken when it is not active any more: in a steady window, or in the last one, even if
+        the gauge still creeps. An error ends it.
+        """
+        if not self.is_active or self._recent.end_s < self._since_s + self._window_s:
+            return None
+        rows = self._recent.since(self._since_s)
+        if rows is None or len(rows) < 2:
+            return None
+        windows, self._windows = self._windows, 0
+        average = average_counts(rows, gauge)
+        if not average.is_steady and windows < self._max_windows:
+            self._windows, self._since_s = windows + 1, self._recent.end_s
+        return average
 
 
 class CountAverager:
@@ -62,13 +171,12 @@ class CountAverager:
     def __init__(self, stream: "LiveStream", channel: int) -> None:
         self._stream = stream
         self._channel = channel
-        self._flag = int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])
         self._changed = threading.Condition()
-        self._taken: list[Floats] | None = None
-        self._invalid = 0
+        self._recent: RecentSamples | None = None
+        self._samples = 0
         self._fault: Exception | None = None
         self._leaving = False
-        self._thread = threading.Thread(target=self._read, name="settled counts", daemon=True)
+        self._thread = threading.Thread(target=self._read, name="averaged counts", daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -78,70 +186,54 @@ class CountAverager:
         self._leaving = True
         self._thread.join()
 
-    def average(self, window_s: float) -> AveragedCounts:
-        """Average of the samples from now on.
+    def steady_average(
+        self,
+        window_s: float,
+        max_windows: int = MAX_WINDOWS,
+        on_unsteady: Callable[[AveragedCounts], None] = lambda _: None,
+    ) -> AveragedCounts:
+        """Average of a window of samples from now on; `on_unsteady` receives those before the gauge rested.
 
         Raises NoAverageError if too few samples come or are valid. Raises AcquisitionError or DriverError if
         the stream has ended.
         """
-        stale, wanted = (round(span_s * self._stream.rate_hz) for span_s in (_STALE_S, window_s))
-        enough = stale + max(wanted, 2)
+        recent = RecentSamples(window_s + TIMEOUT_S)
+        averager = ReadingAverager(recent, window_s, max_windows)
         with self._changed:
-            self._taken, self._invalid = [], 0
-            came = self._changed.wait_for(
-                lambda: self._fault is not None or self._seen() >= enough, window_s + TIMEOUT_S
-            )
-            taken, self._taken = self._taken, None
-        if self._fault is not None:
-            raise self._fault
-        if not came:
-            raise NoAverageError(
-                "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device",
-                samples=sum(map(len, taken)),
-                window_s=window_s + TIMEOUT_S,
-            )
-        valid = np.concatenate(taken)[stale:]
-        if len(valid) < max(_VALID_FRACTION * wanted, 2):
-            raise NoAverageError(
-                "gauge {gauge} is overloaded or its samples are damaged: {invalid} of {samples}. Move it"
-                " back into its range, or check the cable",
-                gauge=self._channel + 1,
-                invalid=self._invalid,
-                samples=self._invalid + sum(map(len, taken)),
-            )
-        return compute_average(valid)
+            self._recent, self._samples = recent, 0
+            while True:
+                average = self._next_window(averager, window_s)
+                if not averager.is_active:
+                    self._recent = None
+                    return average
+                on_unsteady(average)
 
-    def steady_average(
-        self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
-    ) -> AveragedCounts:
-        """First steady average of up to so many windows, else the last; `on_unsteady` receives the others."""
-        for _ in range(windows - 1):
-            average = self.average(window_s)
-            if average.is_steady:
+    def _next_window(self, averager: ReadingAverager, window_s: float) -> AveragedCounts:
+        until_s = time.monotonic() + window_s + TIMEOUT_S
+        while self._fault is None:
+            average = averager.poll(self._channel) if averager.is_active or averager.start() else None
+            if average is not None:
                 return average
-            on_unsteady(average)
-        return self.average(window_s)
-
-    def _seen(self) -> int:
-        return self._invalid + sum(map(len, self._taken or []))
+            if not self._changed.wait(max(0.0, until_s - time.monotonic())):
+                raise NoAverageError(
+                    "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device",
+                    samples=self._samples,
+                    window_s=window_s + TIMEOUT_S,
+                )
+        raise self._fault
 
     def _read(self) -> None:
         try:
             while not self._leaving:
-                chunk = self._stream.next_read(0.05)
-                if chunk is not None:
-                    self._take(chunk)
+                read = self._stream.next_read(0.05)
+                with self._changed:
+                    if read is None or self._recent is None:
+                        continue
+                    for rows in read.rows:
+                        self._recent.append(timed_rows(rows, self._stream.rate_hz))
+                        self._samples += len(rows)
+                    self._changed.notify_all()
         except Exception as error:  # raised by the call that waits for an average
             with self._changed:
                 self._fault = error
                 self._changed.notify_all()
-
-    def _take(self, chunk: "DecodedRead") -> None:
-        with self._changed:
-            if self._taken is None:
-                return
-            for rows in chunk.rows:
-                valid = (rows.status & self._flag) == 0
-                self._taken.append(rows.counts[valid, self._channel].astype(np.float64))
-                self._invalid += int(np.count_nonzero(~valid))
-            self._changed.notify_all()

@@ -51,6 +51,19 @@ class RingRows(CalibratedBlock):
     """Rows between the one asked for and the first one: overwritten before they could be read."""
 
 
+def timed_rows(block: CalibratedBlock, rate_hz: float, lost: int = 0) -> RingRows:
+    """Rows of a block, on the time axis of the stream."""
+    return RingRows(
+        block.first_index,
+        block.counts,
+        block.readings,
+        block.relative_m,
+        block.status,
+        time_s=np.arange(block.first_index, block.end_index) / rate_hz,
+        lost=lost,
+    )
+
+
 class _RingSettings(msgspec.Struct):
     rate_hz: float
     gauges: Gauges
@@ -138,15 +151,7 @@ class RingReader(_Ring):
         overwritten = min(overwritten, end - first)
         first += overwritten
         block = calibrate(SampleBlock(first, counts[overwritten:], status[overwritten:], 0), self._gauges)
-        return RingRows(
-            first,
-            block.counts,
-            block.readings,
-            block.relative_m,
-            block.status,
-            time_s=np.arange(first, end) / self.rate_hz,
-            lost=max(0, first - row),
-        )
+        return timed_rows(block, self.rate_hz, max(0, first - row))
 
     def _copy(self, first: int, end: int) -> list[Any]:
         start, count = first % self.capacity, end - first

@@ -77,8 +77,8 @@ class Workers:
     runs: EventWorker
     batch: EventWorker
     campaign: Worker
-    gauges: EventWorker
-    ports: EventWorker
+    gauges: Worker
+    ports: Worker
     pool: WorkerPool = field(default_factory=WorkerPool)
     report_error: Callable[[ErrorReport], None] = lambda _error: None
 
@@ -87,8 +87,9 @@ class Workers:
         """Make workers that share processes, all but the analysis."""
         pool = WorkerPool()
         record = Worker(report_error, pool)
-        runs, batch, gauges, ports = (EventWorker(Worker(report_error, pool)) for _ in range(4))
-        analysis, campaign = Worker(report_error), Worker(report_error, pool)
+        runs, batch = EventWorker(Worker(report_error, pool)), EventWorker(Worker(report_error, pool))
+        campaign, gauges, ports = (Worker(report_error, pool) for _ in range(3))
+        analysis = Worker(report_error)
         return cls(analysis, record, runs, batch, campaign, gauges, ports, pool, report_error)
 
     def make(self) -> Worker:

@@ -4,25 +4,38 @@ import datetime
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from functools import partial
+from typing import TYPE_CHECKING, Final
 
 from analysis.formatting import typeset, with_unit
-from app.acquisition.averaged_counts import AveragedCounts
+from app.acquisition.averaged_counts import (
+    AveragedCounts,
+    NoAverageError,
+    ReadingAverager,
+    RecentSamples,
+    average_counts,
+)
+from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples, average_counts
+from app.presenters.events import TaskFailure
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
     NO_DEVICE,
+    CalibrationData,
     CalibrationFit,
     CalibrationForm,
     CalibrationPoint,
     CalibrationState,
 )
-from app.presenters.gauges.tasks import FitCalibration, SaveCalibration, SavedCalibration
 from app.presenters.number_text import format_fixed, parse_number
 from app.presenters.results import sentence
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext
-from messages.message import Message
+
+if TYPE_CHECKING:
+    from app.presenters.gauges import tasks
+else:
+    tasks = LazyModule("app.presenters.gauges.tasks")
 
 _LIVE_S: Final = 0.5
 """Averaging time of the live counts: long enough to read the number, short enough to follow a hand."""
@@ -32,18 +45,20 @@ _FITTED_FROM: Final = 2
 
 
 class CalibrationPresenter(Presenter[CalibrationState]):
-    """Takes one reading at a time; results of `submit` come to `on_fitted`, `on_saved` or `on_failed`."""
+    """Takes one reading at a time; calls `on_saved` when a calibration is saved."""
 
     def __init__(
         self,
         recent: RecentSamples,
-        submit: Callable[[FitCalibration | SaveCalibration], None],
+        worker: Worker,
         now: Callable[[], datetime.datetime],
+        on_saved: Callable[[], None],
     ) -> None:
         super().__init__(CalibrationState())
         self._recent = recent
-        self._submit = submit
+        self._worker = worker
         self._now = now
+        self._on_saved_file = on_saved
         self._is_connected = False
         self._averager = ReadingAverager(recent)
         self._dial_mm = 0.0
@@ -92,23 +107,22 @@ class CalibrationPresenter(Presenter[CalibrationState]):
     def save(self) -> None:
         if not self.state.can_save:
             return
-        form = self.state.form
+        form, today = self.state.form, self._now().date()
         try:
-            today = self._now().date()
-            task = SaveCalibration(
-                self._fit_task(),
-                form.use,
-                today,
-                _last_day(form.valid_until, today),
-                _reference(form),
-                form.certificate.strip(),
-                form.calibrated_by.strip(),
-            )
+            data, valid_until = self._data(), _last_day(form.valid_until, today)
         except ValueError as error:
             self._update(message=Chip(str(error), Tone.BAD))
             return
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
-        self._submit(task)
+        self._worker.submit(
+            tasks.save_calibration,
+            form,
+            data,
+            today,
+            valid_until,
+            done=self._on_saved,
+            failed=self._on_save_failed,
+        )
 
     def set_connected(self, is_connected: bool) -> None:
         """Live samples come from now on, or no longer."""
@@ -124,32 +138,15 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             return
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
         if rows is not None:
-            self._show_live(average_counts(rows, self.state.form.gauge))
+            self._show_live(rows)
         self._poll_reading()
 
-    def on_fitted(self, task: FitCalibration, fit: CalibrationFit) -> None:
-        if task.points == self.state.points:
-            self._update(fit=fit, can_save=True)
-
-    def on_saved(self, saved: SavedCalibration) -> None:
-        used = self.state.form.use
-        text = gettext("Written to {file}.", file=saved.file)
-        if saved.previous:
-            text += " " + gettext("The one before is kept as {file}.", file=saved.previous)
-        self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=used and self._is_connected)
-
-    def on_failed(self, task: FitCalibration | SaveCalibration, message: Message) -> None:
-        if isinstance(task, SaveCalibration):
-            self._update(message=Chip(sentence(message), Tone.BAD), can_save=True)
-        elif task.points == self.state.points:
-            tone = Tone.PLAIN if len(task.points) <= _FITTED_FROM else Tone.WARN
-            self._update(fit=None, can_save=False, message=Chip(sentence(message), tone))
-
-    def _show_live(self, average: AveragedCounts | InvalidWindow) -> None:
-        if isinstance(average, InvalidWindow):
-            self._update(live_value="", live_note=average.reason)
+    def _show_live(self, rows: RingRows) -> None:
+        try:
+            mean, noise = _format_counts(average_counts(rows, self.state.form.gauge))
+        except NoAverageError as error:
+            self._update(live_value="", live_note=sentence(error.message))
             return
-        mean, noise = _format_counts(average)
         self._update(
             live_value=mean,
             live_note=gettext(
@@ -158,15 +155,16 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         )
 
     def _poll_reading(self) -> None:
-        average = self._averager.poll(self.state.form.gauge)
-        if isinstance(average, AveragedCounts):
-            self._add_point(average, self._dial_mm)
-        elif isinstance(average, InvalidWindow):
-            self._update(
-                reading_status="", message=Chip(gettext("Not taken. {words}", words=average.reason), Tone.BAD)
-            )
+        try:
+            average = self._averager.poll(self.state.form.gauge)
+        except NoAverageError as error:
+            text = gettext("Not taken. {words}", words=sentence(error.message))
+            self._update(reading_status="", message=Chip(text, Tone.BAD))
+            return
+        if average is not None and self._averager.is_active:
+            self._update(reading_status=moving_text(average))
         elif average is not None:
-            self._update(reading_status=average.text)
+            self._add_point(average, self._dial_mm)
 
     def _add_point(self, average: AveragedCounts, dial_mm: float) -> None:
         text = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_format_counts(average)[0])
@@ -194,21 +192,54 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             self._update(fit=None, can_save=False)
             return
         try:
-            self._submit(self._fit_task())
+            data = self._data()
         except ValueError as error:
             self._update(can_save=False, message=Chip(str(error), Tone.BAD))
-
-    def _fit_task(self) -> FitCalibration:
-        form = self.state.form
-        uncertainty_m = None
-        if form.uncertainty_mm.strip():
-            uncertainty_m = (
-                _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0) * 1e-3
-            )
-        resolution_m = _millimetres(form.resolution_mm, gettext("Resolution of the dial"), least=0.0) * 1e-3
-        return FitCalibration(
-            form.gauge, self.state.points, form.degree, resolution_m, uncertainty_m, self._file_name
+            return
+        points = data.points
+        self._worker.submit(
+            tasks.fit_calibration,
+            data,
+            done=partial(self._on_fitted, points),
+            failed=partial(self._on_fit_failed, points),
         )
+
+    def _on_fitted(self, points: tuple[CalibrationPoint, ...], fit: CalibrationFit) -> None:
+        if points == self.state.points:
+            self._update(fit=fit, can_save=True)
+
+    def _on_fit_failed(self, points: tuple[CalibrationPoint, ...], failure: TaskFailure) -> None:
+        if points == self.state.points:
+            tone = Tone.PLAIN if len(points) <= _FITTED_FROM else Tone.WARN
+            self._update(fit=None, can_save=False, message=Chip(sentence(failure.message), tone))
+
+    def _on_saved(self, files: tuple[str, str]) -> None:
+        file, previous = files
+        text = gettext("Written to {file}.", file=file)
+        if previous:
+            text += " " + gettext("The one before is kept as {file}.", file=previous)
+        offers_reconnect = self.state.form.use and self._is_connected
+        self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=offers_reconnect)
+        self._on_saved_file()
+
+    def _on_save_failed(self, failure: TaskFailure) -> None:
+        self._update(message=Chip(sentence(failure.message), Tone.BAD), can_save=True)
+
+    def _data(self) -> CalibrationData:
+        """What the form asks to fit. Raises ValueError."""
+        form, uncertainty_m = self.state.form, None
+        if form.uncertainty_mm.strip():
+            uncertainty_mm = _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0)
+            uncertainty_m = uncertainty_mm * 1e-3
+        resolution_mm = _millimetres(form.resolution_mm, gettext("Resolution of the dial"), least=0.0)
+        return CalibrationData(
+            self.state.points, form.degree, resolution_mm * 1e-3, uncertainty_m, self._file_name
+        )
+
+
+def moving_text(average: AveragedCounts) -> str:
+    creep = typeset(f"{average.creep_counts:.3g}")
+    return gettext("Still moving by {creep} counts, waiting", creep=creep)
 
 
 def _fit_options(form: CalibrationForm) -> tuple[object, ...]:
@@ -255,7 +286,3 @@ def _last_day(text: str, today: datetime.date) -> datetime.date | None:
     if day < today:
         raise ValueError(gettext("Valid until {day} is past: write a day to come", day=day))
     return day
-
-
-def _reference(form: CalibrationForm) -> str:
-    return form.reference.strip() or f"dial gauge {form.resolution_mm.strip()} mm"

@@ -3,27 +3,41 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from analysis.formatting import typeset, with_unit
-from app.acquisition.averaged_counts import AveragedCounts
+from app.acquisition.averaged_counts import AveragedCounts, NoAverageError, ReadingAverager, RecentSamples
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.recent_samples import InvalidWindow, ReadingAverager, RecentSamples
-from app.presenters.gauges.state import CONNECTION_LOST, NO_DEVICE, CheckForm, CheckKind, CheckState
-from app.presenters.gauges.tasks import CheckGauge, CheckOutcome
+from app.presenters.events import TaskFailure
+from app.presenters.gauges.calibration import moving_text
+from app.presenters.gauges.state import (
+    CONNECTION_LOST,
+    NO_DEVICE,
+    CheckForm,
+    CheckKind,
+    CheckOutcome,
+    CheckState,
+)
 from app.presenters.number_text import parse_number
 from app.presenters.results import sentence
+from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
 from messages.i18n import gettext
-from messages.message import Message
+
+if TYPE_CHECKING:
+    from app.presenters.gauges import tasks
+else:
+    tasks = LazyModule("app.presenters.gauges.tasks")
 
 
 class CheckPresenter(Presenter[CheckState]):
-    """Takes two readings: at rest, and with the known step; `submit` submits the check."""
+    """Takes two readings: at rest, and with the known step; calls `on_kept` when the outcome is recorded."""
 
-    def __init__(self, recent: RecentSamples, submit: Callable[[CheckGauge], None]) -> None:
+    def __init__(self, recent: RecentSamples, worker: Worker, on_kept: Callable[[], None]) -> None:
         super().__init__(CheckState())
         self._averager = ReadingAverager(recent)
-        self._submit = submit
+        self._worker = worker
+        self._on_kept = on_kept
         self._gauges: Gauges | None = None
         self._device = ""
         self._rest: AveragedCounts | None = None
@@ -55,25 +69,15 @@ class CheckPresenter(Presenter[CheckState]):
     def tick(self) -> None:
         if self._gauges is None:
             return
-        reading = self._averager.poll(self.state.form.gauge)
-        if isinstance(reading, AveragedCounts):
-            self._on_reading(reading)
-        elif isinstance(reading, InvalidWindow):
-            self._update(reading_status="", message=Chip(reading.reason, Tone.BAD))
-        elif reading is not None:
-            self._update(reading_status=reading.text)
-
-    def on_checked(self, task: CheckGauge, checked: CheckOutcome) -> None:
-        name = gettext("Gauge {number}", number=task.form.gauge + 1)
-        outcome = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
-        if not checked.passed:
-            outcome = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
-        remedy = () if checked.passed else (gettext("Check plugs and mounting, then calibrate it again."),)
-        self._end(EMPTY_CHIP)
-        self._update(outcome=outcome, values=checked.values, warnings=(*checked.warnings, *remedy))
-
-    def on_failed(self, message: Message) -> None:
-        self._end(Chip(sentence(message), Tone.BAD))
+        try:
+            average = self._averager.poll(self.state.form.gauge)
+        except NoAverageError as error:
+            self._update(reading_status="", message=Chip(sentence(error.message), Tone.BAD))
+            return
+        if average is not None and self._averager.is_active:
+            self._update(reading_status=moving_text(average))
+        elif average is not None:
+            self._on_reading(average)
 
     def _start(self) -> None:
         try:
@@ -93,7 +97,28 @@ class CheckPresenter(Presenter[CheckState]):
             self._update(reading_status="", instruction=_step_instruction(self.state.form))
             return
         self._update(reading_status="", instruction="")
-        self._submit(CheckGauge(self.state.form, self._rest, average, self._device))
+        self._worker.submit(
+            tasks.check_gauge,
+            self.state.form,
+            self._rest,
+            average,
+            self._device,
+            done=self._on_checked,
+            failed=self._on_failed,
+        )
+
+    def _on_checked(self, checked: CheckOutcome) -> None:
+        name = gettext("Gauge {number}", number=self.state.form.gauge + 1)
+        outcome = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
+        if not checked.passed:
+            outcome = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
+        remedy = () if checked.passed else (gettext("Check plugs and mounting, then calibrate it again."),)
+        self._end(EMPTY_CHIP)
+        self._update(outcome=outcome, values=checked.values, warnings=(*checked.warnings, *remedy))
+        self._on_kept()
+
+    def _on_failed(self, failure: TaskFailure) -> None:
+        self._end(Chip(sentence(failure.message), Tone.BAD))
 
     def _end(self, message: Chip) -> None:
         self._averager.stop()

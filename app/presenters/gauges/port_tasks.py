@@ -1,11 +1,10 @@
-"""Tasks of the tab Ports and devices, executed in its worker process, and the text about each port."""
+"""Functions of the tab Ports and devices for its worker process, and the text about each port."""
 
 from dataclasses import replace
 from functools import partial
 
 from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, ReportProgress, Tone
-from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
 from drivers.host_checks import usb_chip_name
@@ -26,22 +25,22 @@ _OUTCOMES = {
 }
 
 
-def list_port_cards(_task: ListPorts, _report: ReportProgress) -> tuple[PortCard, ...]:
+def list_port_cards() -> tuple[PortCard, ...]:
     """List the ports of this computer without opening them."""
     return tuple(listed_port(port) for port in list_ports())
 
 
-def probe_ports(task: ProbePorts, report: ReportProgress) -> tuple[PortCard, ...]:
-    """Probe one port after another."""
+def probe_ports(query_silent: bool, connected: str, report: ReportProgress) -> tuple[PortCard, ...]:
+    """Probe all ports but `connected`; with `query_silent`, send requests to silent devices."""
     present = list_ports()
     cards = []
     for number, port in enumerate(present):
-        if port.device == task.connected:
+        if port.device == connected:
             cards.append(listed_port(port, Chip(gettext("connected here"), Tone.OK)))
             continue
         tell = partial(_report_step, report, port.device, number / len(present))
         tell(message("looking"))
-        cards.append(probed_port(probe_port(port, task.query_silent, tell)))
+        cards.append(probed_port(probe_port(port, query_silent, tell)))
     return tuple(cards)
 
 

@@ -1,38 +1,26 @@
 """Presenter of the tab Ports and devices: lists the serial ports, and probes them on request."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.events import TaskFailure
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
-from app.presenters.worker import EventWorker, LazyFunction
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext
 
-LIST_PORTS: Final = LazyFunction("app.presenters.gauges.port_tasks", "list_port_cards")
-PROBE_PORTS: Final = LazyFunction("app.presenters.gauges.port_tasks", "probe_ports")
-
-
-@dataclass(frozen=True, slots=True)
-class ListPorts:
-    """List the ports without opening them."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProbePorts:
-    """Probe all ports but `connected`; with `query_silent`, send requests to silent devices."""
-
-    query_silent: bool
-    connected: str
+if TYPE_CHECKING:
+    from app.presenters.gauges import port_tasks
+else:
+    port_tasks = LazyModule("app.presenters.gauges.port_tasks")
 
 
 class PortsPresenter(Presenter[PortsState]):
     """Runs one probe at a time, in a worker of its own: cancelling a probe ends its process."""
 
-    def __init__(self, worker: EventWorker, navigator: Navigator) -> None:
+    def __init__(self, worker: Worker, navigator: Navigator) -> None:
         super().__init__(PortsState())
         self._worker = worker
         self._navigator = navigator
@@ -45,13 +33,20 @@ class PortsPresenter(Presenter[PortsState]):
 
     def list_ports(self) -> None:
         if not self._is_probing:
-            self._worker.submit(LIST_PORTS, ListPorts())
+            self._worker.submit(port_tasks.list_port_cards, done=self._on_listed)
 
     def probe(self) -> None:
         if not self._is_probing:
             self._is_probing = True
             self._update(progress=gettext("Looking at the ports"), message=EMPTY_CHIP)
-            self._worker.submit(PROBE_PORTS, ProbePorts(self.state.query_silent, self.connected_url))
+            self._worker.submit(
+                port_tasks.probe_ports,
+                self.state.query_silent,
+                self.connected_url,
+                done=self._on_probed,
+                failed=self._on_failed,
+                progress=self._on_progress,
+            )
 
     def cancel(self) -> None:
         if self._is_probing:
@@ -65,26 +60,26 @@ class PortsPresenter(Presenter[PortsState]):
     def fill_second_port(self, url: str) -> None:
         self._navigator.fill_second_port(url)
 
-    def poll(self) -> None:
-        """Process the worker's events."""
-        for event in self._worker.poll():
-            self._on_event(event)
+    def tick(self) -> None:
+        self._worker.poll()
 
     def close(self) -> None:
         self._worker.close()
 
-    def _on_event(self, event: WorkerEvent) -> None:
-        if isinstance(event, TaskProgress):
-            self._update(progress=event.progress.text)
-        elif isinstance(event, TaskFailed):
-            cancelled = Chip(gettext("Given up"))
-            self._end(cancelled if event.is_cancelled else Chip(sentence(event.message), Tone.BAD))
-        elif isinstance(event.argument, ListPorts):
-            self._update(ports=_with_known_devices(event.answer, self.state.ports))
-        else:
-            self._update(ports=event.answer)
-            none = Chip(gettext("No serial port found. Plug the amplifier in"), Tone.WARN)
-            self._end(EMPTY_CHIP if event.answer else none)
+    def _on_progress(self, progress: Progress) -> None:
+        self._update(progress=progress.text)
+
+    def _on_failed(self, failure: TaskFailure) -> None:
+        cancelled = Chip(gettext("Given up"))
+        self._end(cancelled if failure.is_cancelled else Chip(sentence(failure.message), Tone.BAD))
+
+    def _on_listed(self, ports: tuple[PortCard, ...]) -> None:
+        self._update(ports=_with_known_devices(ports, self.state.ports))
+
+    def _on_probed(self, ports: tuple[PortCard, ...]) -> None:
+        self._update(ports=ports)
+        none = Chip(gettext("No serial port found. Plug the amplifier in"), Tone.WARN)
+        self._end(EMPTY_CHIP if ports else none)
 
     def _end(self, message: Chip) -> None:
         self._is_probing = False

@@ -1,35 +1,33 @@
 """Presenter of the Gauges screen: calibrations in use, gauge health, presenters of the tabs."""
 
 import datetime
-from collections.abc import Callable
-from typing import Any, Final
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Final
 
+from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.formatting import format_signed, typeset, with_unit
+from app.acquisition.averaged_counts import WINDOW_S, RecentSamples
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.events import TaskDone, TaskFailed, WorkerEvent
+from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
+from app.presenters.events import TaskFailure
 from app.presenters.gauges.calibration import CalibrationPresenter
-from app.presenters.gauges.cards import gauge_cards
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter
-from app.presenters.gauges.recent_samples import WINDOW_S, RecentSamples
-from app.presenters.gauges.state import GaugesState, GaugesTab
-from app.presenters.gauges.tasks import (
-    EXECUTE,
-    ActiveCalibrations,
-    CheckGauge,
-    FitCalibration,
-    GaugesTask,
-    LoadCalibrations,
-    MeasureHealth,
-    SaveCalibration,
-)
+from app.presenters.gauges.state import NAMES, ActiveCalibrations, GaugeCard, GaugesState, GaugesTab
 from app.presenters.navigator import Navigator
+from app.presenters.number_text import format_in
 from app.presenters.results import sentence
-from app.presenters.worker import EventWorker
-from config.schema import GaugeChecks, Gauges
-from messages.i18n import N_, gettext
-from messages.message import Message
+from app.presenters.worker import LazyModule, Worker
+from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
+from messages.i18n import N_, gettext, ngettext
+
+if TYPE_CHECKING:
+    from app.presenters.gauge_health import GaugeHealthState
+    from app.presenters.gauges import tasks
+else:
+    tasks = LazyModule("app.presenters.gauges.tasks")
 
 HEALTH_S: Final = 5.0
 """Length of the samples that health is measured from: resolves hum to 0.2 Hz and drift to minutes."""
@@ -49,8 +47,8 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def __init__(
         self,
-        worker: EventWorker,
-        port_worker: EventWorker,
+        worker: Worker,
+        port_worker: Worker,
         gauges: Gauges,
         navigator: Navigator,
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
@@ -63,8 +61,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._now = now
         self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
         self.ports = PortsPresenter(port_worker, navigator)
-        self.calibration = CalibrationPresenter(self._recent, self._submit, now)
-        self.check = CheckPresenter(self._recent, self._submit)
+        self.calibration = CalibrationPresenter(self._recent, worker, now, self._load_calibrations)
+        self.check = CheckPresenter(self._recent, worker, self._load_calibrations)
         self._stream_gauges: Gauges | None = None
         self._rate_hz = 0.0
         self._is_shown = False
@@ -74,7 +72,7 @@ class GaugesPresenter(Presenter[GaugesState]):
     def enter(self) -> None:
         """Reload calibrations and ports: they may have changed while another screen was shown."""
         self._is_shown = True
-        self._submit(LoadCalibrations())
+        self._load_calibrations()
         self.ports.list_ports()
 
     def leave(self) -> None:
@@ -108,9 +106,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._recent.append(rows)
 
     def tick(self) -> None:
-        for event in self._worker.poll():
-            self._on_event(event)
-        self.ports.poll()
+        self._worker.poll()
+        self.ports.tick()
         now_s = self._recent.end_s
         is_reading = self.calibration.state.reading_status or self.check.state.reading_status
         if (self._is_shown or is_reading) and now_s - self._live_s >= _LIVE_EVERY_S:
@@ -124,53 +121,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._worker.close()
         self.ports.close()
 
-    def _submit(self, task: GaugesTask) -> None:
-        self._worker.submit(EXECUTE, task)
-
-    def _measure_health(self, now_s: float) -> None:
-        if self._is_measuring or self._stream_gauges is None or now_s - self._measured_s < HEALTH_EVERY_S:
-            return
-        rows = self._recent.since(now_s - HEALTH_S)
-        if rows is not None and self._recent.length_s >= _LEAST_S:
-            self._is_measuring, self._measured_s = True, now_s
-            self._submit(MeasureHealth(rows, self._rate_hz, self._stream_gauges))
-
-    def _on_event(self, event: WorkerEvent) -> None:
-        if isinstance(event, TaskFailed):
-            self._on_failed(event.argument, event.message)
-        elif isinstance(event, TaskDone):
-            self._on_done(event)
-
-    def _on_failed(self, task: Any, message: Message) -> None:
-        match task:
-            case FitCalibration() | SaveCalibration():
-                self.calibration.on_failed(task, message)
-            case CheckGauge():
-                self.check.on_failed(message)
-            case MeasureHealth():
-                self._is_measuring = False
-                if self._stream_gauges is task.gauges:
-                    self._update(health=(), health_note=sentence(message))
-            case LoadCalibrations():
-                self._update(checks_fault=Chip(sentence(message), Tone.BAD))
-
-    def _on_done(self, event: TaskDone[Any]) -> None:
-        task, answer = event.argument, event.answer
-        match task:
-            case LoadCalibrations():
-                self._on_loaded(answer)
-            case MeasureHealth():
-                self._is_measuring = False
-                if self._stream_gauges is task.gauges:
-                    self._update(health=answer)
-            case FitCalibration():
-                self.calibration.on_fitted(task, answer)
-            case SaveCalibration():
-                self.calibration.on_saved(answer)
-                self._submit(LoadCalibrations())
-            case CheckGauge():
-                self.check.on_checked(task, answer)
-                self._submit(LoadCalibrations())
+    def _load_calibrations(self) -> None:
+        self._worker.submit(tasks.load_calibrations, done=self._on_loaded, failed=self._on_load_failed)
 
     def _on_loaded(self, loaded: ActiveCalibrations) -> None:
         if loaded.gauges != self._gauges:
@@ -179,3 +131,119 @@ class GaugesPresenter(Presenter[GaugesState]):
         fault = Chip(sentence(loaded.checks_fault), Tone.BAD) if loaded.checks_fault else EMPTY_CHIP
         cards = gauge_cards(loaded.gauges, loaded.checks, self._now().date())
         self._update(cards=cards, file=loaded.file, checks_fault=fault)
+
+    def _on_load_failed(self, failure: TaskFailure) -> None:
+        self._update(checks_fault=Chip(sentence(failure.message), Tone.BAD))
+
+    def _measure_health(self, now_s: float) -> None:
+        gauges = self._stream_gauges
+        if self._is_measuring or gauges is None or now_s - self._measured_s < HEALTH_EVERY_S:
+            return
+        rows = self._recent.since(now_s - HEALTH_S)
+        if rows is not None and self._recent.length_s >= _LEAST_S:
+            self._is_measuring, self._measured_s = True, now_s
+            self._worker.submit(
+                tasks.measure_gauges,
+                rows,
+                self._rate_hz,
+                gauges,
+                done=partial(self._on_measured, gauges),
+                failed=partial(self._on_measure_failed, gauges),
+            )
+
+    def _on_measured(self, gauges: Gauges, health: "tuple[GaugeHealthState, ...]") -> None:
+        self._is_measuring = False
+        if self._stream_gauges is gauges:
+            self._update(health=health)
+
+    def _on_measure_failed(self, gauges: Gauges, failure: TaskFailure) -> None:
+        self._is_measuring = False
+        if self._stream_gauges is gauges:
+            self._update(health=(), health_note=sentence(failure.message))
+
+
+_SOON: Final = datetime.timedelta(days=30)
+"""Time that a laboratory usually needs to arrange a calibration."""
+
+
+def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
+    """Cards of both gauges, gauge 1 first."""
+    last = {check.gauge: check for check in checks.latest_checks(gauges)}
+    used = ((gauges.table, last.get("table")), (gauges.relative, last.get("relative")))
+    return tuple(
+        GaugeCard(gettext(name), _validity(gauge, today), tuple(_values(gauge)), _last_check_chip(check))
+        for name, (gauge, check) in zip(NAMES, used, strict=True)
+    )
+
+
+def _validity(gauge: Gauge, today: datetime.date) -> Chip:
+    """Whether a calibration is valid on a day."""
+    until = gauge.valid_until
+    if until is None:
+        return Chip(
+            gettext("No expiry date stated"),
+            Tone.PLAIN,
+            gettext("Whoever calibrates next should say until when it holds"),
+        )
+    if gauge.is_expired(today):
+        return Chip(
+            gettext("EXPIRED on {until}", until=until),
+            Tone.BAD,
+            gettext("Calibrate the gauge before the next test"),
+        )
+    days = (until - today).days
+    if until - today <= _SOON:
+        left = gettext("Expires today")
+        if days:
+            left = ngettext("Expires in {count} day", "Expires in {count} days", days)
+        return Chip(left, Tone.WARN, gettext("Calibrate the gauge soon"))
+    return Chip(gettext("Valid until {until}", until=until), Tone.OK)
+
+
+def _last_check_chip(check: GaugeCheck | None) -> Chip:
+    """Outcome of the last check of the calibration in use."""
+    if check is None:
+        return Chip(
+            gettext("Not checked yet"),
+            Tone.PLAIN,
+            gettext("Check it before a test: the tab Check, or slipstand calibrate check"),
+        )
+    off = typeset(format_signed(MICROMETRE.scale * check.deviation_m, 0))
+    reference_kind = gettext("Known shunt") if check.kind == "shunt" else gettext("Known displacement")
+    text = gettext(
+        "{time}: {off} at {known}, {allowed} allowed",
+        time=f"{check.at:%Y-%m-%d %H:%M}",
+        off=with_unit(off, MICROMETRE.symbol),
+        known=format_in(MILLIMETRE, check.expected_m, 3),
+        allowed=format_in(MICROMETRE, check.tolerance_m, 0),
+    )
+    by = f"{reference_kind}. {check.reference} {check.checked_by}".strip()
+    if check.passed:
+        return Chip(gettext("Check passed {words}", words=text), Tone.OK, by)
+    return Chip(
+        gettext("Check FAILED {words}", words=text),
+        Tone.BAD,
+        gettext("{by}. Check plugs and mounting, then calibrate again", by=by),
+    )
+
+
+def _values(gauge: Gauge) -> Iterator[LabelledValue]:
+    relative, range_m = gauge.gain_relative_standard_uncertainty, gauge.range_m
+    polynomial = ", ".join(typeset(f"{term:.3g}") for term in gauge.polynomial)
+    linearity = "" if gauge.nonlinearity_m is None else format_in(MICROMETRE, gauge.nonlinearity_m)
+    gain, unit = MICROMETRE.scale * gauge.gain_m_per_count, f"{MICROMETRE.symbol}/count"
+    values = {
+        gettext("gain"): with_unit(typeset(f"{gain:.6g}"), unit),
+        gettext("gain uncertainty"): "" if relative is None else with_unit(f"{100 * relative:.2f}", "%"),
+        gettext("zero"): with_unit(typeset(f"{gauge.zero_count:.9g}"), "counts"),
+        **({gettext("polynomial"): polynomial} if polynomial else {}),
+        gettext("range"): "" if range_m is None else with_unit(f"± {1e3 * range_m:g}", MILLIMETRE.symbol),
+        **({gettext("non-linearity"): linearity} if linearity else {}),
+        gettext("calibrated"): gauge.date.isoformat() if gauge.date else "",
+        gettext("by"): gauge.calibrated_by,
+        gettext("reference"): gauge.reference,
+        gettext("certificate"): gauge.certificate,
+        gettext("serial number"): gauge.serial_number,
+    }
+    for label, value in values.items():
+        yield LabelledValue(label, value or gettext("not stated"))

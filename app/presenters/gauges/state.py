@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue
 from app.presenters.navigator import ConnectForm
+from config.schema import GaugeChecks, Gauges
 from messages.i18n import N_
 
 if TYPE_CHECKING:  # its import loads `analysis`, which the window does without until it has started
@@ -61,6 +62,16 @@ class GaugesState:
 
 
 @dataclass(frozen=True, slots=True)
+class ActiveCalibrations:
+    """The calibrations in use, their checks and their file; `checks_fault` if the checks cannot be read."""
+
+    gauges: Gauges
+    checks: GaugeChecks
+    file: str
+    checks_fault: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class PortCard:
     """A serial port of this computer."""
 
@@ -109,6 +120,21 @@ class CalibrationPoint:
 
     counts: float
     dial_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationData:
+    """What a calibration is fitted to, and how."""
+
+    points: tuple[CalibrationPoint, ...]
+    """In the order in which they were taken."""
+    degree: int
+    resolution_m: float
+    """Of the dial gauge."""
+    uncertainty_m: float | None
+    """Of the dial gauge; None where it is not stated."""
+    file_name: str
+    """File of the points, in the folder of settings."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -163,6 +189,16 @@ class CheckForm:
     uncertainty: str = ""
     reference: str = ""
     checked_by: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckOutcome:
+    """Outcome of a check, and the file in which it is recorded."""
+
+    passed: bool
+    values: tuple[LabelledValue, ...]
+    warnings: tuple[str, ...]
+    file: str
 
 
 @dataclass(frozen=True, slots=True)

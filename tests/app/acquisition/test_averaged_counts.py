@@ -48,7 +48,7 @@ def noise(index: np.ndarray) -> np.ndarray:
 
 def test_noise_is_averaged() -> None:
     with CountAverager(MadeUp(noise), 1) as still:
-        average = still.average(1.0)
+        average = still.steady_average(1.0)
     assert average.samples >= 1000
     assert average.counts == pytest.approx(1000.0, abs=0.6)
     assert average.noise_counts == pytest.approx(4.0, rel=0.15)
@@ -71,14 +71,14 @@ def test_an_overloaded_gauge_gives_no_average() -> None:
         CountAverager(MadeUp(noise, status), 1) as still,
         pytest.raises(NoAverageError, match="gauge 2 is over"),
     ):
-        still.average(0.1)
+        still.steady_average(0.1)
     with CountAverager(MadeUp(noise, status), 0) as still:
-        assert still.average(0.1).counts == 7.0
+        assert still.steady_average(0.1).counts == 7.0
 
 
 def test_the_end_of_the_stream_is_heard_of() -> None:
     with CountAverager(Broken(noise), 1) as still, pytest.raises(StreamEndedError, match="port gone"):
-        still.average(0.1)
+        still.steady_average(0.1)
 
 
 def test_noise_alone_is_hardly_ever_taken_for_motion() -> None:

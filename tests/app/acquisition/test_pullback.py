@@ -11,13 +11,13 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 from app.acquisition.messages import EndReason
 from app.acquisition.messages import PullbackState as State
 from app.acquisition.pullback.free_motion import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
+from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.acquisition.pullback.state_machine import (
     ALREADY_PULLED_NOTE,
     NO_READING_NOTE,
     NOT_HELD_NOTE,
     RESTLESS_NOTE,
 )
-from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.simulated_stand.options import Timetable
 from config.files import load_stand, published_table
 

@@ -9,7 +9,6 @@ import pytest
 from app.presenters.base import Progress, Tone
 from app.presenters.gauges import port_tasks
 from app.presenters.gauges.port_tasks import list_port_cards, listed_port, probe_ports, probed_port
-from app.presenters.gauges.ports import ListPorts, ProbePorts
 from app.presenters.start_screen import port_settings
 from drivers.host_checks import PortHint
 from drivers.port import PortInfo, PortUser
@@ -104,7 +103,7 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
     sender = threading.Thread(target=send)
     sender.start()
     try:
-        cards = probe_ports(ProbePorts(query_silent=False, connected="COM7"), told.append)
+        cards = probe_ports(False, "COM7", told.append)
     finally:
         ended.set()
         sender.join()
@@ -113,4 +112,4 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
     assert cards[0].suggested_form.protocol == "csv"
     assert "listening" in told[-1].text
     assert cards[1].status.text == "connected here"
-    assert [card.url for card in list_port_cards(ListPorts(), told.append)] == [terminal.url, "COM7"]
+    assert [card.url for card in list_port_cards()] == [terminal.url, "COM7"]

@@ -8,35 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 from ring_kit import ring_rows
-from stage import FakeWorker
+from stage import Call, FakeWorker
 
+from app.acquisition.averaged_counts import MAX_WINDOWS, NoAverageError, RecentSamples, average_counts
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import Progress, Tone
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress
-from app.presenters.gauges.cards import gauge_cards
-from app.presenters.gauges.ports import ListPorts, ProbePorts
-from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.recent_samples import (
-    MAX_WINDOWS,
-    InvalidWindow,
-    RecentSamples,
-    average_counts,
-)
-from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, GaugesTab, PortCard
-from app.presenters.gauges.tasks import (
+from app.presenters.gauges.presenter import GaugesPresenter, gauge_cards
+from app.presenters.gauges.state import (
+    NO_DEVICE,
     ActiveCalibrations,
-    CheckGauge,
-    FitCalibration,
-    GaugesTask,
-    LoadCalibrations,
-    MeasureHealth,
-    SaveCalibration,
-    SavedCalibration,
+    CheckForm,
+    GaugesState,
+    GaugesTab,
+    PortCard,
 )
-from app.presenters.gauges.work import execute
 from app.presenters.navigator import ConnectForm
-from app.presenters.worker import CANCELLED
 from config.files import load_checks, load_gauges
 from config.schema import GaugeCheck, GaugeChecks, Gauges
 from drivers.samples import SampleStatus
@@ -85,8 +72,12 @@ class Desk:
         return self.presenter.state
 
     @property
-    def asked(self) -> list[Any]:
-        return [argument for _, argument in self.worker.submitted]
+    def asked(self) -> list[str]:
+        return [call.name for call in self.worker.calls]
+
+    @property
+    def last(self) -> Call:
+        return self.worker.calls[-1]
 
     def connect(self) -> None:
         self.presenter.on_connecting("COM7")
@@ -99,19 +90,15 @@ class Desk:
             self.now_s += 0.1
             self.presenter.tick()
 
-    def hear(self, news: object, prober: bool = False) -> None:
-        (self.prober if prober else self.worker).news = [news]
-        self.presenter.tick()
-
     def work(self) -> None:
         """Do for real what was asked for last."""
-        task: GaugesTask = self.asked[-1]
+        call = self.last
         try:
-            answer = execute(task, lambda _: None)
+            answer = call.function(*call.arguments)
         except Exception as error:
-            self.hear(TaskFailed(task, str(error)))
+            call.fail(str(error))
         else:
-            self.hear(TaskDone(task, answer))
+            call.done(answer)
 
 
 @pytest.fixture(autouse=True)
@@ -159,14 +146,9 @@ def test_the_last_check_of_the_calibration_in_use_is_told() -> None:
 
 def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None:
     desk.presenter.enter()
-    assert desk.asked == [LoadCalibrations()]
+    assert desk.asked == ["load_calibrations"]
     other = GAUGES.replace(table=GAUGES.table.replace(calibrated_by="A. Berger"))
-    desk.hear(
-        TaskDone(
-            LoadCalibrations(),
-            ActiveCalibrations(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key"),
-        )
-    )
+    desk.last.done(ActiveCalibrations(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key"))
     assert "A. Berger" in [fact.value for fact in desk.state.cards[0].values]
     assert desk.went == [other], "Record takes them too"
     assert desk.state.checks_fault.tone is Tone.BAD
@@ -188,7 +170,7 @@ def test_live_samples_are_judged_while_the_screen_is_seen(desk: Desk) -> None:
     assert desk.asked == []
     desk.presenter.enter()
     desk.pass_time(0.2)
-    assert isinstance(desk.asked[-1], MeasureHealth)
+    assert desk.asked[-1] == "measure_gauges"
     desk.pass_time(3.0)
     assert len(desk.asked) == 2, "one look at a time"
     desk.work()
@@ -205,9 +187,9 @@ def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
     desk.presenter.enter()
     desk.connect()
     desk.pass_time(2.0)
-    task = desk.asked[-1]
+    assert desk.asked[-1] == "measure_gauges"
     desk.presenter.on_disconnected()
-    desk.hear(TaskDone(task, execute(task, lambda _: None)))
+    desk.work()
     assert desk.state.health == ()
 
 
@@ -216,24 +198,24 @@ def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
 
 def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) -> None:
     desk.presenter.enter()
-    assert [task for _, task in desk.prober.submitted] == [ListPorts()]
+    (listing,) = desk.prober.calls
+    assert listing.name == "list_port_cards"
     desk.presenter.ports.probe()
     desk.presenter.ports.set_query_silent(True)
     desk.presenter.ports.probe()
-    assert desk.prober.submitted[-1][1] == ProbePorts(query_silent=False, connected="")
-    assert len(desk.prober.submitted) == 2, "one look at a time"
-    task = desk.prober.submitted[-1][1]
-    desk.hear(TaskProgress(task, Progress("COM7: listening at 9600 baud")), prober=True)
+    _, probe = desk.prober.calls  # one look at a time
+    assert (probe.name, probe.arguments) == ("probe_ports", (False, ""))
+    probe.progress(Progress("COM7: listening at 9600 baud"))
     assert desk.presenter.ports.state.progress == "COM7: listening at 9600 baud"
     form = ConnectForm("COM7", "csv", "9600", settings="columns=time_us,value,value")
     cards = (PortCard("COM7", suggested_form=form), PortCard("COM8"))
-    desk.hear(TaskDone(task, cards), prober=True)
+    probe.done(cards)
     assert desk.presenter.ports.state.ports == cards
     desk.presenter.ports.fill_port("COM8")
     desk.presenter.ports.fill_port("COM7")
     assert desk.went == [form]
     desk.presenter.enter()
-    desk.hear(TaskDone(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
+    desk.prober.calls[-1].done((PortCard("COM7"), PortCard("COM9")))
     assert desk.presenter.ports.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
 
 
@@ -241,7 +223,7 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
     desk.presenter.ports.probe()
     desk.presenter.ports.cancel()
     assert desk.prober.cancelled == 1
-    desk.hear(TaskFailed(desk.prober.submitted[-1][1], CANCELLED, is_cancelled=True), prober=True)
+    desk.prober.calls[-1].cancel()
     assert desk.presenter.ports.state.progress == ""
     assert desk.presenter.ports.state.message.text == "Given up"
 
@@ -251,7 +233,6 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
 
 def test_counts_are_what_the_device_has_sent() -> None:
     seen = average_counts(rows(0.0, 1.0), 1)
-    assert not isinstance(seen, InvalidWindow)
     gauge = GAUGES.relative
     assert seen.counts == pytest.approx(1e-3 / gauge.gain_m_per_count + gauge.zero_count, abs=200.0)
 
@@ -266,8 +247,9 @@ def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
     assert newest.time_s[0] == 5.5
     assert newest.first_index == 2750
     clipped = rows(0.0, 1.0, status=int(SampleStatus.OVERLOAD_TABLE))
-    assert isinstance(average_counts(clipped, 0), InvalidWindow)
-    assert not isinstance(average_counts(clipped, 1), InvalidWindow)
+    with pytest.raises(NoAverageError, match="gauge 1 is overloaded"):
+        average_counts(clipped, 0)
+    assert average_counts(clipped, 1).samples == RATE_HZ
 
 
 # --- calibrating ---
@@ -316,8 +298,7 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
     assert "is past" in desk.presenter.calibration.state.message.text
     desk.presenter.calibration.set_form(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
     desk.presenter.calibration.save()
-    saving = desk.asked[-1]
-    assert isinstance(saving, SaveCalibration)
+    assert desk.asked[-1] == "save_calibration"
     desk.work()
     used = load_gauges(settings / "gauges.toml")
     assert used.table.gain_m_per_count == pytest.approx(GAUGES.table.gain_m_per_count / 1.01, rel=1e-4)
@@ -386,8 +367,8 @@ def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) ->
     calibrate_by_hand(desk, [0.0])
     form = desk.presenter.calibration.state.form
     desk.presenter.calibration.set_form(replace(form, degree=2, uncertainty_mm="0,002"))
-    fit = desk.asked[-1]
-    assert isinstance(fit, FitCalibration)
+    assert desk.asked[-1] == "fit_calibration"
+    (fit,) = desk.last.arguments
     assert fit.degree == 2
     assert fit.uncertainty_m == pytest.approx(2e-6)
     desk.presenter.calibration.set_form(replace(form, resolution_mm="fine"))
@@ -395,10 +376,13 @@ def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) ->
 
 
 def test_what_went_wrong_while_saving_is_said(desk: Desk) -> None:
-    task = SaveCalibration(FitCalibration(0, (), 1, 1e-5, None, ""), True, NOW.date())
-    desk.hear(TaskFailed(task, "gauges.toml: cannot be written (no space left)"))
+    desk.connect()
+    calibrate_by_hand(desk, [0.0, 2.5, 5.0])
+    desk.presenter.calibration.save()
+    desk.last.fail("gauges.toml: cannot be written (no space left)")
     assert desk.presenter.calibration.state.message.tone is Tone.BAD
-    desk.hear(TaskDone(task, SavedCalibration("new.toml", "old.toml")))
+    desk.presenter.calibration.save()
+    desk.last.done(("new.toml", "old.toml"))
     assert "old.toml" in desk.presenter.calibration.state.message.text
 
 
@@ -431,7 +415,7 @@ def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
     assert "+10" in desk.presenter.check.state.instruction
     desk.presenter.check.advance()
     desk.pass_time(1.5, table_m=1e-3 + moved_m)
-    assert isinstance(desk.asked[-1], CheckGauge)
+    assert desk.asked[-1] == "check_gauge"
     desk.work()
 
 
@@ -448,7 +432,7 @@ def test_a_gauge_is_checked_and_the_verdict_kept(desk: Desk, moved_m: float, pas
     assert (kept.gauge, kept.passed, kept.reference) == ("table", passed, "gauge block")
     assert kept.device == "GSV-8"
     assert kept.measured_m == pytest.approx(moved_m, abs=1e-6)
-    assert isinstance(desk.asked[-1], LoadCalibrations), "the cards tell it too"
+    assert desk.asked[-1] == "load_calibrations", "the cards tell it too"
     assert not check.is_started
 
 

@@ -16,12 +16,16 @@ from stage import FakeWorker
 from analysis.gauge_health import HealthGrade
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, LabelledValue, Tone
-from app.presenters.events import TaskDone
 from app.presenters.gauge_health import GaugeHealthState, SymptomText
-from app.presenters.gauges.ports import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.state import CalibrationFit, CalibrationPoint, CheckState, GaugesTab, PortCard
-from app.presenters.gauges.tasks import ActiveCalibrations, FitCalibration, LoadCalibrations
+from app.presenters.gauges.state import (
+    ActiveCalibrations,
+    CalibrationFit,
+    CalibrationPoint,
+    CheckState,
+    GaugesTab,
+    PortCard,
+)
 from app.presenters.navigator import ConnectForm
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme
@@ -108,9 +112,9 @@ class Stage:
         in_use = ActiveCalibrations(
             GAUGES.replace(table=expired), GaugeChecks(), "/home/lab/config/gauges.toml"
         )
-        self.worker.news = [TaskDone(LoadCalibrations(), in_use)]
+        self.presenter.enter()
+        self.worker.calls[-1].done(in_use)
         self.connect()
-        self.presenter.tick()
         self.presenter._update(
             health=(health("Gauge 1", HealthGrade.DOUBTFUL), health("Gauge 2", HealthGrade.BAD))
         )
@@ -152,7 +156,7 @@ def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
         stage.qtbot.keyClick(stage.screen, key, Qt.KeyboardModifier.AltModifier)
         assert stage.presenter.state.tab is side
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_F5)
-    assert stage.prober.submitted[-1][1] == ProbePorts(query_silent=False, connected="")
+    assert stage.prober.calls[-1].arguments == (False, "")
 
 
 def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
@@ -164,7 +168,7 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     assert PORTS[0].suggested_form in stage.went
     stage.screen._ports._query_silent.click()
     stage.click("Look at the ports")
-    assert stage.prober.submitted[-1][1].query_silent
+    assert stage.prober.calls[-1].arguments == (True, "COM7")
     stage.click("Stop looking")
     assert stage.prober.cancelled == 1
 
@@ -212,7 +216,7 @@ def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
     stage.qtbot.keyClicks(stage.field("Its uncertainty, mm"), "0.002")
     form = stage.presenter.calibration.state.form
     assert (form.calibrated_by, form.uncertainty_mm) == ("A. Berger", "0.002")
-    assert not any(isinstance(task, FitCalibration) for _, task in stage.worker.submitted)
+    assert "fit_calibration" not in [call.name for call in stage.worker.calls]
 
 
 @pytest.mark.parametrize("side", GaugesTab)
@@ -249,13 +253,12 @@ def test_a_check_is_led_through(stage: Stage) -> None:
 
 def test_one_of_two_devices_can_be_that_of_gauge_2(stage: Stage) -> None:
     stage.presenter.set_tab(GaugesTab.PORTS)
-    stage.worker.news = []
     other = replace(PORTS[0], url="/dev/ttyUSB1")
-    stage.prober.news = [TaskDone(ProbePorts(False, ""), PORTS)]
-    stage.presenter.tick()
+    stage.presenter.ports.probe()
+    stage.prober.calls[-1].done(PORTS)
     assert "Use for gauge 2" not in stage.words(), "there is only one"
-    stage.prober.news = [TaskDone(ProbePorts(False, ""), (*PORTS, other))]
-    stage.presenter.tick()
+    stage.presenter.ports.probe()
+    stage.prober.calls[-1].done((*PORTS, other))
     (_, second) = [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Use for gauge 2"]
     second.click()
     assert stage.went == ["/dev/ttyUSB1"]
