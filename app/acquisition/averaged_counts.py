@@ -216,7 +216,8 @@ class CountAverager:
                 return average
             if not self._changed.wait(max(0.0, until_s - time.monotonic())):
                 raise NoAverageError(
-                    "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device",
+                    "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the"
+                    " device",
                     samples=self._samples,
                     window_s=window_s + TIMEOUT_S,
                 )
