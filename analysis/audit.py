@@ -1,9 +1,9 @@
 """Consistency of a published table of friction tests with itself and with the equations of motion."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Final
 
 import numpy as np
 
@@ -15,15 +15,7 @@ KILOGRAM_FORCE_N: Final = 9.80665
 FRICTION_RANGE: Final = (0.03, 0.3)
 """Range of f_d in which a residual displacement must be reachable: the range that the paper searched."""
 _POSITIVE: Final = ("plate_mass_kg", "stiffness_as_printed", "period_s", "damping_n1_per_s")
-_FIGURES: Final = (
-    *_POSITIVE,
-    "residual_displacement_m",
-    "damping_n2_per_s",
-    "friction_static",
-    "friction_dynamic",
-    "velocity_max_m_per_s",
-    "acceleration_max_m_per_s2",
-)
+"""Divisors."""
 _FRICTION_STEP: Final = 0.0005
 """Finds the extremes of the residual displacement to some micrometres."""
 _DURATION_S: Final = 30.0
@@ -34,52 +26,22 @@ class AuditError(AnalysisError, ValueError):
     """A row that cannot be checked. The message names the series."""
 
 
-class PublishedRow(Protocol):
+@dataclass(frozen=True, slots=True)
+class PublishedRow:
     """A row as printed."""
 
-    @property
-    def series(self) -> str:
-        """Series code."""
-
-    @property
-    def plate_mass_kg(self) -> float:
-        """m2."""
-
-    @property
-    def stiffness_as_printed(self) -> float:
-        """Stiffness in a unit that the print leaves open."""
-
-    @property
-    def period_s(self) -> float:
-        """T of the motion without sliding."""
-
-    @property
-    def residual_displacement_m(self) -> float:
-        """u_s."""
-
-    @property
-    def damping_n1_per_s(self) -> float:
-        """n1."""
-
-    @property
-    def damping_n2_per_s(self) -> float:
-        """n2."""
-
-    @property
-    def friction_static(self) -> float:
-        """f_s."""
-
-    @property
-    def friction_dynamic(self) -> float:
-        """f_d."""
-
-    @property
-    def velocity_max_m_per_s(self) -> float:
-        """v_max."""
-
-    @property
-    def acceleration_max_m_per_s2(self) -> float:
-        """a_max."""
+    series: str
+    plate_mass_kg: float
+    stiffness_as_printed: float
+    """In a unit that the print leaves open."""
+    period_s: float
+    residual_displacement_m: float
+    damping_n1_per_s: float
+    damping_n2_per_s: float
+    friction_static: float
+    friction_dynamic: float
+    velocity_max_m_per_s: float
+    acceleration_max_m_per_s2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,20 +63,12 @@ class AuditedRow:
 
     @property
     def flags(self) -> list[str]:
-        """Flags of the checks that failed."""
         return [check.flag for check in self.checks if check.flagged]
 
 
-@dataclass(frozen=True, slots=True)
-class AuditReport:
-    """The audited table, in its own order."""
-
-    rows: tuple[AuditedRow, ...]
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Number of rows that carry each flag, for all of `FLAGS`."""
-        return {flag: sum(flag in row.flags for row in self.rows) for flag in FLAGS}
+def count_flags(rows: Sequence[AuditedRow]) -> dict[str, int]:
+    """Number of rows that carry each flag, for all of `FLAGS`."""
+    return {flag: sum(flag in row.flags for row in rows) for flag in FLAGS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +107,7 @@ def audit(
     table_mass_kg: float,
     pullbacks_m: Mapping[str, float],
     gravity_m_per_s2: float = 9.81,
-) -> AuditReport:
+) -> list[AuditedRow]:
     """Check every row of a published table against itself and the equations of motion.
 
     A value exactly at a limit is not flagged. The flags:
@@ -177,30 +131,33 @@ def audit(
     `table_mass_kg` is m1, `gravity_m_per_s2` is g, `pullbacks_m` is u0 of each series code. Raises
     AuditError if a row describes no motion, or its pullback is not given.
     """
-    return AuditReport(tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows))
+    return [
+        _audit_row(_Case(row, table_mass_kg, _pullback(row.series, pullbacks_m), gravity_m_per_s2))
+        for row in rows
+    ]
 
 
-def _audit_row(
-    row: PublishedRow, table_mass_kg: float, pullbacks_m: Mapping[str, float], gravity_m_per_s2: float
-) -> AuditedRow:
-    if row.series not in pullbacks_m:
-        raise AuditError(
-            "series {series!r} has no pullback. Add it to the given pullbacks.", series=row.series
-        )
-    _check_figures(row)
-    case = _Case(row, table_mass_kg, pullbacks_m[row.series], gravity_m_per_s2)
+def _pullback(series: str, pullbacks_m: Mapping[str, float]) -> float:
+    if series not in pullbacks_m:
+        raise AuditError("series {series!r} has no pullback. Add it to the given pullbacks.", series=series)
+    return pullbacks_m[series]
+
+
+def _audit_row(case: _Case) -> AuditedRow:
+    _check_figures(case.row)
     try:
-        return AuditedRow(row.series, tuple(check for rule in _RULES for check in rule(case)))
+        return AuditedRow(case.row.series, tuple(_checks(case)))
     except MotionError as error:
         raise AuditError(
-            "series {series!r} describes no motion: {error}. Correct the row.", series=row.series, error=error
+            "series {series!r} describes no motion: {error}. Correct the row.",
+            series=case.row.series,
+            error=error,
         ) from error
 
 
 def _check_figures(row: PublishedRow) -> None:
     """Raise AuditError unless every value is finite, and above zero where it is a divisor."""
-    for name in _FIGURES:
-        value = getattr(row, name)
+    for name, value in list(asdict(row).items())[1:]:
         if not math.isfinite(value) or (name in _POSITIVE and value <= 0.0):
             needed = "a number above 0" if name in _POSITIVE else "a number"
             raise AuditError(
@@ -212,39 +169,25 @@ def _check_figures(row: PublishedRow) -> None:
             )
 
 
-def _stiffness(case: _Case) -> Iterator[AuditCheck]:
+def _checks(case: _Case) -> Iterator[AuditCheck]:
+    """All checks, in the order of `FLAGS`."""
+    row, omega = case.row, 2.0 * math.pi / case.row.period_s
     for unit, newtons in (("n", 1.0), ("kgf", KILOGRAM_FORCE_N)):
-        expected_s = 2.0 * math.pi * math.sqrt(case.mass_kg / (case.row.stiffness_as_printed * newtons))
-        yield _relative_check(f"stiffness_{unit}_per_m", case.row.period_s, expected_s)
-
-
-def _damping(case: _Case) -> Iterator[AuditCheck]:
-    ratio = case.row.damping_n2_per_s / case.row.damping_n1_per_s
+        expected_s = 2.0 * math.pi * math.sqrt(case.mass_kg / (row.stiffness_as_printed * newtons))
+        yield _relative_check(f"stiffness_{unit}_per_m", row.period_s, expected_s)
+    ratio = row.damping_n2_per_s / row.damping_n1_per_s
     yield _relative_check("damping", ratio, case.mass_kg / case.table_mass_kg)
 
-
-def _velocity(case: _Case) -> Iterator[AuditCheck]:
-    printed = case.row.velocity_max_m_per_s
-    expected = case.pullback_m * 2.0 * math.pi / case.row.period_s
+    printed, expected = row.velocity_max_m_per_s, case.pullback_m * omega
     yield AuditCheck("velocity", printed > 1.10 * expected, printed, expected)
-
-
-def _acceleration(case: _Case) -> Iterator[AuditCheck]:
-    printed = case.row.acceleration_max_m_per_s2
-    expected = case.motion(case.row.friction_dynamic).table_acceleration_max_m_per_s2
+    motion = case.motion(row.friction_dynamic)
+    printed, expected = row.acceleration_max_m_per_s2, motion.table_acceleration_max_m_per_s2
     yield AuditCheck("acceleration", printed > 1.15 * expected, printed, expected)
-
-
-def _breakaway(case: _Case) -> Iterator[AuditCheck]:
-    k1_squared = (2.0 * math.pi / case.row.period_s) ** 2 + case.row.damping_n1_per_s**2
-    needed = case.row.friction_static * case.gravity_m_per_s2
-    reached = k1_squared * case.pullback_m
+    needed = row.friction_static * case.gravity_m_per_s2
+    reached = (omega**2 + row.damping_n1_per_s**2) * case.pullback_m
     yield AuditCheck("breakaway", reached < needed, needed, reached)
 
-
-def _residual(case: _Case) -> Iterator[AuditCheck]:
-    printed = case.row.residual_displacement_m
-    expected = case.motion(case.row.friction_dynamic).residual_displacement_m
+    printed, expected = row.residual_displacement_m, motion.residual_displacement_m
     for limit_mm in (1, 2):
         within = abs(printed - expected) <= 1e-3 * limit_mm
         yield AuditCheck(f"residual_within_{limit_mm}_mm", within, printed, expected)
@@ -259,14 +202,6 @@ def _relative_check(flag: str, printed: float, expected: float) -> AuditCheck:
     return AuditCheck(flag, abs(printed / expected - 1.0) > 0.05, printed, expected)
 
 
-_RULES: Final[tuple[Callable[[_Case], Iterator[AuditCheck]], ...]] = (
-    _stiffness,
-    _damping,
-    _velocity,
-    _acceleration,
-    _breakaway,
-    _residual,
-)
 FLAGS: Final = (
     "stiffness_n_per_m",
     "stiffness_kgf_per_m",

@@ -85,7 +85,6 @@ class Unit:
 
     @property
     def in_latex(self) -> str:
-        """Unit in LaTeX."""
         return self.latex or self.symbol
 
     def number(self, value: float, decimals: int) -> str:
@@ -97,7 +96,6 @@ class Unit:
         return f"{self.number(value, decimals)} {self.symbol}"
 
     def labelled(self, name: str) -> str:
-        """Label of an axis or column: `residual (µm)`."""
         return f"{name} ({self.symbol})"
 
 

@@ -43,7 +43,6 @@ class GaugeSamples:
     displacement_m: Floats
     """(n,) float64: by its calibration (m); NaN where a sample is missing or damaged."""
     overloaded: NDArray[np.bool_]
-    """(n,) bool: flagged by the device."""
     rate_hz: float
     range_m: float | None = None
     """It reads from -range_m to range_m."""
@@ -73,15 +72,12 @@ class GaugeHealth:
     """Looked at, absent ones included."""
     duration_s: float
     mean_m: float
-    """Where the gauge stands."""
     noise_rms_m: float
     """Standard deviation of a sample about a straight line, without the hum but with the swing."""
     drift_m_per_min: float
-    """Slope of that line."""
     drift_standard_uncertainty_m_per_min: float
     """From the scatter of ten means."""
     hum: tuple[Hum, ...]
-    """At 50 and 60 Hz."""
     oscillation_amplitude_m: float
     """Of the strongest line below 25 Hz if it is most of the signal (the table moves), otherwise 0."""
     resolution_m: float
@@ -92,9 +88,7 @@ class GaugeHealth:
     range_m: float | None
     """Of the gauge, to either side."""
     missing_fraction: float
-    """Fraction of the samples that are missing or damaged."""
     overload_fraction: float
-    """Fraction that the device flagged."""
     clipped_fraction: float
     """Fraction at the very largest or smallest reading."""
     repeated_fraction: float
@@ -212,7 +206,6 @@ def _oscillation(spectrum: Spectrum) -> float:
 
 
 def _clipped_fraction(x: Floats) -> float:
-    """Share of readings at the largest or the smallest value, where either is met more than twice."""
     at_ends = [int(np.count_nonzero(x == end)) for end in (x.max(), x.min())]
     return sum(count for count in at_ends if count > 2) / len(x)
 
@@ -254,10 +247,8 @@ class Symptom:
     """A fault of a gauge at rest."""
 
     code: str
-    """Stable name, for programs."""
     grade: HealthGrade
     message: Message
-    """What is wrong, and what to do."""
     remedy: Message
 
 
@@ -288,7 +279,6 @@ def diagnose(health: GaugeHealth) -> tuple[Symptom, ...]:
 
 
 def _signal_faults(health: GaugeHealth) -> Iterator[Symptom]:
-    """Yield faults that suppress or falsify readings."""
     if health.missing_fraction > _MISSING[0]:
         yield Symptom(
             "absent",
@@ -328,7 +318,6 @@ def _signal_faults(health: GaugeHealth) -> Iterator[Symptom]:
 
 
 def _dead_channel(health: GaugeHealth) -> Iterator[Symptom]:
-    """Yield signs that no gauge is connected."""
     if health.distinct_values == 1:
         yield Symptom(
             "dead",
@@ -360,7 +349,6 @@ def _dead_channel(health: GaugeHealth) -> Iterator[Symptom]:
 
 
 def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
-    """Yield disturbances that add to the readings."""
     if health.noise_rms_m > NOISE_M[0]:
         yield Symptom(
             "noisy",

@@ -21,7 +21,7 @@ from analysis.laws.parameters import Parameter
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from analysis.preparation.channels import SAMPLES_MIN, Channel
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN
-from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from analysis.quantities import BudgetLine, Quantity, ResultWarning, result_warning
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
 from analysis.results.fitted_quantities import msk64_degree
 from analysis.results.joint_fit import add_systematic_uncertainty
@@ -55,19 +55,15 @@ class PlannedTest:
     """
 
     parameters: TwoMassParameters
-    """Expected stand, contact and pullback."""
     rate_hz: float = 1000.0
     duration_s: float = 10.0
-    """Recorded after the release."""
     hold_s: float = 1.0
-    """Recorded before the release."""
     noise_m: float = 2e-5
     """Standard deviation of the readings of both gauges; at least 0.1 µm."""
     table_mass_uncertainty_kg: float = 0.0
     plate_mass_uncertainty_kg: float = 0.0
     gravity_uncertainty_m_per_s2: float = 0.0
     clock_scale_uncertainty: float = CLOCK_UNCERTAINTY
-    """Relative standard uncertainty of the device's rate."""
     table_gauge: GaugeUncertainty = _NOTHING_STATED
     relative_gauge: GaugeUncertainty = _NOTHING_STATED
     gauge_2_measures_plate: bool = False
@@ -98,7 +94,6 @@ class PlannedTest:
                 )
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with `changes`."""
         return replace(self, **changes)
 
     @property
@@ -109,7 +104,6 @@ class PlannedTest:
 
     @property
     def period_s(self) -> float:
-        """Damped period of the joint motion."""
         k1, n1 = _joint(self.parameters)
         return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
 
@@ -144,7 +138,6 @@ class Plan:
     law: FrictionLaw
     motion: Motion
     msk64_degree: str
-    """Of the table's largest velocity."""
     rest_s: float | None
     """Time after the release at which the swing is as small as the noise; None without damping."""
     table_use: RangeUse
@@ -280,7 +273,6 @@ def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
 
 
 def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
-    """Fit at the true parameters."""
     point = default_point()
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)
@@ -309,36 +301,50 @@ def _warnings(
     found = [*_range_warnings(uses)]
     if motion.slip_end_s == 0.0:
         needed_mm = MILLIMETRE.scale * smallest_pullback_m(test.parameters)
-        text = message(
-            "the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.",
-            needed_mm=needed_mm,
-        )
-        return [*found, ResultWarning("no-slip", text)]
+        return [
+            *found,
+            result_warning(
+                "no-slip",
+                "the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.",
+                needed_mm=needed_mm,
+            ),
+        ]
     if motion.slip_end_s >= test.duration_s:
-        text = message(
-            "the plate will still slip after {duration_s:g} s. Record longer.", duration_s=test.duration_s
+        found.append(
+            result_warning(
+                "slip-to-end",
+                "the plate will still slip after {duration_s:g} s. Record longer.",
+                duration_s=test.duration_s,
+            )
         )
-        found.append(ResultWarning("slip-to-end", text))
     elif test.duration_s < (needed_s := motion.slip_end_s + TAIL_PERIODS_MIN * test.period_s):
-        text = message(
-            "the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more.",
-            needed_s=needed_s,
+        found.append(
+            result_warning(
+                "tail-too-short",
+                "the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more.",
+                needed_s=needed_s,
+            )
         )
-        found.append(ResultWarning("tail-too-short", text))
     if "friction_dynamic" not in budget.results:
-        text = message("the record will not tell f_d. Sample faster and longer, within the gauges' ranges.")
-        found.append(ResultWarning("friction-undetermined", text))
+        found.append(
+            result_warning(
+                "friction-undetermined",
+                "the record will not tell f_d. Sample faster and longer, within the gauges' ranges.",
+            )
+        )
     unstated = [
         message("gauge {gauge}", gauge=number)
         for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
         if gauge.gain_relative is None
     ]
     if unstated:
-        text = message(
-            "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
-            gauges=joined(unstated, " and "),
+        found.append(
+            result_warning(
+                "gain-not-stated",
+                "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
+                gauges=joined(unstated, " and "),
+            )
         )
-        found.append(ResultWarning("gain-not-stated", text))
     return found
 
 
@@ -347,15 +353,17 @@ def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
     for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
         if use.range_m is not None and not use.fits():
             read = f"{MILLIMETRE.number(use.lowest_m, 2)} to {MILLIMETRE.text(use.highest_m, 2)}"
-            text = message(
-                "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
-                " readings are left out. {remedy}",
-                number=number,
-                read=read,
-                range_m=MILLIMETRE.scale * use.range_m,
-                remedy=remedy,
+            found.append(
+                result_warning(
+                    f"gauge-{number}-range",
+                    "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
+                    " readings are left out. {remedy}",
+                    number=number,
+                    read=read,
+                    range_m=MILLIMETRE.scale * use.range_m,
+                    remedy=remedy,
+                )
             )
-            found.append(ResultWarning(f"gauge-{number}-range", text))
     return found
 
 

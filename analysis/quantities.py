@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Self, TypeAlias
+from typing import ClassVar, Self, TypeAlias
 
 from messages.i18n import N_
 from messages.message import Message, message
@@ -13,7 +13,6 @@ class Quantity:
     """A measured quantity."""
 
     value: float
-    """In `unit`."""
     standard_uncertainty: float
     interval_95: tuple[float, float]
     """95 % coverage interval in `unit`, not necessarily symmetric."""
@@ -34,7 +33,11 @@ class ResultWarning:
     code: str
     """Stable name, for programs."""
     message: Message
-    """Sentence for people."""
+
+
+def result_warning(code: str, template: str, /, **values: object) -> ResultWarning:
+    """Warning with the message of `template` and `values`."""
+    return ResultWarning(code, message(template, **values))
 
 
 class SharedBy(Enum):
@@ -79,7 +82,6 @@ class BudgetSource(Enum):
     """The error has a rectangular distribution instead of a normal one."""
 
     def __new__(cls, name: str, shared_by: SharedBy = SharedBy.STAND, is_rectangular: bool = False) -> Self:
-        """Make a member whose value is its name."""
         member = object.__new__(cls)
         member._value_ = name
         member.shared_by = shared_by
@@ -88,38 +90,25 @@ class BudgetSource(Enum):
 
     @property
     def label(self) -> Message:
-        """Name for people."""
         return Message(self.value)
 
     def __str__(self) -> str:
-        """Name in JSON."""
         return str(self.value)
 
 
 @dataclass(frozen=True, slots=True)
 class OtherLaw:
-    """The chance that a friction law other than the chosen one is true: a source of uncertainty."""
+    """The chance that the friction law `law` is true, not the chosen one: a source of uncertainty."""
 
+    shared_by: ClassVar = SharedBy.NONE
+    is_rectangular: ClassVar = False
     law: str
-    """Name of that law."""
-
-    @property
-    def shared_by(self) -> SharedBy:
-        """Each run chooses its law by its own readings."""
-        return SharedBy.NONE
-
-    @property
-    def is_rectangular(self) -> bool:
-        """The error counts as normal."""
-        return False
 
     @property
     def label(self) -> Message:
-        """Name for people."""
         return message(_OTHER_LAW, law=self.law)
 
     def __str__(self) -> str:
-        """Name in JSON."""
         return str(self.label)
 
 
@@ -146,6 +135,5 @@ class BudgetLine:
 
     source: Source
     contribution_to: str
-    """Name of the result."""
     standard_uncertainty: float
     """In the unit of the result. NaN where the source matters but its uncertainty is not stated."""

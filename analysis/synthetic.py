@@ -41,19 +41,15 @@ class Truth:
     """Standard deviation of white noise, and converter step (0: none)."""
     step_m: float = 0.0
     offsets_m: tuple[float, float] = (3e-4, 6e-3)
-    """Zeros of both gauges."""
     gain_errors: tuple[float, float] = (0.0, 0.0)
     """What the record does not know of: relative gain errors, lateness of gauge 2 (s), and by how much true
     time runs faster than the record's."""
     lag_s: float = 0.0
     clock_error: float = 0.0
     drift_m_per_s: float = 0.0
-    """Drift of gauge 2."""
     seed: int = 0
-    """Of the noise."""
 
     def parameters(self) -> TwoMassParameters:
-        """The stand, contact and pullback of this test."""
         return TwoMassParameters.from_free_decay(
             period_s=self.period_s,
             damping_n1_per_s=self.damping_n1_per_s,
@@ -67,7 +63,6 @@ class Truth:
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with `changes`."""
         return replace(self, **changes)
 
 

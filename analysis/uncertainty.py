@@ -43,7 +43,6 @@ class ParameterUncertainty:
     """(16, 16) float64: covariance from the noise of the readings."""
 
     def standard_uncertainty(self, weights: Floats) -> float:
-        """Standard uncertainty of a linear form of the parameters."""
         return float(np.sqrt(sum(share**2 for share in self.contributions(weights).values())))
 
     def contributions(self, weights: Floats) -> dict[Source, float]:

@@ -60,7 +60,6 @@ class UncertaintyParts:
 
     @property
     def total(self) -> float:
-        """Combined standard uncertainty."""
         return math.hypot(self.noise, self.stated)
 
     @property
@@ -134,7 +133,6 @@ def _by_repeats(now: UncertaintyParts) -> ReductionOption:
 
 
 def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    """Try longer pullbacks, as far as both gauges reach."""
     planned_m = test.parameters.pullback_m
     best, best_m = now.total, planned_m
     for factor in _PULLBACK_FACTORS:
@@ -161,8 +159,6 @@ def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
 
 
 def _by_calibration(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    """Look for the share of today's calibration uncertainties that is allowed."""
-
     def total(share: float) -> float:
         parts = uncertainty_parts(
             test.replace(
@@ -209,6 +205,5 @@ def _floor(now: UncertaintyParts) -> Message:
 
 
 def _improved(gauge: GaugeUncertainty, share: float) -> GaugeUncertainty:
-    """The same gauge with `share` of its uncertainties of gain and non-linearity."""
     gain = None if gauge.gain_relative is None else share * gauge.gain_relative
     return replace(gauge, gain_relative=gain, nonlinearity_m=share * gauge.nonlinearity_m)

@@ -22,10 +22,10 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = tuple(ROOT / name for name in ("analysis", "app", "config", "drivers", "messages"))
 ENGLISH_ONLY = (ROOT / "app" / "cli", ROOT / "app" / "qt" / "screenshots.py")
 """The command line, and a program for developers."""
-_FUNCTIONS = {"gettext", "N_", "message", "ngettext"}
-_SUFFIXES = ("Error", "Warning")
-_CODE_FIRST = {"ResultWarning"}
-"""Classes whose first argument is a code; their second one is a `message` of its own."""
+_FUNCTIONS = {"gettext", "N_", "message", "ngettext", "result_warning"}
+_CODE_FIRST = {"result_warning"}
+"""Functions whose second argument is the text, after a code."""
+_SUFFIX = "Error"
 
 
 def extract(folders: Iterable[Path] = PACKAGES) -> Catalog:
@@ -69,7 +69,7 @@ def _texts(path: Path) -> Iterator[tuple[str | tuple[str, str], int]]:
             if isinstance(node.func, ast.Name) and node.func.id == "ngettext":
                 plural = node.args[1:2]
             many = [text for argument in plural for text in _constants(argument, path)]
-            for text in _constants(node.args[0], path):
+            for text in _constants(node.args[_function_name(node.func) in _CODE_FIRST], path):
                 yield ((text, many[0]) if many else text), node.lineno
 
 
@@ -79,11 +79,13 @@ def _has_words(text: str | tuple[str, str]) -> bool:
     return any(letter.isalpha() for literal, *_ in string.Formatter().parse(one) for letter in literal)
 
 
+def _function_name(function: ast.expr) -> str:
+    return function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
+
+
 def _carries_text(function: ast.expr) -> bool:
-    name = function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
-    if name in _FUNCTIONS:
-        return True
-    return name.endswith(_SUFFIXES) and name not in _CODE_FIRST and not hasattr(builtins, name)
+    name = _function_name(function)
+    return name in _FUNCTIONS or (name.endswith(_SUFFIX) and not hasattr(builtins, name))
 
 
 def _constants(argument: ast.expr, path: Path) -> Iterator[str]:

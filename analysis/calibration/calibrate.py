@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 from analysis.arrays import Floats
 from analysis.calibration.points import POLYNOMIAL_DEGREES, CalibrationError, CalibrationPoints
 from analysis.formatting import format_number
-from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning, result_warning
 from messages.i18n import N_
 from messages.message import message
 
@@ -247,7 +247,6 @@ class Calibration:
         return 0.5 * (high - low) / _NORMAL_95 / abs(self.gain_m_per_count.value)
 
     def displacement_m(self, counts: Floats) -> Floats:
-        """Displacements (k,) of counts (k,) (m)."""
         linear = self.gain_m_per_count.value * (counts - self.zero_count.value)
         return linear * np.polynomial.polynomial.polyval(linear, (1.0, *self.polynomial))
 
@@ -362,15 +361,13 @@ def _warnings(
 ) -> list[ResultWarning]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
     warnings = [
-        ResultWarning(
+        result_warning(
             "reading-doubtful",
-            message(
-                "reading {place}, {dial_m:.4g} mm, is {residual_m:+.3f} mm off the curve. Check it for a"
-                " misread turn of the dial",
-                place=place + 1,
-                dial_m=readings.dial_m[place] * 1e3,
-                residual_m=residual_m[place] * 1e3,
-            ),
+            "reading {place}, {dial_m:.4g} mm, is {residual_m:+.3f} mm off the curve. Check it for a"
+            " misread turn of the dial",
+            place=place + 1,
+            dial_m=readings.dial_m[place] * 1e3,
+            residual_m=residual_m[place] * 1e3,
         )
         for place in np.flatnonzero(np.abs(residual_m) > _DOUBTFUL * usual_m)
     ]
@@ -379,7 +376,7 @@ def _warnings(
         (characteristics.hysteresis_m, "one-way-only", _ONE_WAY_ONLY),
         (characteristics.repeatability_m, "one-round-only", _ONE_ROUND_ONLY),
     )
-    return warnings + [ResultWarning(code, message(text)) for value, code, text in missing if value is None]
+    return warnings + [result_warning(code, text) for value, code, text in missing if value is None]
 
 
 _DIAL_NOT_STATED = N_("the dial gauge's own uncertainty is not stated and not counted.")

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from analysis.calibration.points import CalibrationError
-from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
+from analysis.quantities import BudgetLine, BudgetSource, ResultWarning, result_warning
 from messages.i18n import N_
-from messages.message import message
 
 COVERAGE: Final = 2.0
 """Tolerance over the combined standard uncertainty: coverage of about 95 % (JCGM 100, 6.3)."""
@@ -23,7 +22,6 @@ class MeanReading:
     """Mean reading of a gauge at rest."""
 
     displacement_m: float
-    """Mean (m)."""
     noise_m: float
     """Standard deviation of one sample (m)."""
     samples: int
@@ -41,11 +39,9 @@ class CalibrationClaim:
     """Stated uncertainties of a calibration; None is "not stated"."""
 
     gain_relative: float | None = None
-    """Relative standard uncertainty of the gain (1)."""
     nonlinearity_m: float | None = None
     """Largest deviation from the curve (m)."""
     repeatability_m: float | None = None
-    """Standard deviation from round to round (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +51,6 @@ class ReferenceDisplacement:
     displacement_m: float
     """With its sign (m)."""
     standard_uncertainty_m: float | None = None
-    """Of that (m); None: not stated."""
     is_electric: bool = False
     """A shunt: the gauge does not move, so non-linearity and repeatability do not contribute."""
 
@@ -87,7 +82,6 @@ class DisplacementCheck:
 
     @property
     def deviation_m(self) -> float:
-        """Measured minus expected (m)."""
         return self.measured_m - self.expected_m
 
     @property
@@ -154,21 +148,25 @@ def _warnings(
 ) -> list[ResultWarning]:
     template = N_("the uncertainty of the {source} is not stated and not counted.")
     warnings = [
-        ResultWarning("not-stated", message(template, source=line.source.label))
+        result_warning("not-stated", template, source=line.source.label)
         for line in budget
         if math.isnan(line.standard_uncertainty)
     ]
     share = COVERAGE * combined_m / abs(reference.displacement_m)
     if share > _BLUNT:
-        text = message(
-            "an error of {share:.0%} would pass. Take a larger displacement, or a more certain one.",
-            share=share,
+        warnings.append(
+            result_warning(
+                "check-blunt",
+                "an error of {share:.0%} would pass. Take a larger displacement, or a more certain one.",
+                share=share,
+            )
         )
-        warnings.append(ResultWarning("check-blunt", text))
     if measured_m * reference.displacement_m < 0.0:
-        text = message(
-            "the gauge shows a displacement to the other side. Check its direction, its plugs"
-            " and the sign that was given."
+        warnings.append(
+            result_warning(
+                "other-way",
+                "the gauge shows a displacement to the other side. Check its direction, its plugs"
+                " and the sign that was given.",
+            )
         )
-        warnings.append(ResultWarning("other-way", text))
     return warnings

@@ -1,6 +1,6 @@
 """Summary of a campaign: rows by series, effects, ratios, excluded runs, and the published table beside."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.audit import KILOGRAM_FORCE_N, PublishedRow
@@ -29,13 +29,10 @@ class Campaign:
     rows: tuple[SeriesRow, ...]
     """In the paper's order."""
     effects: Effects
-    """Dependence of f_d on mass, pullback, velocity and contact."""
     ratios: tuple[ContactRatio, ...]
-    """f_s / f_d by contact."""
     msk64_degrees: tuple[str, ...]
     """Degrees that the table reached, each once, lowest first."""
     excluded: tuple[Excluded, ...]
-    """In the order given."""
     warnings: tuple[ResultWarning, ...]
 
 
@@ -50,24 +47,19 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
     )
     series = group_into_series(counted)
     rows = pool_rows(series)
+    shaken = [row for row in rows if TABLE_VELOCITY in row.quantities]
+    shaken.sort(key=lambda row: row.quantities[TABLE_VELOCITY].quantity.value)
     return Campaign(
         rows,
         find_effects(rows),
         friction_ratios(series, rows),
-        tuple(dict.fromkeys(row.msk64_degree for row in sorted(rows, key=_velocity) if row.msk64_degree)),
+        tuple(dict.fromkeys(row.msk64_degree for row in shaken if row.msk64_degree)),
         tuple(Excluded(run.name, run.excluded) for run in runs if run.excluded),
         (*campaign_warnings(counted, known_contacts), *_run_warnings(counted)),
     )
 
 
-def _velocity(row: SeriesRow) -> float:
-    """Largest velocity of the table (m/s)."""
-    velocity = row.quantities.get(TABLE_VELOCITY)
-    return 0.0 if velocity is None else velocity.quantity.value
-
-
 def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
-    """Warnings of single runs, grouped by code and gauge."""
     groups: dict[tuple[str, object], list[tuple[RunResult, Message]]] = {}
     for run in runs:
         for warning in run.warnings:
@@ -104,23 +96,20 @@ class PublishedComparison:
     normalised: float | None
 
 
-def compare_with_published(row: SeriesRow, printed: PublishedRow) -> tuple[PublishedComparison, ...]:
-    """Compare a row with the published one, in the order of the columns."""
-    compared = []
+def compare_with_published(
+    rows: Sequence[SeriesRow], published: Mapping[str, PublishedRow]
+) -> dict[str, tuple[PublishedComparison, ...]]:
+    """Compare all rows that the published table has too, by their labels, in the order of the columns."""
+    return {
+        row.label: tuple(_comparisons(row, published[row.label])) for row in rows if row.label in published
+    }
+
+
+def _comparisons(row: SeriesRow, printed: PublishedRow) -> Iterator[PublishedComparison]:
     for name, attribute in ((each.name, column.published) for each, column in table_columns()):
         if attribute and name in row.quantities:
             quantity = row.quantities[name].quantity
             published = getattr(printed, attribute) * _UNITS_PRINTED.get(name, 1.0)
             difference, deviation = quantity.value - published, quantity.standard_uncertainty
             normalised = difference / deviation if deviation else None
-            compared.append(PublishedComparison(name, quantity.value, published, difference, normalised))
-    return tuple(compared)
-
-
-def compare_all_with_published(
-    rows: Sequence[SeriesRow], published: Mapping[str, PublishedRow]
-) -> dict[str, tuple[PublishedComparison, ...]]:
-    """Compare all rows that the published table has too, by their labels."""
-    return {
-        row.label: compare_with_published(row, published[row.label]) for row in rows if row.label in published
-    }
+            yield PublishedComparison(name, quantity.value, published, difference, normalised)

@@ -97,7 +97,6 @@ class ContactRatio:
     ratio: Quantity | None
     """Mean over the series that determined f_s, with their scatter; None without any."""
     series: int
-    """Number of these series."""
     between_series: float | None
     """Standard deviation of the ratio between series; None with fewer than two."""
     bounds: tuple[float | None, float | None]

@@ -56,7 +56,6 @@ class Effect:
     """Whether f_d depends on it, at the 5 % level; None where the campaign cannot tell."""
     sentence: Message
     statistic: float | None = None
-    """Of the F test."""
     p_value: float | None = None
     degrees_of_freedom: tuple[int, int] | None = None
     sizes: tuple[EffectSize, ...] = ()
@@ -74,7 +73,6 @@ class Effects:
     """Relative standard deviation of the series about the model beyond their uncertainties; None where
     undetermined."""
     series: int
-    """Number of rows used."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -135,14 +133,12 @@ def _undetermined(cause: Cause, reason: Message) -> Effect:
 
 
 def _change_quantity(fitted: LinearFit, weights: Floats) -> Quantity:
-    """Relative change from a difference of ln f_d."""
     value, deviation, half = linear_model.estimate_linear_form(fitted, weights)
     ends = _relative_change(value - half), _relative_change(value + half)
     return Quantity(_relative_change(value), (1.0 + _relative_change(value)) * deviation, ends, "1")
 
 
 def _relative_change(difference: float) -> float:
-    """Relative change of a difference of logarithms."""
     return math.expm1(difference) if difference < _LARGEST else math.inf
 
 

@@ -21,7 +21,6 @@ class Observations:
     """Values of the model, with the covariance of their errors."""
 
     values: Floats
-    """(n,) float64."""
     variances: Floats
     """(n,) float64: of the independent errors, from repeats."""
     shared: Floats
@@ -165,12 +164,10 @@ class DesignMatrix:
 
     @property
     def contacts(self) -> tuple[str, ...]:
-        """Contacts in the order of the table."""
         return tuple(dict.fromkeys(contact for contact, _ in self.cells))
 
     @property
     def pullbacks_m(self) -> tuple[float, ...]:
-        """Pullbacks, the smallest first."""
         return tuple(sorted({pullback for _, pullback in self.cells}))
 
     def form(self, **shares: float) -> Floats:

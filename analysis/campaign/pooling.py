@@ -25,7 +25,6 @@ class SharedError:
 
     source: Source
     shared_by: str
-    """Identity of the calibration, stand or series."""
 
     def __str__(self) -> str:
         """Name in JSON: `gauge 1 gain of A`."""
@@ -127,7 +126,6 @@ class PooledQuantity:
     quantity: Quantity
     """Weighted mean; its uncertainty includes errors that repeats share."""
     runs: int
-    """Number of runs that determined it."""
     repeatable: float
     """Part of the standard uncertainty that repeats reduce."""
     common: dict[SharedError, float]
@@ -224,7 +222,6 @@ def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[Share
 def _half_widths(
     readings: Sequence[RunValue], stated: float, seen: float, shared: float, scatter: SeriesScatter
 ) -> tuple[float, float]:
-    """Half widths of the 95 % interval, below and above the mean."""
     half = COVERAGE_FACTOR_95 * stated
     if scatter.degrees_of_freedom:
         half = max(half, float(stdtrit(scatter.degrees_of_freedom, 0.975)) * seen)

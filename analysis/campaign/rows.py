@@ -9,10 +9,10 @@ from scipy.special import chdtrc
 
 from analysis.campaign.pooling import PooledQuantity, is_fully_stated, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
-from analysis.catalogue import QuantityDefinition, TableColumn, definition, table_columns
-from analysis.quantities import Quantity, ResultWarning
+from analysis.catalogue import TableColumn, table_columns
+from analysis.quantities import Quantity, ResultWarning, result_warning
 from analysis.results.fitted_quantities import msk64_degree
-from messages.message import message
+from messages.i18n import N_
 
 STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
 TABLE_VELOCITY = "table_velocity_max_m_per_s"
@@ -41,46 +41,23 @@ def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
 
     Series of one contact share their scatter; for properties of the stand, all series do.
     """
-    quantities: dict[str, dict[str, PooledQuantity]] = {each.label: {} for each in series}
-    for row, column in _pooled_columns():
-        for label, pooled in _pooled(series, row, column).items():
-            quantities[label][row.name] = pooled
+    quantities = {each.label: {_MASS: _plate_mass(each)} for each in series}
+    of_runs = [(row.name, column) for row, column in table_columns() if row.name != _MASS]
+    for name, column in (*of_runs, (STATIC_LOWER, TableColumn(0)), (STATIC_UPPER, TableColumn(0))):
+        values = [[one for run in each.runs if (one := run_value(run, name)) is not None] for each in series]
+        found = [(each, some) for each, some in zip(series, values, strict=True) if some]
+        kinds = ["" if column.is_of_stand else each.key.contact for each, _ in found]
+        pooled = pool([some for _, some in found], proportional=column.is_proportional, kinds=kinds)
+        for (each, _), one in zip(found, pooled, strict=True):
+            quantities[each.label][name] = one
     return tuple(_row(each, quantities[each.label]) for each in series)
 
 
-def _pooled_columns() -> Iterator[tuple[QuantityDefinition, TableColumn]]:
-    """Quantities that runs determine, with the rules of their columns; bounds of f_s pool as f_s does."""
-    for row, column in table_columns():
-        if row.name != _MASS:
-            yield row, column
-    for name in (STATIC_LOWER, STATIC_UPPER):
-        yield definition(name), TableColumn(position=0)
-
-
-def _pooled(
-    series: Sequence[Series], row: QuantityDefinition, column: TableColumn
-) -> dict[str, PooledQuantity]:
-    found = []
-    for each in series:
-        some = [one for run in each.runs if (one := run_value(run, row.name)) is not None]
-        if some:
-            found.append((each, some))
-    kinds = ["" if column.is_of_stand else each.key.contact for each, _ in found]
-    pooled = pool([some for _, some in found], proportional=column.is_proportional, kinds=kinds)
-    return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
-
-
 def _row(series: Series, quantities: dict[str, PooledQuantity]) -> SeriesRow:
-    quantities = {_MASS: _plate_mass(series), **quantities}
     velocity = quantities.get(TABLE_VELOCITY)
-    return SeriesRow(
-        series.label,
-        series.key,
-        quantities,
-        "" if velocity is None else _degree(velocity.quantity),
-        tuple(run.name for run in series.runs),
-        tuple(_warnings(series, quantities)),
-    )
+    degree = "" if velocity is None else _degree(velocity.quantity)
+    runs = tuple(run.name for run in series.runs)
+    return SeriesRow(series.label, series.key, quantities, degree, runs, tuple(_warnings(series, quantities)))
 
 
 def _plate_mass(series: Series) -> PooledQuantity:
@@ -97,69 +74,46 @@ def _degree(velocity: Quantity) -> str:
     return "/".join(ends)
 
 
-def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> list[ResultWarning]:
-    friction = quantities.get(_FRICTION)
-    found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
-    if friction is None:
-        text = message("{label}: no run determined f_d.", label=series.label)
-        found.append(ResultWarning("no-friction", text))
-    elif friction.runs == 1:
-        text = message(
-            "{label}: one run alone determined f_d. Repeat the test twice at least", label=series.label
-        )
-        found.append(ResultWarning("single-run", text))
-    if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
-        text = message(
-            "{label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate",
-            label=series.label,
-        )
-        found.append(ResultWarning("gain-not-stated", text))
-    return [caution for caution in found if caution is not None]
-
-
-def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
+def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> Iterator[ResultWarning]:
+    """Outliers, runs that differ by more than their own uncertainties explain, and what lacks."""
+    label, friction = series.label, quantities.get(_FRICTION)
     by_run: dict[str, list[str]] = {}
     for row, _ in table_columns():
         for run in quantities[row.name].outliers if row.name in quantities else ():
             by_run.setdefault(run, []).append(row.symbol.text)
-    if not by_run:
-        return None
-    said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
-    text = message(
-        "{label}: far from the other runs: {said}. All runs count; look at these, and leave"
-        " out with --exclude what there is a reason for",
-        label=series.label,
-        said=said,
-    )
-    return ResultWarning("outlying-run", text)
-
-
-def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
-    """Warn of quantities in which runs differ by more than their own uncertainties explain."""
-    found = [
+    if by_run:
+        yield result_warning(
+            "outlying-run",
+            "{label}: far from the other runs: {said}. All runs count; look at these, and leave"
+            " out with --exclude what there is a reason for",
+            label=label,
+            said="; ".join(f"{PurePath(run).name} in {', '.join(those)}" for run, those in by_run.items()),
+        )
+    differing = [
         f"{row.symbol.text} (Birge ratio {pooled.birge_ratio:.1f})"
         for row, _ in table_columns()
         if (pooled := quantities.get(row.name)) is not None and pooled.birge_ratio is not None
         if chdtrc(pooled.runs - 1, pooled.birge_ratio**2 * (pooled.runs - 1)) < _CHANCE / len(table_columns())
     ]
-    if not found:
-        return None
-    text = message(
-        "{series}: runs differ by more than their noise explains in {quantities}. The uncertainties"
-        " include these differences",
-        series=series.label,
-        quantities=found,
-    )
-    return ResultWarning("runs-differ", text)
-
-
-def _inadequate(series: Series) -> ResultWarning | None:
-    wrong = [run for run in series.runs if run.adequate is False]
-    if not wrong:
-        return None
-    text = message(
-        "{label}: no friction law explains {run_names}. Look at it: slipstand analyze",
-        label=series.label,
-        run_names=run_names(wrong),
-    )
-    return ResultWarning("not-adequate", text)
+    if differing:
+        yield result_warning(
+            "runs-differ",
+            "{series}: runs differ by more than their noise explains in {quantities}. The uncertainties"
+            " include these differences",
+            series=label,
+            quantities=differing,
+        )
+    if wrong := [run for run in series.runs if run.adequate is False]:
+        template = N_("{label}: no friction law explains {run_names}. Look at it: slipstand analyze")
+        yield result_warning("not-adequate", template, label=label, run_names=run_names(wrong))
+    if friction is None:
+        yield result_warning("no-friction", "{label}: no run determined f_d.", label=label)
+    elif friction.runs == 1:
+        template = N_("{label}: one run alone determined f_d. Repeat the test twice at least")
+        yield result_warning("single-run", template, label=label)
+    if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
+        yield result_warning(
+            "gain-not-stated",
+            "{label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate",
+            label=label,
+        )

@@ -30,7 +30,6 @@ class RepeatedValues:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Number of values minus number of series."""
         return len(self.values) - len(np.unique(self.series))
 
     def select(self, chosen: NDArray[np.bool_]) -> Self:
@@ -43,7 +42,6 @@ class RepeatedValues:
         return 1.0 / (self.variances + (between * self.scales) ** 2)
 
     def means(self, between: float) -> Floats:
-        """Weighted mean of each series (m,)."""
         weights = self.weights(between)
         sums = np.bincount(self.series, weights * self.values)
         return np.asarray(sums / np.bincount(self.series, weights), dtype=np.float64)

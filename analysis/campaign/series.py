@@ -1,11 +1,12 @@
 """Input of a campaign: results of runs, grouped into series, with warnings about runs that do not fit."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from analysis.quantities import BudgetLine, Quantity, ResultWarning
-from messages.message import message
+from analysis.quantities import BudgetLine, Quantity, ResultWarning, result_warning
+from messages.i18n import N_
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,10 +99,35 @@ def group_into_series(runs: Sequence[RunResult]) -> list[Series]:
     return sorted(series, key=lambda each: each.key.sort_key)
 
 
-def campaign_warnings(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[ResultWarning]:
-    """Return warnings about calibrations, missing series and unknown contacts."""
-    found = [_calibrations(runs), _without_series(runs), *_unknown_contacts(runs, known_contacts)]
-    return [caution for caution in found if caution is not None]
+def campaign_warnings(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> Iterator[ResultWarning]:
+    """Warn of several calibrations, runs without a series, and unknown contacts."""
+    count = len({run.calibration_id for run in runs})
+    if count > 1:
+        template = N_(
+            "{count} calibrations were in use: their errors are taken as independent of each other."
+        )
+        yield result_warning("several-calibrations", template, count=count)
+    if without := [run for run in runs if not run.series.code]:
+        yield result_warning(
+            "no-series",
+            "{count} runs have no series ({run_names}): they are sorted by contact, pullback and masses."
+            " Name it: slipstand edit RUN --series CODE",
+            count=len(without),
+            run_names=run_names(without),
+        )
+    unknown: dict[str, list[RunResult]] = {}
+    for run in runs:
+        if known_contacts and run.series.contact not in known_contacts:
+            unknown.setdefault(run.series.contact, []).append(run)
+    for contact, of_contact in unknown.items():
+        yield result_warning(
+            "unknown-contact",
+            "contact {contact!r} ({run_names}) is not one of the stand ({known}). It gets rows of its"
+            " own; name it in stand.toml",
+            contact=contact or "not named",
+            run_names=run_names(of_contact),
+            known=", ".join(known_contacts),
+        )
 
 
 def run_names(runs: Sequence[RunResult]) -> str:
@@ -111,9 +137,8 @@ def run_names(runs: Sequence[RunResult]) -> str:
 
 
 def _same(one: SeriesKey, other: SeriesKey) -> bool:
-    """Tell whether two runs of one label are the same test."""
     return (one.contact, one.pullback_m) == (other.contact, other.pullback_m) and all(
-        abs(a - b) <= _SAME_MASS * abs(a)
+        math.isclose(a, b, rel_tol=_SAME_MASS)
         for a, b in ((one.plate_mass_kg, other.plate_mass_kg), (one.table_mass_kg, other.table_mass_kg))
     )
 
@@ -130,46 +155,3 @@ def _distinction(key: SeriesKey, groups: Sequence[Sequence[RunResult]]) -> str:
     )  # fmt: skip
     differing = [said for said, values in facts if len(values) > 1]
     return f" ({', '.join(differing)})" if differing else ""
-
-
-def _calibrations(runs: Sequence[RunResult]) -> ResultWarning | None:
-    count = len({run.calibration_id for run in runs})
-    if count < 2:
-        return None
-    text = message(
-        "{count} calibrations were in use: their errors are taken as independent of each other.", count=count
-    )
-    return ResultWarning("several-calibrations", text)
-
-
-def _without_series(runs: Sequence[RunResult]) -> ResultWarning | None:
-    without = [run for run in runs if not run.series.code]
-    if not without:
-        return None
-    text = message(
-        "{count} runs have no series ({run_names}): they are sorted by contact, pullback and masses."
-        " Name it: slipstand edit RUN --series CODE",
-        count=len(without),
-        run_names=run_names(without),
-    )
-    return ResultWarning("no-series", text)
-
-
-def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[ResultWarning]:
-    unknown: dict[str, list[RunResult]] = {}
-    for run in runs:
-        if known and run.series.contact not in known:
-            unknown.setdefault(run.series.contact, []).append(run)
-    return [
-        ResultWarning(
-            "unknown-contact",
-            message(
-                "contact {contact!r} ({run_names}) is not one of the stand ({known}). It gets rows of its"
-                " own; name it in stand.toml",
-                contact=contact or "not named",
-                run_names=run_names(of_it),
-                known=", ".join(known),
-            ),
-        )
-        for contact, of_it in unknown.items()
-    ]

@@ -31,11 +31,8 @@ class Parameters(NamedTuple):
     turning_s: float
     """Time (s) of the last turning point before the fitted stretch."""
     turning: float
-    """Displacement there."""
     omega_rad_per_s: float
-    """Damped frequency."""
     damping_n_per_s: float
-    """Viscous damping constant."""
     coulomb: float
     """x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left."""
     offset: float
@@ -43,7 +40,6 @@ class Parameters(NamedTuple):
 
     @property
     def period_s(self) -> float:
-        """Damped period."""
         return 2.0 * math.pi / self.omega_rad_per_s
 
     @property
@@ -80,7 +76,6 @@ class OneMassFit:
     residual: Floats
     """(n,) float64: reading minus curve, in the unit of the readings."""
     cost: float
-    """Sum of squared residuals."""
     order: int
     """Derivative of the displacement that the readings are."""
 
@@ -90,7 +85,6 @@ class OneMassFit:
         return math.sqrt(self.cost / max(1, len(self.residual) - len(self.parameters)))
 
     def uncertainty(self, which: int) -> float:
-        """Standard uncertainty of one parameter."""
         return math.sqrt(max(0.0, float(self.covariance[which, which])))
 
 

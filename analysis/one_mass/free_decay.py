@@ -41,7 +41,6 @@ class SpectralLine:
     """A line that stands out of the spectrum of residuals."""
 
     frequency_hz: float
-    """By the median sampling interval."""
     amplitude: float
     """As a steady sine, in the unit of the residuals."""
 
@@ -53,11 +52,9 @@ class ResidualAssessment:
     adequate: bool
     """They are noise, or the rounding of the converter."""
     rms: float
-    """Their root mean square."""
     noise: float
     """Root mean square of their part which neighbours do not share."""
     line: SpectralLine | None
-    """The strongest line, if noise does not explain it."""
 
 
 def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:

@@ -14,10 +14,9 @@ from analysis.one_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
 from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
 from analysis.one_mass.turning_points import classical_log_decrement, find_turning_points
 from analysis.preparation.channels import Channel, Channels, read_channels
-from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source
+from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
-from messages.message import message
 
 MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
 
@@ -233,26 +232,30 @@ def _classical_figures(
     if not significant:
         return []
     displacement = budget.results["coulomb_displacement_m"].unit
-    text = message(
-        "dry friction is significant (x_k = {coulomb}): the plain log decrement {value} is biased,"
-        " its viscous part is {results}.",
-        coulomb=format_with_unit(parameters.coulomb, displacement),
-        value=format_number(value, 4),
-        results=format_number(budget.results["log_decrement"].value, 4),
-    )
-    return [ResultWarning("coulomb-biases-log-decrement", text)]
+    return [
+        result_warning(
+            "coulomb-biases-log-decrement",
+            "dry friction is significant (x_k = {coulomb}): the plain log decrement {value} is biased,"
+            " its viscous part is {results}.",
+            coulomb=format_with_unit(parameters.coulomb, displacement),
+            value=format_number(value, 4),
+            results=format_number(budget.results["log_decrement"].value, 4),
+        )
+    ]
 
 
 def _verdict(solution: FreeDecayFit, significant: bool, warnings: list[ResultWarning]) -> ModelSelection:
     verdict = solution.verdict
     if not solution.adequate:
-        text = message(
-            "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
-            " or a pattern in it: period and damping may be biased.",
-            rms=format_with_unit(verdict.rms, solution.unit),
-            noise=format_with_unit(verdict.noise, solution.unit),
+        warnings.append(
+            result_warning(
+                "model-inadequate",
+                "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
+                " or a pattern in it: period and damping may be biased.",
+                rms=format_with_unit(verdict.rms, solution.unit),
+                noise=format_with_unit(verdict.noise, solution.unit),
+            )
         )
-        warnings.append(ResultWarning("model-inadequate", text))
     name = "viscous+coulomb" if significant else "viscous"
     return ModelSelection(name, solution.adequate, verdict.rms, verdict.noise)
 

@@ -26,7 +26,6 @@ class TurningPoints:
     """(k,) int64: half cycles since the first; increasing, not necessarily without gaps."""
     time_s: Floats
     value: Floats
-    """(k,) float64: reading there."""
     side: Floats
     """(k,) float64: +1 for a maximum, -1 for a minimum."""
     noise_gain: Floats
@@ -42,7 +41,6 @@ class HalfCycleRegression:
     loss: float
     """(1 + b) x_k, in the unit of the readings."""
     offset: float
-    """Middle of the rest band."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,7 +173,6 @@ class ProfileInterval:
     """From the fitted value to the ends of the shortest 95 % interval."""
     above: float
     deviation: float
-    """Standard deviation."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -397,7 +396,6 @@ def _demand(parameters: Floats, position: Floats, velocity: Floats) -> Floats:
 
 
 def _largest_demand(parameters: Floats, phase: Floats) -> float:
-    """Largest demand during a last stick."""
     mass = float(parameters[Parameter.TABLE_MASS] + parameters[Parameter.PLATE_MASS])
     n = float(parameters[Parameter.DAMPING]) / (2.0 * mass)
     w = float(np.sqrt(parameters[Parameter.STIFFNESS] / mass - n * n))
@@ -417,7 +415,7 @@ _PLAUSIBLE = 2.0
 
 @dataclass(frozen=True, slots=True)
 class SlipEnd:
-    """End of the last slip (s) and its standard uncertainty (s)."""
+    """End of the last slip and its standard uncertainty."""
 
     time_s: float
     uncertainty_s: float
@@ -509,7 +507,6 @@ def _end_of(parameters: Floats, model: FrictionLaw, end_s: float) -> float | Non
 
 
 def _slips_on(chosen: Fit, end_s: float, period_s: float) -> bool:
-    """Whether the fitted motion slips at `end_s` or after it: a period later the widest swing is past."""
     end = _end_of(chosen.parameters, chosen.law, end_s + period_s)
     return end is None or end > end_s
 

@@ -15,7 +15,7 @@ from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import NOISE_FLOOR_M
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.oscillation import DampedCosine, check_friction, damped_cosine, envelope_curvature
-from analysis.quantities import BudgetSource, ResultWarning, Source
+from analysis.quantities import BudgetSource, ResultWarning, Source, result_warning
 from analysis.record import Record, RecordError
 from analysis.uncertainty import (
     ParameterUncertainty,
@@ -75,14 +75,14 @@ def assess_model(
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:
     """What a law that does not explain the record leaves."""
-    text = message(
+    return result_warning(
+        "model-inadequate",
         "the law {name} leaves {residual_rms_m} of residual for {noise_rms_m} of noise, or a pattern"
         " in it: f_d may be biased.",
         name=judged.name,
         residual_rms_m=format_length(judged.residual_rms_m),
         noise_rms_m=format_length(judged.noise_rms_m),
     )
-    return ResultWarning("model-inadequate", text)
 
 
 def identifiability_warnings(
@@ -91,23 +91,32 @@ def identifiability_warnings(
     """Warn of what the record does not determine about the chosen law and its motion."""
     warnings = []
     if not slip_ended:
-        text = message(
-            "by the fitted motion the plate slips at the end of the record or again after it: u_s"
-            " and the end of slip are not known. Record until the plate sticks."
+        warnings.append(
+            result_warning(
+                "slip-not-ended",
+                "by the fitted motion the plate slips at the end of the record or again after it: u_s"
+                " and the end of slip are not known. Record until the plate sticks.",
+            )
         )
-        warnings.append(ResultWarning("slip-not-ended", text))
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
-        text = message("f_d does not change the fitted motion, so that it has no value: no slip was fitted.")
-        warnings.append(ResultWarning("friction-not-identified", text))
-    if BudgetSource.LEVELLING in uncertainty.shifts:
-        text = message(
-            "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
-            " mrad, which its uncertainty includes."
+        warnings.append(
+            result_warning(
+                "friction-not-identified",
+                "f_d does not change the fitted motion, so that it has no value: no slip was fitted.",
+            )
         )
-        warnings.append(ResultWarning("tilt-not-identified", text))
+    if BudgetSource.LEVELLING in uncertainty.shifts:
+        warnings.append(
+            result_warning(
+                "tilt-not-identified",
+                "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
+                " mrad, which its uncertainty includes.",
+            )
+        )
     if chosen.law.has_static_friction and not chosen.determines(Parameter.FRICTION_STATIC):
-        text = message("no stick ends in a slip: f_s has bounds, but no value.")
-        warnings.append(ResultWarning("static-not-identified", text))
+        warnings.append(
+            result_warning("static-not-identified", "no stick ends in a slip: f_s has bounds, but no value.")
+        )
     return warnings
 
 
@@ -122,17 +131,18 @@ def tail_warnings(decay: FreeDecay) -> list[ResultWarning]:
     cause = (
         message("dry friction in the stand") if bend < 0.0 else message("damping that grows with the swing")
     )
-    text = message(
-        "the stick tail does not decay exponentially ({bend:.0f} standard deviations), as from"
-        " {cause}: n1 is a mean. Identify a run of the bare table.",
-        bend=abs(bend),
-        cause=cause,
-    )
-    return [ResultWarning("tail-not-exponential", text)]
+    return [
+        result_warning(
+            "tail-not-exponential",
+            "the stick tail does not decay exponentially ({bend:.0f} standard deviations), as from"
+            " {cause}: n1 is a mean. Identify a run of the bare table.",
+            bend=abs(bend),
+            cause=cause,
+        )
+    ]
 
 
 def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:
-    """Tell whether the mean square is within the band that both samples' sizes allow."""
     ratio = float(np.mean(residual**2)) / noise_m**2
     spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
     return ratio <= float(np.exp(_BAND * spread))
@@ -184,7 +194,6 @@ class JointFit:
 
     @property
     def end_s(self) -> float:
-        """Last reading of gauge 1."""
         return float(self.decay.table.time_s[-1])
 
     @property

@@ -16,7 +16,7 @@ from analysis.formatting import format_number
 from analysis.laws.catalogue import COMPARED_LAWS, WIDEST_LAW
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError
 from analysis.results.joint_fit import JointFit
 from messages.message import message
@@ -57,19 +57,20 @@ def mass_warnings(joint: JointFit) -> list[ResultWarning]:
         return []
     plate = record.masses.plate_mass_kg
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
-    text = message(
-        "a table of {found} kg under the plate of {plate} kg would explain this motion, one of {given} kg"
-        " does not. Check both masses{swapped}: friction and stiffness depend on them.",
-        found=format_number(found, 4),
-        plate=format_number(plate, 4),
-        given=format_number(given, 4),
-        swapped=message(", they look swapped") if swapped else "",
-    )
-    return [ResultWarning("masses-contradict-motion", text)]
+    return [
+        result_warning(
+            "masses-contradict-motion",
+            "a table of {found} kg under the plate of {plate} kg would explain this motion, one of {given} kg"
+            " does not. Check both masses{swapped}: friction and stiffness depend on them.",
+            found=format_number(found, 4),
+            plate=format_number(plate, 4),
+            given=format_number(given, 4),
+            swapped=message(", they look swapped") if swapped else "",
+        )
+    ]
 
 
 def _loosened(problem: FitProblem, fit: Fit) -> Fit:
-    """The fit refined with the table mass free."""
     mass = fit.value(Parameter.TABLE_MASS)
     loose = problem.with_prior(Parameter.TABLE_MASS, mass, _LOOSE * mass)
     return fit_at_minimum(loose, fit.law, loose.minimise(fit.parameters, fit.law))

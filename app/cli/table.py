@@ -5,8 +5,10 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from analysis.audit import audit
-from analysis.campaign.campaign import Campaign, compare_all_with_published
+import msgspec
+
+from analysis.audit import PublishedRow, audit
+from analysis.campaign.campaign import Campaign, compare_with_published
 from app.cli import output as out
 from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
@@ -54,15 +56,16 @@ def table_content(gathered: CollectedRuns, campaign: Campaign, *, published: boo
 
 def _published(campaign: Campaign) -> dict[str, PublishedRowComparison]:
     """The paper's rows of the series that were found, with what the audit says of them."""
-    stand, printed = load_stand(), published_table()
-    beside = compare_all_with_published(campaign.rows, printed)
-    report = audit(
+    stand = load_stand()
+    printed = msgspec.convert(published_table(), dict[str, PublishedRow], from_attributes=True)
+    beside = compare_with_published(campaign.rows, printed)
+    audited = audit(
         [printed[label] for label in beside],
         table_mass_kg=stand.table_mass_kg,
         pullbacks_m={label: stand.series(label).pullback_m for label in beside},
         gravity_m_per_s2=stand.gravity_m_per_s2,
     )
-    flags = {row.series: tuple(row.flags) for row in report.rows}
+    flags = {row.series: tuple(row.flags) for row in audited}
     return {label: PublishedRowComparison(figures, flags[label]) for label, figures in beside.items()}
 
 

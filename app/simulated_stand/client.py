@@ -69,7 +69,6 @@ class SimulatedStand:
 
     @classmethod
     def start(cls, options: SimulatedStandOptions) -> Self:
-        """Start the process and wait until its port can be opened. Raises SimulatedStandError."""
         return cls(spawn("app.simulated_stand", msgspec.json.encode(options).decode()))
 
     @property

@@ -34,7 +34,6 @@ class Timetable:
 
     @property
     def release_s(self) -> float:
-        """From the beginning of a test to its release."""
         return self.rest_s + self.pull_s + self.hold_s
 
     @property
@@ -43,7 +42,6 @@ class Timetable:
 
     @property
     def cycle_s(self) -> float:
-        """From the beginning of a test to the beginning of the next."""
         return self.parts_s if self.every_s is None else self.every_s
 
 

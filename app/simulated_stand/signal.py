@@ -93,9 +93,7 @@ class GaugeFaults:
     """What one gauge adds to the true displacement."""
 
     noise_m: float = 0.0
-    """Standard deviation of white noise (m)."""
     drift_m_per_s: float = 0.0
-    """Creep of the zero since the beginning of the test (m/s)."""
     nonlinearity_m: float = 0.0
     """Largest deviation from the calibration line, at half range (m)."""
     clip_m: float | None = None

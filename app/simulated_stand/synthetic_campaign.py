@@ -182,7 +182,6 @@ def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]
 
 
 def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]) -> TwoMassParameters:
-    """The same with the f_d of one run."""
     own = parameters.friction_dynamic * (1.0 + scatter * np.random.default_rng(seed).standard_normal())
     static = parameters.friction_static
     return replace(
@@ -206,7 +205,6 @@ class Comparison(msgspec.Struct, frozen=True):
 
     @property
     def is_covered(self) -> bool:
-        """Whether the 95 % interval holds the truth."""
         return self.interval_95[0] <= self.truth <= self.interval_95[1]
 
 

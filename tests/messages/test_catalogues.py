@@ -114,7 +114,7 @@ def test_texts_are_read_from_the_syntax_tree(tmp_path: Path) -> None:
 CODE = "not-a-message"
 NAME = N_("Name")
 def fail(path, count, first):
-    warn = ResultWarning("too-short", message("only {time_s:.1f} s" " are left", time_s=1.0))
+    warn = result_warning("too-short", "only {time_s:.1f} s" " are left", time_s=1.0)
     if count:
         raise errors.PortError("{port} is " "busy", port=path)
     if first:

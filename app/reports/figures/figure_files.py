@@ -33,7 +33,6 @@ class FigureFile(msgspec.Struct, frozen=True):
     """A written figure."""
 
     figure: str
-    """Number in the paper."""
     file: str
     caption: str
     run: str = ""
@@ -48,7 +47,6 @@ class FigureFolder(msgspec.Struct, frozen=True):
     replace: bool = False
 
     def check(self) -> None:
-        """Check that the folder can be created and written to. Raises WriteError."""
         path = Path(self.path)
         there = next(place for place in (path, *path.parents) if place.exists())
         if not there.is_dir():
@@ -57,14 +55,12 @@ class FigureFolder(msgspec.Struct, frozen=True):
             raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
     def create(self) -> None:
-        """Create the folder. Raises WriteError."""
         try:
             Path(self.path).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise storage_error(Path(self.path), error) from None
 
     def check_not_existing(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
-        """Check that no figure exists already. Raises RunExistsError."""
         for number in numbers:
             for stem in [""] if number == FRICTION_FIGURE else stems:
                 file = self.file(number, stem)
@@ -80,7 +76,6 @@ class FigureFolder(msgspec.Struct, frozen=True):
     def write(
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
     ) -> FigureFile:
-        """Write one figure within `print_style`. Raises RunError."""
         self.create()
         target = self.file(number, stem)
         with atomic_write(target, replace=self.replace) as made:

@@ -90,7 +90,6 @@ def _look(colour: str, shade: float) -> dict[str, Any]:
 
 
 def _label(contact: str, names: Mapping[str, str]) -> str:
-    """Code, and below it the name in lines."""
     if not contact:
         return "contact\nunknown"
     lines = [contact]

@@ -41,18 +41,15 @@ class RunFigureData:
     time_s: Floats
     """(n,) float64: times of the readings since the release."""
     table_m: Floats
-    """(n,) float64."""
     relative_m: Floats | None
     """(n,) float64 or None: plate against table; None without a second gauge."""
     motion: MotionSamples | None
     """Of the fitted law; None without one."""
     slip_end_s: float | None
-    """Seconds since the release."""
     results: dict[str, Quantity]
 
     @classmethod
     def from_identification(cls, record: Record, found: Identification) -> Self:
-        """Curves of a record and its identification, from the release on."""
         release_s = found.events.release_s or float(record.time_s[0])
         first_s, last_s = _span_s(record, found, release_s)
         since_s = record.time_s - release_s
@@ -86,7 +83,6 @@ def _period_s(found: Identification) -> float:
 
 
 def _fitted_motion(record: Record, found: Identification) -> Motion | None:
-    """The fitted motion to the end of the record."""
     if found.model is None or "release_s" not in found.parameters:
         return None
     parameters = dict(found.parameters)
@@ -112,7 +108,6 @@ def _displacements(motion: Motion, since_s: Floats) -> tuple[Floats, Floats]:
 def _readings(
     record: Record, found: Identification, shown: NDArray[np.bool_], motion_m: tuple[Floats, Floats] | None
 ) -> tuple[Floats, Floats | None]:
-    """Simulated motion plus the residuals of the gauges."""
     gauges = [record.table_displacement_m, record.relative_displacement_m]
     if motion_m is None or found.curves is None:
         rest = [None if gauge is None else gauge[shown] - _middle(gauge) for gauge in gauges]
@@ -158,7 +153,6 @@ class RunFigure:
     """One of the paper's figures."""
 
     number: str
-    """In the paper: "3a"."""
     caption: str
     draw: Draw
     simulated: bool = True
@@ -219,7 +213,6 @@ def _accelerations(axes: Axes, run: RunFigureData) -> None:
 def _rates(
     axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], symbol: str, label: str, largest: str
 ) -> None:
-    """Draw both bodies with their largest values."""
     table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}')}"
     plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}')}"
     _bodies(axes, _motion(run).time_s, both, (table, plate))
@@ -268,7 +261,6 @@ def _simulated(axes: Axes, time_s: Floats, value: Floats) -> None:
 
 
 def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: tuple[str, str]) -> None:
-    """Draw table and plate in different colours and dashes."""
     axes.plot(time_s, values[0], color=TABLE, linewidth=0.9, label=labels[0])
     axes.plot(time_s, values[1], color=PLATE, linewidth=1.1, linestyle=DASHED, label=labels[1])
 

@@ -27,7 +27,6 @@ class TableContent:
     campaign: Campaign
     warnings: tuple[ResultWarning, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
-    """Runs without a result, with the reason."""
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
     """By the labels of the rows; None where not asked for."""
 

@@ -94,7 +94,6 @@ def _markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> lis
 
 
 def _marked(text: str) -> str:
-    """Escape text for Markdown."""
     return "".join(f"\\{one}" if one in "\\`*_[]<>|#" else " " if one in "\r\n" else one for one in text)
 
 
@@ -122,7 +121,6 @@ def _latex(content: TableContent) -> str:
 
 
 def _latex_cell(text: str) -> str:
-    """A cell with minus signs and ranges in LaTeX."""
     shown = escape_latex(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
     if shown.startswith(("[", "*")):  # after the end of a row these would belong to it
         return f"{{{shown[0]}}}{shown[1:]}"

@@ -166,7 +166,6 @@ def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> 
 
 
 def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
-    """Column indices of each block."""
     block, used = [0], widths[0]
     for place, wide in enumerate(widths[1:], start=1):
         if len(block) > 1 and used + len(_GAP) + wide > width:

@@ -47,9 +47,7 @@ class CampaignReportInput:
     content: TableContent
     gathered: CollectedRuns
     prints: Sequence[Fingerprint]
-    """Of every run that was read, in the order of `gathered.runs`."""
     shown: Sequence[Analysis]
-    """Runs whose motion is drawn."""
     folder: str
     """Common folder of all runs; paths are relative to it."""
 

@@ -56,7 +56,6 @@ def printable(text: str) -> str:
 
 @contextmanager
 def _compiler(report: Report) -> Iterator[typst.Compiler]:
-    """Compiler of a report. Raises WriteError where typesetting fails."""
     document = msgspec.json.encode(_printable(msgspec.to_builtins(report))).decode()
     with as_file(files("app.reports.test_report") / "template.typ") as template:
         try:
@@ -74,7 +73,6 @@ def _compiler(report: Report) -> Iterator[typst.Compiler]:
 
 
 def _printable(value: Any, key: str = "") -> Any:
-    """Make every text of a document printable, except SVG."""
     if isinstance(value, dict):
         return {name: _printable(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.audit import KILOGRAM_FORCE_N
-from analysis.campaign.campaign import compare_all_with_published, summarize
+from analysis.campaign.campaign import compare_with_published, summarize
 from analysis.campaign.series import SeriesKey
 from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
 from config.files import published_table
@@ -198,7 +198,7 @@ def test_print_stands_beside_what_was_found():
     values = {"stiffness_n_per_m": (66_000.0, 10.0, 0.0), FRICTION: (0.11, 0.005, 0.0)}
     key = SeriesKey("9XXM0", "XX", 0.012, 22.4, 131.6)
     rows = summarize([run("a", "1FFM0", values), friction_run("b", key, 0.1)]).rows
-    beside = compare_all_with_published(rows, published_table())
+    beside = compare_with_published(rows, published_table())
     by_name = {one.name: one for one in beside["1FFM0"]}
 
     assert list(beside) == ["1FFM0"]

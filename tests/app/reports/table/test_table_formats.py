@@ -9,7 +9,7 @@ from dataclasses import replace
 import openpyxl
 import pytest
 
-from analysis.campaign.campaign import Excluded, compare_all_with_published, summarize
+from analysis.campaign.campaign import Excluded, compare_with_published, summarize
 from analysis.campaign.series import SeriesKey
 from analysis.formatting import format_concise
 from app.reports.table.content import PublishedRowComparison, TableContent, row_cells, table_headers
@@ -46,7 +46,7 @@ def content():
     campaign = replace(campaign, excluded=(Excluded("=bad.h5", HOSTILE),))
     printed = {
         label: PublishedRowComparison(figures, ("damping",))
-        for label, figures in compare_all_with_published(campaign.rows, published_table()).items()
+        for label, figures in compare_with_published(campaign.rows, published_table()).items()
     }
     return TableContent(campaign, (), (("broken.h5", "it is no run. Leave it out"),), printed)
 
