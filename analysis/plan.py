@@ -6,6 +6,7 @@ parabola (f_s close to f_d), a real test may report a larger uncertainty.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -24,8 +25,9 @@ from analysis.preparation.free_decay import TAIL_PERIODS_MIN
 from analysis.quantities import BudgetLine, Quantity, ResultWarning, result_warning
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
 from analysis.results.fitted_quantities import msk64_degree
-from analysis.results.joint_fit import add_systematic_uncertainty
+from analysis.results.joint_fit import FRICTION_PARAMETERS, add_systematic_uncertainty
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
+from messages.i18n import N_
 from messages.message import joined, message
 
 CLOCK_UNCERTAINTY = 5e-5
@@ -170,7 +172,7 @@ def plan(test: PlannedTest) -> Plan:
         tests_without_recentring=next((count for count in range(_TESTS_MAX) if not fits(count)), None),
         results=budget.results,
         budget=budget.lines,
-        warnings=_warnings(test, motion, (table_use, relative_use), budget),
+        warnings=list(_warnings(test, motion, (table_use, relative_use), budget)),
     )
 
 
@@ -196,7 +198,7 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
         return budget
     fit = _fit(test, problem)
     fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
-    for place, name in _FRICTIONS:
+    for place, name in FRICTION_PARAMETERS.items():
         if place in test.law.free_parameters and fit.determines(place):
             weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
@@ -209,12 +211,6 @@ def smallest_pullback_m(parameters: TwoMassParameters) -> float:
     k1, _ = _joint(parameters)
     limit = parameters.static_or_dynamic - abs(parameters.tilt_rad)
     return parameters.gravity_m_per_s2 * limit / k1**2
-
-
-_FRICTIONS = (
-    (Parameter.FRICTION_DYNAMIC, "friction_dynamic"),
-    (Parameter.FRICTION_STATIC, "friction_static"),
-)
 
 
 def _joint(parameters: TwoMassParameters) -> tuple[float, float]:
@@ -297,74 +293,39 @@ def _rest_s(test: PlannedTest) -> float | None:
 
 def _warnings(
     test: PlannedTest, motion: Motion, uses: tuple[RangeUse, RangeUse], budget: UncertaintyBudget
-) -> list[ResultWarning]:
-    found = [*_range_warnings(uses)]
+) -> Iterator[ResultWarning]:
+    remedies = (message("Pull back less."), message("Place the plate off centre, or pull back less."))
+    for number, use, remedy in zip((1, 2), uses, remedies, strict=True):
+        if use.range_m is not None and not use.fits():
+            yield result_warning(
+                f"gauge-{number}-range",
+                "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
+                " readings are left out. {remedy}",
+                number=number,
+                read=f"{MILLIMETRE.number(use.lowest_m, 2)} to {MILLIMETRE.text(use.highest_m, 2)}",
+                range_m=MILLIMETRE.scale * use.range_m,
+                remedy=remedy,
+            )
     if motion.slip_end_s == 0.0:
         needed_mm = MILLIMETRE.scale * smallest_pullback_m(test.parameters)
-        return [
-            *found,
-            result_warning(
-                "no-slip",
-                "the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.",
-                needed_mm=needed_mm,
-            ),
-        ]
+        template = N_("the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm.")
+        yield result_warning("no-slip", template, needed_mm=needed_mm)
+        return
     if motion.slip_end_s >= test.duration_s:
-        found.append(
-            result_warning(
-                "slip-to-end",
-                "the plate will still slip after {duration_s:g} s. Record longer.",
-                duration_s=test.duration_s,
-            )
-        )
+        template = N_("the plate will still slip after {duration_s:g} s. Record longer.")
+        yield result_warning("slip-to-end", template, duration_s=test.duration_s)
     elif test.duration_s < (needed_s := motion.slip_end_s + TAIL_PERIODS_MIN * test.period_s):
-        found.append(
-            result_warning(
-                "tail-too-short",
-                "the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more.",
-                needed_s=needed_s,
-            )
-        )
+        template = N_("the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more.")
+        yield result_warning("tail-too-short", template, needed_s=needed_s)
     if "friction_dynamic" not in budget.results:
-        found.append(
-            result_warning(
-                "friction-undetermined",
-                "the record will not tell f_d. Sample faster and longer, within the gauges' ranges.",
-            )
+        yield result_warning(
+            "friction-undetermined",
+            "the record will not tell f_d. Sample faster and longer, within the gauges' ranges.",
         )
-    unstated = [
-        message("gauge {gauge}", gauge=number)
-        for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
-        if gauge.gain_relative is None
-    ]
-    if unstated:
-        found.append(
-            result_warning(
-                "gain-not-stated",
-                "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
-                gauges=joined(unstated, " and "),
-            )
+    gauges = {1: test.table_gauge, 2: test.relative_gauge}
+    if unstated := [number for number, gauge in gauges.items() if gauge.gain_relative is None]:
+        yield result_warning(
+            "gain-not-stated",
+            "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
+            gauges=joined([message("gauge {gauge}", gauge=number) for number in unstated], " and "),
         )
-    return found
-
-
-def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
-    found = []
-    for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
-        if use.range_m is not None and not use.fits():
-            read = f"{MILLIMETRE.number(use.lowest_m, 2)} to {MILLIMETRE.text(use.highest_m, 2)}"
-            found.append(
-                result_warning(
-                    f"gauge-{number}-range",
-                    "gauge {number} will read {read}, beyond its range of {range_m:.2f} mm: clipped"
-                    " readings are left out. {remedy}",
-                    number=number,
-                    read=read,
-                    range_m=MILLIMETRE.scale * use.range_m,
-                    remedy=remedy,
-                )
-            )
-    return found
-
-
-_RANGE_REMEDIES = (message("Pull back less."), message("Place the plate off centre, or pull back less."))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 from messages.i18n import N_
 from messages.message import Message, message
@@ -35,7 +35,7 @@ class ResultWarning:
     message: Message
 
 
-def result_warning(code: str, template: str, /, **values: object) -> ResultWarning:
+def result_warning(code: str, template: str, /, **values: Any) -> ResultWarning:
     """Warning with the message of `template` and `values`."""
     return ResultWarning(code, message(template, **values))
 

@@ -1,6 +1,7 @@
 """Calibration of a gauge: curve through counts and displacements, gain, zero, and their uncertainties."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -64,10 +65,7 @@ class CalibrationCurve:
                 degree=self.polynomial.degree(),
             )
         zero = float(near[np.argmin(np.abs(near - np.clip(near, low, high)))])
-        self._check_one_to_one(min(low, zero), max(high, zero))
-        return zero
-
-    def _check_one_to_one(self, low: float, high: float) -> None:
+        low, high = min(low, zero), max(high, zero)
         slopes = self.polynomial.deriv()(np.linspace(low, high, 201))
         if slopes.min() * slopes.max() <= 0.0:
             raise CalibrationError(
@@ -77,6 +75,7 @@ class CalibrationCurve:
                 low=format_number(low, 7),
                 high=format_number(high, 7),
             )
+        return zero
 
     def _rows(self, counts: Floats) -> Floats:
         offset, scale = self.polynomial.mapparms()
@@ -145,11 +144,14 @@ def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> Ga
     loops = [
         abs(mean - means[step, -1]) for (step, way), mean in means.items() if way == 1 and (step, -1) in means
     ]
+    repeated = [cell for _, _, cell in cells if len(cell) > 1]
+    freedom = sum(len(cell) - 1 for cell in repeated)
+    squares = sum(float(np.sum((cell - cell.mean()) ** 2)) for cell in repeated)
     lowest = residual_m[steps == 0]
     return GaugeCharacteristics(
         max(abs(mean) for mean in means.values()),
         max(loops, default=None),
-        _repeatability([cell for _, _, cell in cells]),
+        math.sqrt(squares / freedom) if freedom else None,
         float(lowest[0] - lowest[-1]) if len(lowest) > 1 else None,
     )
 
@@ -164,15 +166,6 @@ def step_means(readings: CalibrationPoints) -> tuple[Floats, Floats]:
         means.append(np.mean(both, axis=0))
     counts, dial_m = np.array(means).T
     return counts, dial_m
-
-
-def _repeatability(cells: list[Floats]) -> float | None:
-    repeated = [cell for cell in cells if len(cell) > 1]
-    freedom = sum(len(cell) - 1 for cell in repeated)
-    if not freedom:
-        return None
-    squares = sum(float(np.sum((cell - cell.mean()) ** 2)) for cell in repeated)
-    return float(np.sqrt(squares / freedom))
 
 
 _DOUBTFUL: Final = 8.0
@@ -269,23 +262,19 @@ def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: 
     residual = points.dial_m - curve.polynomial(points.counts)
     characteristics = gauge_characteristics(points, residual)
     gain, bends = _about(curve, zero)
-    budget = _budget(curve, zero, dial, characteristics)
-    relative, zero_m, whole = (
-        _combined(budget, name) for name in ("gain_m_per_count", "zero", "displacement")
-    )
+    shares = _contributions(curve, zero, dial, characteristics)
     freedom = curve.degrees_of_freedom
-    gain_share, zero_share = _share(budget, "gain_m_per_count"), _share(budget, "zero")
     return Calibration(
-        _quantity(gain, abs(gain) * relative, gain_share, freedom, "m/count"),
-        _quantity(zero, zero_m / abs(gain), zero_share, freedom, "count"),
+        _quantity(gain, abs(gain), shares["gain_m_per_count"], freedom, "m/count"),
+        _quantity(zero, 1.0 / abs(gain), shares["zero"], freedom, "count"),
         bends,
-        zero_m,
-        whole,
+        _combined(shares["zero"]),
+        _combined(shares["displacement"]),
         characteristics,
         curve.scatter_m,
         points,
         residual,
-        budget,
+        tuple(BudgetLine(source, name, size) for name, of in shares.items() for source, size in of.items()),
         tuple(_warnings(points, residual, dial, characteristics)),
     )
 
@@ -301,9 +290,9 @@ def _about(curve: CalibrationCurve, zero: float) -> tuple[float, tuple[float, ..
     return gain, tuple(term / gain**power for power, term in enumerate(taylor[1:], start=2))
 
 
-def _budget(
+def _contributions(
     curve: CalibrationCurve, zero: float, dial: DialGauge, characteristics: GaugeCharacteristics
-) -> tuple[BudgetLine, ...]:
+) -> dict[str, dict[BudgetSource, float]]:
     """Each source's standard uncertainty of gain (relative), zero and displacement (m)."""
     # Few steps may lie on a line by chance; the resolution of the dial is the lower limit.
     scatter_m = max(curve.scatter_m, dial.reading_uncertainty_m)
@@ -312,7 +301,7 @@ def _budget(
     drift_m = abs(characteristics.zero_drift_m or 0.0) / _SQRT12
     at = np.linspace(curve.ends[0], curve.ends[1], 21)
     at_zero = float(curve.standard_uncertainty(np.array([zero]))[0])
-    contributions = {
+    return {
         "gain_m_per_count": {
             BudgetSource.READINGS: scatter_m * curve.chord_standard_uncertainty() / span_m,
             BudgetSource.DIAL_GAUGE: math.sqrt(2.0) * certificate_m / span_m,
@@ -330,38 +319,32 @@ def _budget(
             BudgetSource.REPEATABILITY: characteristics.repeatability_m or 0.0,
         },
     }
-    return tuple(
-        BudgetLine(source, name, uncertainty)
-        for name, shares in contributions.items()
-        for source, uncertainty in shares.items()
-    )
 
 
-def _combined(budget: tuple[BudgetLine, ...], name: str) -> float:
-    lines = [line.standard_uncertainty for line in budget if line.contribution_to == name]
-    return math.sqrt(sum(value * value for value in lines if not math.isnan(value)))
+def _combined(shares: dict[BudgetSource, float]) -> float:
+    return math.hypot(*(value for value in shares.values() if not math.isnan(value)))
 
 
-def _share(budget: tuple[BudgetLine, ...], name: str) -> float:
-    """Share of the readings, which have few degrees of freedom, in a standard uncertainty."""
-    whole = _combined(budget, name)
-    readings = _combined(tuple(line for line in budget if line.source is BudgetSource.READINGS), name)
-    return readings / whole if whole else 0.0
+def _quantity(
+    value: float, scale: float, shares: dict[BudgetSource, float], freedom: int, unit: str
+) -> Quantity:
+    """Quantity with the interval of the effective degrees of freedom (JCGM 100, G.2b).
 
-
-def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit: str) -> Quantity:
-    """Quantity with the interval of the effective degrees of freedom (JCGM 100, G.2b)."""
+    Of the sources (in units of 1 / `scale`) the readings alone have few degrees of freedom.
+    """
+    combined = _combined(shares)
+    share = shares[BudgetSource.READINGS] / combined if combined else 0.0
     effective = freedom / share**4 if share > 1e-3 else math.inf
-    half = float(stdtrit(min(effective, 1e6), 0.975)) * uncertainty
-    return Quantity(value, uncertainty, (value - half, value + half), unit)
+    half = float(stdtrit(min(effective, 1e6), 0.975)) * scale * combined
+    return Quantity(value, scale * combined, (value - half, value + half), unit)
 
 
 def _warnings(
     readings: CalibrationPoints, residual_m: Floats, dial: DialGauge, characteristics: GaugeCharacteristics
-) -> list[ResultWarning]:
+) -> Iterator[ResultWarning]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
-    warnings = [
-        result_warning(
+    for place in np.flatnonzero(np.abs(residual_m) > _DOUBTFUL * usual_m):
+        yield result_warning(
             "reading-doubtful",
             "reading {place}, {dial_m:.4g} mm, is {residual_m:+.3f} mm off the curve. Check it for a"
             " misread turn of the dial",
@@ -369,16 +352,11 @@ def _warnings(
             dial_m=readings.dial_m[place] * 1e3,
             residual_m=residual_m[place] * 1e3,
         )
-        for place in np.flatnonzero(np.abs(residual_m) > _DOUBTFUL * usual_m)
-    ]
-    missing = (
-        (dial.standard_uncertainty_m, "dial-uncertainty-not-stated", _DIAL_NOT_STATED),
-        (characteristics.hysteresis_m, "one-way-only", _ONE_WAY_ONLY),
-        (characteristics.repeatability_m, "one-round-only", _ONE_ROUND_ONLY),
-    )
-    return warnings + [result_warning(code, text) for value, code, text in missing if value is None]
-
-
-_DIAL_NOT_STATED = N_("the dial gauge's own uncertainty is not stated and not counted.")
-_ONE_WAY_ONLY = N_("hysteresis cannot be determined without readings up and down.")
-_ONE_ROUND_ONLY = N_("repeatability cannot be determined from one round.")
+    if dial.standard_uncertainty_m is None:
+        template = N_("the dial gauge's own uncertainty is not stated and not counted.")
+        yield result_warning("dial-uncertainty-not-stated", template)
+    if characteristics.hysteresis_m is None:
+        template = N_("hysteresis cannot be determined without readings up and down.")
+        yield result_warning("one-way-only", template)
+    if characteristics.repeatability_m is None:
+        yield result_warning("one-round-only", "repeatability cannot be determined from one round.")

@@ -1,6 +1,7 @@
 """Check of a calibration against a known displacement."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +15,6 @@ _BLUNT: Final = 0.05
 """A tolerance above this share of the displacement passes errors of a gain that matter for f_d."""
 _BOTH_ENDS: Final = math.sqrt(2.0)
 _SQRT12: Final = math.sqrt(12.0)
-_MEASURED: Final = "measured_m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,44 +129,34 @@ def _budget(
 ) -> tuple[BudgetLine, ...]:
     gain = math.nan if claim.gain_relative is None else claim.gain_relative
     known_m = math.nan if reference.standard_uncertainty_m is None else reference.standard_uncertainty_m
-    lines = [
-        (BudgetSource.CALIBRATION_GAIN, gain * abs(reference.displacement_m)),
-        (BudgetSource.KNOWN_DISPLACEMENT, known_m),
-        (BudgetSource.READINGS, math.hypot(rest.standard_uncertainty_m, moved.standard_uncertainty_m)),
-    ]
+    sizes_m = {
+        BudgetSource.CALIBRATION_GAIN: gain * abs(reference.displacement_m),
+        BudgetSource.KNOWN_DISPLACEMENT: known_m,
+        BudgetSource.READINGS: math.hypot(rest.standard_uncertainty_m, moved.standard_uncertainty_m),
+    }
     if not reference.is_electric:
         nonlinearity_m = (claim.nonlinearity_m or 0.0) / math.sqrt(3.0)
-        lines += [
-            (BudgetSource.NONLINEARITY, _BOTH_ENDS * nonlinearity_m),
-            (BudgetSource.REPEATABILITY, _BOTH_ENDS * (claim.repeatability_m or 0.0)),
-        ]
-    return tuple(BudgetLine(source, _MEASURED, uncertainty_m) for source, uncertainty_m in lines)
+        sizes_m[BudgetSource.NONLINEARITY] = _BOTH_ENDS * nonlinearity_m
+        sizes_m[BudgetSource.REPEATABILITY] = _BOTH_ENDS * (claim.repeatability_m or 0.0)
+    return tuple(BudgetLine(source, "measured_m", size_m) for source, size_m in sizes_m.items())
 
 
 def _warnings(
     reference: ReferenceDisplacement, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
-) -> list[ResultWarning]:
-    template = N_("the uncertainty of the {source} is not stated and not counted.")
-    warnings = [
-        result_warning("not-stated", template, source=line.source.label)
-        for line in budget
-        if math.isnan(line.standard_uncertainty)
-    ]
+) -> Iterator[ResultWarning]:
+    for line in budget:
+        if math.isnan(line.standard_uncertainty):
+            template = N_("the uncertainty of the {source} is not stated and not counted.")
+            yield result_warning("not-stated", template, source=line.source.label)
     share = COVERAGE * combined_m / abs(reference.displacement_m)
     if share > _BLUNT:
-        warnings.append(
-            result_warning(
-                "check-blunt",
-                "an error of {share:.0%} would pass. Take a larger displacement, or a more certain one.",
-                share=share,
-            )
+        template = N_(
+            "an error of {share:.0%} would pass. Take a larger displacement, or a more certain one."
         )
+        yield result_warning("check-blunt", template, share=share)
     if measured_m * reference.displacement_m < 0.0:
-        warnings.append(
-            result_warning(
-                "other-way",
-                "the gauge shows a displacement to the other side. Check its direction, its plugs"
-                " and the sign that was given.",
-            )
+        yield result_warning(
+            "other-way",
+            "the gauge shows a displacement to the other side. Check its direction, its plugs"
+            " and the sign that was given.",
         )
-    return warnings

@@ -48,8 +48,8 @@ def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
         found = [(each, some) for each, some in zip(series, values, strict=True) if some]
         kinds = ["" if column.is_of_stand else each.key.contact for each, _ in found]
         pooled = pool([some for _, some in found], proportional=column.is_proportional, kinds=kinds)
-        for (each, _), one in zip(found, pooled, strict=True):
-            quantities[each.label][name] = one
+        for (each, _), quantity in zip(found, pooled, strict=True):
+            quantities[each.label][name] = quantity
     return tuple(_row(each, quantities[each.label]) for each in series)
 
 

@@ -17,7 +17,7 @@ from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
 from analysis.record import AnalysisError, Record
-from analysis.results.joint_fit import SIGNED_PARAMETERS, DecayConstants, JointFit
+from analysis.results.joint_fit import FRICTION_PARAMETERS, SIGNED_PARAMETERS, DecayConstants, JointFit
 from analysis.uncertainty import (
     COVERAGE_FACTOR_95,
     LEVELLING_UNCERTAINTY_RAD,
@@ -39,13 +39,14 @@ def add_fitted_quantities(
     profiled = joint.selection.adequate or fit.law.solver.is_closed_form
     own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
     of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
-    for place, name, unit in (*_FRICTION, *of_law, *_STAND):
+    friction = [(place, name, "1") for place, name in FRICTION_PARAMETERS.items()]
+    for place, name, unit in (*friction, *of_law, *_STAND):
         if fit.determines(place):
             sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
             weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
             shares, reach = fitted.contributions(weights), None
-            if profiled and fit.law.has_static_friction and place in _PROFILED:
+            if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
                 shares, reach = _by_profile(joint.problem, fit, place, shares)
             budget.add(name, sign * fit.value(place), unit, shares, reach)
     if slip_ended:
@@ -114,13 +115,7 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
     budget.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
 
 
-_FRICTION = (
-    (Parameter.FRICTION_DYNAMIC, "friction_dynamic", "1"),
-    (Parameter.FRICTION_STATIC, "friction_static", "1"),
-)
-_STAND = ((Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m"))
-_PROFILED = (Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC)
-"""Parameters about which chi-square may have kinks."""
+_STAND = (Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m")
 _RATES = (
     ("table_velocity_max_m_per_s", "m/s"),
     ("plate_velocity_max_m_per_s", "m/s"),

@@ -1,6 +1,6 @@
 """The joint fit of a record: choice of the law, its verdict and uncertainty, curves, and decay constants."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from analysis.uncertainty import (
     numerical_gradient,
     propagate_with_model_choice,
 )
+from messages.i18n import N_
 from messages.message import message
 
 _BAND = 3.2905
@@ -58,15 +59,12 @@ def assess_model(
     """
     adequate = True
     residuals = (chosen.table_residual_m, chosen.relative_residual_m)
-    times = (
-        problem.table.time_s,
-        problem.table.time_s if problem.relative is None else problem.relative.time_s,
-    )
-    for residual, time, noise, readings in zip(
-        residuals, times, problem.noise_m, noise_readings, strict=True
-    ):
+    channels = (problem.table, problem.relative or problem.table)
+    gauges = zip(residuals, channels, problem.noise_m, noise_readings, strict=True)
+    for residual, channel, noise, readings in gauges:
         if len(residual):
-            adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
+            white = _white(residual / noise, channel.time_s, period_s)
+            adequate &= _small_enough(residual, noise, readings) and white
     tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
@@ -87,59 +85,45 @@ def inadequate_warning(judged: ModelSelection) -> ResultWarning:
 
 def identifiability_warnings(
     chosen: Fit, uncertainty: ParameterUncertainty, *, slip_ended: bool
-) -> list[ResultWarning]:
+) -> Iterator[ResultWarning]:
     """Warn of what the record does not determine about the chosen law and its motion."""
-    warnings = []
     if not slip_ended:
-        warnings.append(
-            result_warning(
-                "slip-not-ended",
-                "by the fitted motion the plate slips at the end of the record or again after it: u_s"
-                " and the end of slip are not known. Record until the plate sticks.",
-            )
+        yield result_warning(
+            "slip-not-ended",
+            "by the fitted motion the plate slips at the end of the record or again after it: u_s"
+            " and the end of slip are not known. Record until the plate sticks.",
         )
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
-        warnings.append(
-            result_warning(
-                "friction-not-identified",
-                "f_d does not change the fitted motion, so that it has no value: no slip was fitted.",
-            )
+        yield result_warning(
+            "friction-not-identified",
+            "f_d does not change the fitted motion, so that it has no value: no slip was fitted.",
         )
     if BudgetSource.LEVELLING in uncertainty.shifts:
-        warnings.append(
-            result_warning(
-                "tilt-not-identified",
-                "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
-                " mrad, which its uncertainty includes.",
-            )
+        yield result_warning(
+            "tilt-not-identified",
+            "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"
+            " mrad, which its uncertainty includes.",
         )
     if chosen.law.has_static_friction and not chosen.determines(Parameter.FRICTION_STATIC):
-        warnings.append(
-            result_warning("static-not-identified", "no stick ends in a slip: f_s has bounds, but no value.")
-        )
-    return warnings
+        template = N_("no stick ends in a slip: f_s has bounds, but no value.")
+        yield result_warning("static-not-identified", template)
 
 
-def tail_warnings(decay: FreeDecay) -> list[ResultWarning]:
-    """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
+def tail_warnings(decay: FreeDecay) -> Iterator[ResultWarning]:
+    """Warn of a stick tail that does not decay exponentially, as dry friction in the stand makes it."""
     tail = decay.tail
     if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
-        return []
+        return
     bend = envelope_curvature(decay.table.between(tail.start_s, np.inf), tail)
-    if abs(bend) < _BEND_SIGMAS:
-        return []
-    cause = (
-        message("dry friction in the stand") if bend < 0.0 else message("damping that grows with the swing")
-    )
-    return [
-        result_warning(
+    if abs(bend) >= _BEND_SIGMAS:
+        damping = message("damping that grows with the swing")
+        yield result_warning(
             "tail-not-exponential",
             "the stick tail does not decay exponentially ({bend:.0f} standard deviations), as from"
             " {cause}: n1 is a mean. Identify a run of the bare table.",
             bend=abs(bend),
-            cause=cause,
+            cause=message("dry friction in the stand") if bend < 0.0 else damping,
         )
-    ]
 
 
 def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:
@@ -219,9 +203,8 @@ def joint_fit_uncertainty(
     record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, candidates: list[Fit]
 ) -> ParameterUncertainty:
     """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
-    return add_systematic_uncertainty(
-        record, problem, fit, propagate_with_model_choice(problem, fit, candidates, decay.period_s / 4.0)
-    )
+    own = propagate_with_model_choice(problem, fit, candidates, decay.period_s / 4.0)
+    return add_systematic_uncertainty(record, problem, fit, own)
 
 
 def add_systematic_uncertainty(
@@ -256,9 +239,13 @@ def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
     return column
 
 
-PARAMETER_NAMES = {
+FRICTION_PARAMETERS = {
     Parameter.FRICTION_DYNAMIC: "friction_dynamic",
     Parameter.FRICTION_STATIC: "friction_static",
+}
+"""Chi-square about them may have kinks."""
+PARAMETER_NAMES = {
+    **FRICTION_PARAMETERS,
     Parameter.STIFFNESS: "stiffness_n_per_m",
     Parameter.DAMPING: "damping_coefficient_kg_per_s",
     Parameter.PULLBACK: "pullback_m",

@@ -21,15 +21,14 @@ from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import refit_damped_cosine
 from analysis.quantities import Quantity
 from analysis.record import StandMasses
-from analysis.results.joint_fit import DecayConstants, JointFit, period_and_damping
+from analysis.results.joint_fit import FRICTION_PARAMETERS, DecayConstants, JointFit, period_and_damping
 from analysis.uncertainty import ParameterUncertainty
 
 LINEAR_DRAWS = 100_000
 _STEPS = 6
 _SPREAD = float(np.sqrt(3.0))
 _PARAMETERS = {
-    "friction_dynamic": Parameter.FRICTION_DYNAMIC,
-    "friction_static": Parameter.FRICTION_STATIC,
+    **{name: place for place, name in FRICTION_PARAMETERS.items()},
     "tilt_rad": Parameter.TILT,
     "pullback_m": Parameter.PULLBACK,
 }

@@ -99,14 +99,13 @@ def test_counts_of_the_papers_table():
     stand = files.load_stand()
     rows = msgspec.convert(list(files.published_table().values()), list[PublishedRow], from_attributes=True)
     pullbacks = {row.series: stand.series(row.series).pullback_m for row in rows}
-    counts = count_flags(
-        audit(
-            rows,
-            table_mass_kg=stand.table_mass_kg,
-            pullbacks_m=pullbacks,
-            gravity_m_per_s2=stand.gravity_m_per_s2,
-        )
+    audited = audit(
+        rows,
+        table_mass_kg=stand.table_mass_kg,
+        pullbacks_m=pullbacks,
+        gravity_m_per_s2=stand.gravity_m_per_s2,
     )
+    counts = count_flags(audited)
     assert tuple(counts) == FLAGS
     assert counts == {
         "stiffness_n_per_m": 36,
