@@ -125,7 +125,7 @@ def _repeatability_rows(campaign: Campaign) -> tuple[RepeatabilityRow, ...]:
 def _excluded_rows(runs: CollectedRuns, campaign: Campaign) -> tuple[RunRow, ...]:
     """Excluded runs, and why; those that an operator excluded can be included again."""
     by_name = {run.name: run for run in runs.runs}
-    by_operator = {name for name, details in runs.details.items() if details.excluded}
+    by_operator = {name for name, details in runs.details.items() if details.metadata.excluded}
     by_operator |= {excluded.run for excluded in runs.excluded}
     return tuple(
         RunRow(
