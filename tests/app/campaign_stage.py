@@ -11,11 +11,13 @@ from app.presenters.campaign.formatting import summarise
 from app.presenters.campaign.state import CampaignSummary
 from app.runs.campaign.collect import CollectedRuns, FailedRun
 from app.runs.campaign.run_result import RunDetails
-from app.runs.metadata import Conditions
+from app.runs.metadata import create_metadata
 from config.files import load_stand
+from config.schema import Gauge, Gauges
 from messages.message import message
 
 FOLDER = "/recordings"
+GAUGES = Gauges(*(Gauge(gain_m_per_count=1e-6, zero_count=0.0) for _ in range(2)))
 ALL_SERIES = ("1FFM0", "1FFM1", "1SSM0", "1SSM1")
 BEGUN = datetime.datetime(2026, 1, 12, tzinfo=datetime.UTC)
 TORN = FailedRun(f"{FOLDER}/torn.h5", message("it is no run. Choose another"))
@@ -65,12 +67,13 @@ def found(
     counted = tuple(replace(one, excluded=reasons.get(one.name, one.excluded)) for one in taken)
     details = {
         one.name: RunDetails(
-            one.name, BEGUN, one.series.code, "", "", "", Conditions(), 131.6, 22.4, "stand", "cal",
-            analysis=None if number < unsaved else 1, excluded=reasons.get(one.name, ""),
+            create_metadata(load_stand(), GAUGES, BEGUN).replace(
+                series=one.series.code, excluded=reasons.get(one.name, "")
+            ),
+            one.name,
+            analysis=None if number < unsaved else 1,
         )
         for number, one in enumerate(counted)
-    }  # fmt: skip
+    }
     stale = ResultWarning("stale", message("results of a.h5 were stale: new ones are taken."))
-    return summarise(
-        CollectedRuns(counted, failures, (stale,), details, {"stand": load_stand()}, {}), ALL_SERIES
-    )
+    return summarise(CollectedRuns(counted, failures, (stale,), details), ALL_SERIES)
