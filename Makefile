@@ -112,7 +112,7 @@ peers: setup
 	$(BIN)/python -m pytest tests -m peer -rA
 
 screenshots: setup
-	$(BIN)/python -m app.qt.screenshots docs/screenshots
+	$(BIN)/python -m tools.screenshots docs/screenshots
 
 study: setup
 	@for study in coverage wrong_models garbage one_mass campaign plan; do \

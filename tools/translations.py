@@ -20,8 +20,7 @@ from messages.i18n import DOMAIN, LOCALE
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = tuple(ROOT / name for name in ("analysis", "app", "config", "drivers", "messages"))
-ENGLISH_ONLY = (ROOT / "app" / "cli", ROOT / "app" / "qt" / "screenshots.py")
-"""The command line, and a program for developers."""
+ENGLISH_ONLY = ROOT / "app" / "cli"
 _FUNCTIONS = {"gettext", "N_", "message", "ngettext", "result_warning"}
 _CODE_FIRST = {"result_warning"}
 """Functions whose second argument is the text, after a code."""
@@ -32,7 +31,7 @@ def extract(folders: Iterable[Path] = PACKAGES) -> Catalog:
     """Collect the texts of a source tree. Raises ValueError where a text is an f-string."""
     catalogue = Catalog()
     for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
-        if any(path.is_relative_to(part) for part in ENGLISH_ONLY):
+        if path.is_relative_to(ENGLISH_ONLY):
             continue
         name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
         for text, line in _texts(path):

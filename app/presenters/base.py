@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from enum import Enum, StrEnum
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -87,17 +87,20 @@ class LabelledValue:
     value: str
 
 
+class NoticeAction(Enum):
+    """Action that a notice offers, and the text of its button."""
+
+    RECONNECT = N_("Connect again")
+    RECOVER = N_("Recover")
+
+
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Message above the screen, shown until it is dismissed.
-
-    `action` and `dismiss` are buttons; without an action there is only the latter. `details` can be unfolded
-    and copied.
-    """
+    """Message above the screen, shown until it is dismissed; `details` can be unfolded and copied."""
 
     text: str
     tone: Tone = Tone.BAD
-    action: str = ""
+    action: NoticeAction | None = None
     dismiss: str = N_("Dismiss")
     details: str = ""
 

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.presenters.base import Notice, Progress, Tone
+from app.presenters.base import Notice, NoticeAction, Progress, Tone
 from app.presenters.results import sentence
 from messages.i18n import N_, gettext, ngettext
 
-RECOVER = N_("Recover")
-LATER = N_("Later")
+_LATER = N_("Later")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,22 +19,23 @@ class RecoveryReport:
     errors: tuple[str, ...] = ()
 
 
+def offer_recovery(text: str, tone: Tone = Tone.BAD) -> Notice:
+    return Notice(text, tone, NoticeAction.RECOVER, _LATER)
+
+
 def recovery_question(count: int) -> Notice:
-    """Offer to recover unfinished runs."""
     text = ngettext("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
     text += " " + gettext("All that came is in a journal, and the run can be rebuilt from it.")
-    return Notice(text, Tone.WARN, RECOVER, LATER)
+    return offer_recovery(text, Tone.WARN)
 
 
 def recovery_progress(progress: Progress | None = None) -> Notice:
-    """Show the progress of the recovery."""
     if progress is None or progress.fraction is None:
         return Notice(gettext("Recovering runs"), Tone.PLAIN)
     return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
 
 
 def recovery_outcome(recovered: RecoveryReport) -> Notice:
-    """Show the result of the recovery."""
     names, parts = [Path(path).name for path in recovered.runs], []
     if len(names) == 1:
         parts.append(gettext("Recovered {name}", name=names[0]))

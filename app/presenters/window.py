@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Notice, Presenter, Progress, Tone
+from app.presenters.base import Notice, NoticeAction, Presenter, Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
@@ -25,7 +25,7 @@ from app.presenters.record.state import (
     RunsChanged,
     StandContext,
 )
-from app.presenters.recovery import LATER, RECOVER, RecoveryReport
+from app.presenters.recovery import RecoveryReport
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
@@ -36,15 +36,13 @@ from app.presenters.start_screen import PortChoice, StartPresenter, StartState
 from app.presenters.worker import EventWorker, LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
-from messages.i18n import N_, gettext
+from messages.i18n import gettext
 from messages.message import Message
 
 if TYPE_CHECKING:
     from app.presenters import analysis_task
 else:
     analysis_task = LazyModule("app.presenters.analysis_task")
-
-RECONNECT = N_("Connect again")
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +149,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(notice=None)
 
     def execute_notice_action(self) -> None:
-        offered = self.state.notice.action if self.state.notice else ""
+        action = self.state.notice.action if self.state.notice else None
         self._update(notice=None)
-        if offered == RECOVER:
+        if action is NoticeAction.RECOVER:
             self._recover_runs()
         else:
             self.reconnect()
@@ -276,7 +274,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
-            self._update(notice=self._failure_notice(event.message, RECONNECT))
+            self._update(notice=self._failure_notice(event.message, NoticeAction.RECONNECT))
 
     def _on_run_ended(self, event: RunEnded) -> None:
         if event.message:
@@ -287,9 +285,11 @@ class WindowPresenter(Presenter[WindowState]):
             self.identify.on_opening(event.path)
             self._analyse(event.path)
 
-    def _failure_notice(self, message: Message | str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
+    def _failure_notice(
+        self, message: Message | str, action: NoticeAction | None = None, tone: Tone = Tone.BAD
+    ) -> Notice:
         if self._count_unfinished():
-            return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
+            return recovery.offer_recovery(sentence(message))
         return Notice(sentence(message), tone, action)
 
     def _recover_runs(self) -> None:
@@ -307,7 +307,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.record.dispatch(RunsChanged())
 
     def _on_recovery_failed(self, failure: TaskFailure) -> None:
-        self._update(notice=Notice(sentence(failure.message), Tone.BAD, RECOVER, LATER))
+        self._update(notice=recovery.offer_recovery(sentence(failure.message)))
 
     def _analyse(self, path: str) -> None:
         self._workers.analysis.submit(

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QMainWindow,
     QPlainTextEdit,
-    QPushButton,
     QStackedWidget,
     QToolButton,
     QWidget,
@@ -20,6 +19,7 @@ from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter, WindowState
 from app.qt.screens import build_screen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
+from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import HelpDialog, add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label
@@ -49,12 +49,10 @@ class MainWindow(QMainWindow):
         self._import: QDialog | None = None
         self._help: QDialog | None = None
         self._stack = QStackedWidget()
-        self._notice = NoticeBar()
+        self._notice = NoticeBar(presenter)
         self._rail = {screen: self._rail_button(screen) for screen in Screen}
         self._lay_out()
         self._add_keys()
-        self._notice.acted.connect(presenter.execute_notice_action)
-        self._notice.dismissed.connect(presenter.dismiss_notice)
         theme.changed.connect(self._restyle)
         self._restyle()
         self.setWindowTitle("Slipstand")
@@ -194,25 +192,18 @@ _DETAILS_HEIGHT = 168
 class NoticeBar(QFrame):
     """Shows one notice, or nothing; its details are folded away."""
 
-    acted = Signal()
-    dismissed = Signal()
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, presenter: WindowPresenter) -> None:
+        super().__init__()
         self.setProperty("role", "notice")
         self._shown: Notice | None = None
         self._kind = label()
         self._text = label(wrap=True)
-        self._fold = QPushButton()
-        self._copy = QPushButton(gettext("Copy"))
-        self._action = QPushButton()
-        self._dismiss = QPushButton()
+        self._fold = make_button("", lambda: self._unfold(self._details.isHidden()))
+        self._copy = make_button(gettext("Copy"), self._copy_details)
+        self._action = make_button("", presenter.execute_notice_action)
+        self._dismiss = make_button("", presenter.dismiss_notice)
         self._details = _details_field()
         self._lay_out()
-        self._fold.clicked.connect(lambda _checked: self._unfold(self._details.isHidden()))
-        self._copy.clicked.connect(lambda _checked: self._copy_details())
-        self._action.clicked.connect(self.acted)
-        self._dismiss.clicked.connect(self.dismissed)
         self.hide()
 
     def show_notice(self, notice: Notice | None) -> None:
@@ -229,8 +220,8 @@ class NoticeBar(QFrame):
         self._kind.setVisible(bool(kind))
         self._text.setText(notice.text)
         self.setAccessibleName(f"{kind}: {notice.text}" if kind else notice.text)
-        self._action.setText(gettext(notice.action))
-        self._action.setVisible(bool(notice.action))
+        self._action.setText(gettext(notice.action.value) if notice.action else "")
+        self._action.setVisible(notice.action is not None)
         self._dismiss.setText(gettext(notice.dismiss))
         self._details.setPlainText(notice.details)
         self._fold.setVisible(bool(notice.details))

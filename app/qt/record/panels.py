@@ -1,22 +1,17 @@
 """Panels of the right column: guidance while recording, result and decision after a run."""
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.record.state import (
-    Action,
-    GuidanceState,
-    LiveEstimate,
-    LiveReadings,
-    PullbackTarget,
-    Step,
-    StepStatus,
-)
+from app.presenters.record import state as record
+from app.presenters.record.state import Action, NoteEdited, StepStatus
 from app.presenters.results import Result
 from app.qt.theme import TextRole, Theme, colour, set_property
-from app.qt.widgets.inputs import ShortcutSafeEdit
+from app.qt.widgets.inputs import ProgressBar, ShortcutSafeEdit, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import ValueLabel, break_path, label, padded, set_text_or_hide, show_chip
@@ -33,22 +28,18 @@ _BAR_RADIUS = 6.0
 class GuidancePanel(QWidget):
     """Stepper, instruction, target bar, live estimate and current readings."""
 
-    connect_wanted = Signal()
-
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self, theme: Theme, connect_device: Callable[[], object]) -> None:
         super().__init__()
-        self._connect = QPushButton(gettext("Connect"))
+        self._connect = make_button(gettext("Connect"), connect_device)
         self._connect.setProperty("scale", "large")
         self._connect.setProperty("primary", "true")
-        self._connect.clicked.connect(self.connect_wanted)
         self._instruction = label(role=TextRole.INSTRUCTION, wrap=True)
         self._detail = label(role=TextRole.HEADING, wrap=True)
         self._instruction.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._detail.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._target = TargetBar(theme)
         self._stepper = Stepper()
-        self._progress = QProgressBar()
-        self._progress.setTextVisible(False)
+        self._progress = ProgressBar()
         self._progress_text = label(muted=True)
         self._estimates = _value_labels(_ESTIMATES_MAX)
         self._note = label(muted=True, wrap=True)
@@ -76,7 +67,7 @@ class GuidancePanel(QWidget):
             of=self,
         )
 
-    def show_guidance(self, guidance: GuidanceState) -> None:
+    def show_guidance(self, guidance: record.GuidanceState) -> None:
         self._instruction.setText(guidance.instruction)
         self._detail.setText(guidance.detail)
         for widget, lines in ((self._instruction, 1), (self._detail, 2)):
@@ -89,20 +80,15 @@ class GuidancePanel(QWidget):
         self._connect.setVisible(not connected)
 
     def show_progress(self, progress: Progress | None) -> None:
-        self._progress_text.setVisible(progress is not None)
-        self._progress.setVisible(progress is not None)
-        if progress is None:
-            return
-        self._progress_text.setText(progress.text)
-        self._progress.setRange(0, 0 if progress.fraction is None else 100)
-        self._progress.setValue(round(100 * (progress.fraction or 0.0)))
+        set_text_or_hide(self._progress_text, progress.text if progress else "")
+        self._progress.show_progress(progress)
 
-    def show_live_estimate(self, estimate: LiveEstimate) -> None:
+    def show_live_estimate(self, estimate: record.LiveEstimate) -> None:
         for target, row in zip(self._estimates, padded(estimate.rows, _ESTIMATES_MAX, None), strict=True):
             target.show_row(row)
         set_text_or_hide(self._note, estimate.note)
 
-    def show_readings(self, readings: LiveReadings) -> None:
+    def show_readings(self, readings: record.LiveReadings) -> None:
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.value.setText(text)
         self._origin.setText(readings.origin)
@@ -132,11 +118,11 @@ class Stepper(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._steps: tuple[Step, ...] = ()
+        self._steps: tuple[record.Step, ...] = ()
         self._labels: list[QLabel] = []
         self._layout = make_row(spacing=4, of=self)
 
-    def show_steps(self, steps: tuple[Step, ...]) -> None:
+    def show_steps(self, steps: tuple[record.Step, ...]) -> None:
         if steps == self._steps:
             return
         self._steps = steps
@@ -163,14 +149,14 @@ class TargetBar(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._target: PullbackTarget | None = None
+        self._target: record.PullbackTarget | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:  # noqa: N802
         return QSize(240, _BAR_HEIGHT)
 
-    def show_target(self, target: PullbackTarget | None) -> None:
+    def show_target(self, target: record.PullbackTarget | None) -> None:
         self.setVisible(target is not None)
         if target == self._target:
             return
@@ -254,19 +240,17 @@ _DECISION_BUTTONS = {
 class DecisionPanel(QFrame):
     """Note and decision about a run: Keep, Repeat, Discard. Hidden while no run waits for a decision."""
 
-    acted = Signal(Action)
-    noted = Signal(str)
-    note_left = Signal()
-    """The keyboard focus belongs to the buttons again."""
-
-    def __init__(self) -> None:
+    def __init__(
+        self, dispatch: Callable[[record.RecordEvent], None], leave_note: Callable[[], None]
+    ) -> None:
         super().__init__()
+        self._dispatch = dispatch
         self._note = ShortcutSafeEdit()
         self._note.setPlaceholderText(gettext("Note, kept with the run (N)"))
         self._note.setToolTip(gettext("Enter keeps the run with this note, Esc leaves the field"))
         self._note.setAccessibleName(gettext("Note on this run"))
-        self._note.textEdited.connect(self.noted)
-        self._note.left.connect(self.note_left)
+        self._note.textEdited.connect(lambda note: dispatch(NoteEdited(note)))
+        self._note.left.connect(leave_note)
         add_shortcut(self, "N", gettext("Write a note on the run; Esc leaves the field"), self._note.setFocus)
         self._buttons = {action: self._button(action) for action in _DECISION_BUTTONS}
         buttons = make_row(*((button, 1) for button in self._buttons.values()), spacing=8)
@@ -289,7 +273,7 @@ class DecisionPanel(QFrame):
         text, key, keys, description = _DECISION_BUTTONS[action]
         button = _EnterButton(f"{gettext(text)}\n{key}")
         button.setProperty("scale", "large")
-        button.clicked.connect(lambda: self.acted.emit(action))
+        button.clicked.connect(lambda: self._dispatch(action))
         if keys:
             bind_button(button, keys, gettext(description), self)
         else:  # the run bar has the shortcut

@@ -1,25 +1,35 @@
 """Bar at the bottom of Record: series and plan, form of the next runs, large buttons."""
 
-from PySide6.QtCore import Qt, Signal
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.presenters.conditions import CONDITION_TITLES
-from app.presenters.record.state import Action, PlanState, RunChoices, RunForm, SeriesProgress
+from app.presenters.record.state import (
+    Action,
+    PlanState,
+    RecordEvent,
+    RunChoices,
+    RunForm,
+    SeriesChosen,
+    SeriesProgress,
+)
 from app.qt.theme import TextRole, font, set_property
-from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit, show_texts
+from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit, make_button, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext, ngettext
 
 _BUTTONS = {
-    Action.TARE: (N_("Tare"), "T", ("T",), N_("Read both gauges from here; calibration and runs stay")),
-    Action.ARM: (N_("Arm"), "A", ("A",), N_("Record the next pullback")),
-    Action.STOP: (N_("Stop"), "Esc", ("Esc",), N_("End the recording now and keep it")),
-    Action.NEXT: (N_("Next"), "Enter", ("Return", "Enter"), N_("Make ready for the next run")),
+    Action.TARE: (N_("Tare"), "T", N_("Read both gauges from here; calibration and runs stay")),
+    Action.ARM: (N_("Arm"), "A", N_("Record the next pullback")),
+    Action.STOP: (N_("Stop"), "Esc", N_("End the recording now and keep it")),
+    Action.NEXT: (N_("Next"), "Enter", N_("Make ready for the next run")),
 }
-"""Label, shown key, keys and description of each action."""
+"""Label, key and description of each action."""
 _FOLD = N_("Operator, conditions, runs in a row, note")
 _KEEP = (N_("Keep"), N_("Keep the run with what was found in it, and go on"))
 _STRIP_SPACING = 4
@@ -40,26 +50,29 @@ _WIDE = {"note": 2}
 
 
 class RunBar(QFrame):
-    """Series, plan and form of the next runs; Tare, Arm, Stop, Keep."""
+    """Series, plan and form of the next runs; Tare, Arm, Stop, Keep.
 
-    acted = Signal(Action)
-    series_chosen = Signal(str)
-    form_edited = Signal(RunForm)
-    plan_wanted = Signal()
-    form_left = Signal()
-    """The keyboard focus belongs to the buttons again."""
+    `leave_form` gives the keyboard focus back to the buttons.
+    """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        dispatch: Callable[[RecordEvent], None],
+        edit_plan: Callable[[], None],
+        leave_form: Callable[[], None],
+    ) -> None:
         super().__init__()
+        self._dispatch = dispatch
+        self._leave_form = leave_form
         self.setProperty("role", "bar")
         self._series = ComboBox()
         self._series.setMinimumWidth(112)
         self._series.setAccessibleName(gettext("Series"))
-        self._strip = PlanStrip()
-        self._plan = QPushButton(gettext("Plan"))
+        self._strip = PlanStrip(self._choose_series)
+        self._plan = make_button(gettext("Plan"), edit_plan)
         self._fold = QToolButton()
         self._summary = _Elided()
-        self._form = RunFormFields()
+        self._form = RunFormFields(dispatch, leave_form)
         self._form.hide()
         self._buttons = {action: self._button(action) for action in _BUTTONS}
         self._shown = RunChoices("", ())
@@ -87,7 +100,7 @@ class RunBar(QFrame):
             button.setEnabled(action in allowed)
             is_primary = action is primary and not keeps  # the button of the decision panel is, then
             set_property(button, "primary", "true" if is_primary else "false")
-        text, key, _, description = _BUTTONS[Action.NEXT]
+        text, key, description = _BUTTONS[Action.NEXT]
         text, description = _KEEP if keeps else (text, description)
         self._buttons[Action.NEXT].setText(f"{gettext(text)}   {key}")
         set_button_hint(self._buttons[Action.NEXT], gettext(description))
@@ -101,41 +114,38 @@ class RunBar(QFrame):
         choices = self._shown
         unfolded = self._form.isVisibleTo(self)
         self._fold.setArrowType(Qt.ArrowType.DownArrow if unfolded else Qt.ArrowType.RightArrow)
-        nothing = gettext(_FOLD)
-        usual = nothing if unfolded else choices.summary or nothing
-        self._summary.set_line(choices.form_error or usual, is_error=bool(choices.form_error))
+        summary = gettext(_FOLD) if unfolded else choices.summary or gettext(_FOLD)
+        self._summary.set_line(choices.form_error or summary, is_error=bool(choices.form_error))
 
     def _toggle(self) -> None:
         self._form.setVisible(not self._form.isVisibleTo(self))
         if self._form.isVisibleTo(self):
             self._form.take_focus()
         else:
-            self.form_left.emit()
+            self._leave_form()
         self._show_summary()
 
     def _button(self, action: Action) -> QPushButton:
-        text, key, keys, description = _BUTTONS[action]
-        button = QPushButton(f"{gettext(text)}   {key}")
+        text, key, description = _BUTTONS[action]
+        button = make_button(f"{gettext(text)}   {key}", lambda: self._dispatch(action))
         button.setProperty("scale", "large")
         button.setMinimumWidth(108)
-        button.clicked.connect(lambda: self.acted.emit(action))
-        bind_button(button, keys, gettext(description), self)
+        bind_button(button, ("Return", "Enter") if key == "Enter" else key, gettext(description), self)
         return button
 
+    def _choose_series(self, series: str) -> None:
+        self._dispatch(SeriesChosen(series))
+
     def _connect(self) -> None:
-        self._series.activated.connect(lambda _: self.series_chosen.emit(self._series.currentText()))
-        self._strip.chosen.connect(self.series_chosen)
-        self._plan.clicked.connect(self.plan_wanted)
+        self._series.activated.connect(lambda _: self._choose_series(self._series.currentText()))
         bind_button(self._plan, "P", gettext("Say which series to measure how often"), self)
         self._fold.setProperty("role", "fold")
         self._fold.setAccessibleName(gettext(_FOLD))
         self._fold.clicked.connect(self._toggle)
         bind_button(self._fold, "F2", gettext("What is known of the next tests"), self)
-        self._form.edited.connect(self.form_edited)
-        self._form.left.connect(self.form_left)
         add_shortcut(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
         untare = gettext("Read both gauges by the calibration again")
-        add_shortcut(self, "Shift+T", untare, lambda: self.acted.emit(Action.UNTARE))
+        add_shortcut(self, "Shift+T", untare, lambda: self._dispatch(Action.UNTARE))
 
     def _lay_out(self) -> None:
         series = make_row(self._series, (self._strip, 1), self._plan, spacing=8)
@@ -172,10 +182,9 @@ class _Elided(QLabel):
 class PlanStrip(QWidget):
     """Series plan on one line: as many series around the chosen one as fit. A click chooses a series."""
 
-    chosen = Signal(str)
-
-    def __init__(self) -> None:
+    def __init__(self, choose: Callable[[str], object]) -> None:
         super().__init__()
+        self._choose = choose
         self._progress: tuple[SeriesProgress, ...] = ()
         self._series = ""
         self._buttons: list[QPushButton] = []
@@ -233,9 +242,8 @@ class PlanStrip(QWidget):
         return first, end
 
     def _add_button(self) -> None:
-        made = QPushButton(self)
+        made = make_button("", lambda: self._choose(made.text().split()[0]))
         made.setProperty("role", "plan")
-        made.clicked.connect(lambda: self.chosen.emit(made.text().split()[0]))
         self._buttons.append(made)
         self._layout.insertWidget(self._layout.count() - 2, made)
 
@@ -243,12 +251,9 @@ class PlanStrip(QWidget):
 class RunFormFields(QWidget):
     """Fields of a `RunForm`."""
 
-    edited = Signal(RunForm)
-    left = Signal()
-    """The keyboard focus belongs to the buttons again."""
-
-    def __init__(self) -> None:
+    def __init__(self, edit: Callable[[RunForm], None], leave: Callable[[], None]) -> None:
         super().__init__()
+        self._edit = edit
         self._fields = {name: ShortcutSafeEdit(ESCAPE_AND_ENTER) for name in _FORM_FIELDS}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 4, 0, 0)
@@ -259,7 +264,7 @@ class RunFormFields(QWidget):
             field.setAccessibleName(gettext(title_text))
             field.setPlaceholderText(gettext(hint))
             field.textEdited.connect(self._emit_form)
-            field.left.connect(self.left)
+            field.left.connect(leave)
             title = label(gettext(title_text), TextRole.LABEL, muted=True)
             title.setBuddy(field)
             titled = make_column(title, field, spacing=4)
@@ -277,4 +282,4 @@ class RunFormFields(QWidget):
         next(iter(self._fields.values())).setFocus()
 
     def _emit_form(self) -> None:
-        self.edited.emit(RunForm(**{name: field.text() for name, field in self._fields.items()}))
+        self._edit(RunForm(**{name: field.text() for name, field in self._fields.items()}))

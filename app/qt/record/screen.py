@@ -4,22 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QFrame,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QSizePolicy,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QFrame, QLabel, QLineEdit, QSizePolicy, QStackedWidget, QWidget
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, NoteEdited, PlotResized, RecordState, SeriesChosen, StatusBar
+from app.presenters.record.state import Action, PlotResized, RecordState, StatusBar
 from app.presenters.results import Result
 from app.qt.record.live_plots import LivePlots
 from app.qt.record.panels import DecisionPanel, GuidancePanel, ResultPanel
@@ -27,7 +18,8 @@ from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.run_bar import RunBar
 from app.qt.record.sound import CuePlayer
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
+from app.qt.widgets.inputs import make_button
+from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button, set_button_hint
 from app.qt.widgets.text import label, padded, set_text_or_hide, show_chip
 from messages.i18n import gettext
@@ -48,12 +40,13 @@ class RecordScreen(QWidget):
         self._shown: RecordState | None = None
         self._status_bar = StatusBarWidget()
         self._plots = LivePlots(theme)
-        self._guidance = GuidancePanel(theme)
+        self._plots.resized.connect(lambda width_px: presenter.dispatch(PlotResized(width_px)))
+        self._guidance = GuidancePanel(theme, connect_device)
         self._result = ResultPanel()
-        self._decision = DecisionPanel()
-        self._status_line = StatusLine()
+        self._decision = DecisionPanel(presenter.dispatch, self._take_focus)
+        self._status_line = StatusLine(lambda: presenter.dispatch(Action.UNDO))
         self._column = _Column((self._guidance, self._result), (self._decision, self._status_line))
-        self._bar = RunBar()
+        self._bar = RunBar(presenter.dispatch, self._edit_plan, self._take_focus)
         self._plan: PlanDialog | None = None
         self._sound = CuePlayer()
         self._parts: dict[str, Callable[[Any], None]] = {
@@ -65,8 +58,9 @@ class RecordScreen(QWidget):
             "progress": self._guidance.show_progress,
             "result": self._show_result,
         }
-        self._lay_out()
-        self._connect(connect_device)
+        card = make_frame(self._plots)
+        middle = make_row((card, 1), self._column, spacing=8)
+        make_column(self._status_bar, (middle, 1), self._bar, spacing=8, margins=(8, 8), of=self)
 
     def show_state(self, state: RecordState) -> None:
         """Show the parts of a state that differ from the state shown."""
@@ -114,27 +108,6 @@ class RecordScreen(QWidget):
         if result is not None:
             self._result.show_result(result)
         self._column.stack.setCurrentIndex(int(result is not None))
-
-    def _connect(self, connect_device: Callable[[], object]) -> None:
-        dispatch = self._presenter.dispatch
-        for panel in (self._bar, self._decision):
-            panel.acted.connect(dispatch)
-        self._bar.series_chosen.connect(lambda series: dispatch(SeriesChosen(series)))
-        self._bar.form_edited.connect(dispatch)
-        self._bar.plan_wanted.connect(self._edit_plan)
-        self._decision.noted.connect(lambda note: dispatch(NoteEdited(note)))
-        self._decision.note_left.connect(self._take_focus)
-        self._bar.form_left.connect(self._take_focus)
-        self._status_line.undone.connect(lambda: dispatch(Action.UNDO))
-        self._plots.resized.connect(lambda width_px: dispatch(PlotResized(width_px)))
-        self._guidance.connect_wanted.connect(connect_device)
-
-    def _lay_out(self) -> None:
-        card = QFrame()
-        card.setProperty("role", "card")
-        make_column(self._plots, margins=(1, 1), of=card)
-        middle = make_row((card, 1), self._column, spacing=8)
-        make_column(self._status_bar, (middle, 1), self._bar, spacing=8, margins=(8, 8), of=self)
 
 
 def _actions(state: RecordState) -> tuple[object, ...]:
@@ -217,13 +190,10 @@ class StatusBarWidget(QFrame):
 class StatusLine(QFrame):
     """Outcome of the last action, with an Undo button where it can be taken back; hidden if empty."""
 
-    undone = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, undo: Callable[[], object]) -> None:
         super().__init__()
         self._message = label(wrap=True)
-        self._undo = QPushButton(gettext("Undo"))
-        self._undo.clicked.connect(self.undone)
+        self._undo = make_button(gettext("Undo"), undo)
         bind_button(self._undo, "Ctrl+Z", gettext("Take back what was decided about the last run"), self)
         make_row((self._message, 1), self._undo, spacing=8, margins=(16, 8), of=self)
 

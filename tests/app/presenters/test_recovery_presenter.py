@@ -9,12 +9,12 @@ from stage import FakeLauncher, FakeWorker, bench, fake_workers
 from app.acquisition.messages import Failed
 from app.presenters import recovery
 from app.presenters.analysis_task import recover_runs
-from app.presenters.base import Notice, Progress, Tone
+from app.presenters.base import Notice, NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.recovery import LATER, RECOVER, RecoveryReport
+from app.presenters.recovery import RecoveryReport
 from app.presenters.start_screen import StartState
-from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
+from app.presenters.window import WindowContext, WindowPresenter
 
 
 class Desk:
@@ -44,12 +44,16 @@ def desk() -> Iterator[Desk]:
 
 def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
     desk.window.ask_to_recover()
-    assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (RECOVER, LATER, Tone.WARN)
+    assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (
+        NoticeAction.RECOVER,
+        "Later",
+        Tone.WARN,
+    )
     assert "2 runs were cut short" in desk.notice.text
     desk.window.execute_notice_action()
     (call,) = desk.worker.calls
     assert (call.name, call.arguments) == ("recover_runs", (str(bench().directory),))
-    assert desk.notice.action == ""
+    assert desk.notice.action is None
     call.progress(Progress("Recovering x", 0.4))
     assert desk.notice.text == "Recovering x: 40%"
     call.done(RecoveryReport(runs=("/r/a.h5", "/r/b.h5")))
@@ -69,9 +73,9 @@ def test_nothing_is_asked_where_nothing_is_unfinished(desk: Desk) -> None:
     assert desk.window.state.notice is None
 
 
-@pytest.mark.parametrize(("unfinished", "offered"), [(1, RECOVER), (0, RECONNECT)])
+@pytest.mark.parametrize(("unfinished", "offered"), [(1, NoticeAction.RECOVER), (0, NoticeAction.RECONNECT)])
 def test_an_engine_that_died_is_said_and_recovery_offered_where_there_is_any(
-    desk: Desk, unfinished: int, offered: str
+    desk: Desk, unfinished: int, offered: NoticeAction
 ) -> None:
     desk.unfinished = unfinished
     desk.window.open_simulated("1FFM0")
@@ -81,7 +85,7 @@ def test_an_engine_that_died_is_said_and_recovery_offered_where_there_is_any(
     while desk.window.state.notice is None:
         desk.window.tick()
     assert "ended by itself" in desk.notice.text
-    assert desk.notice.action == offered
+    assert desk.notice.action is offered
     desk.window.execute_notice_action()
     assert len(desk.worker.calls) == unfinished
 
@@ -97,7 +101,10 @@ def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
         "Recovered a.h5. What was there before is kept as a.h5.before-recovery. " + faults[0]
     )
     call.fail("the disk is full. Free some space")
-    assert (desk.notice.action, desk.notice.text) == (RECOVER, "The disk is full. Free some space")
+    assert (desk.notice.action, desk.notice.text) == (
+        NoticeAction.RECOVER,
+        "The disk is full. Free some space",
+    )
 
 
 def test_the_task_itself_finishes_what_is_in_the_folder(

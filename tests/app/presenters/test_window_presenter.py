@@ -18,7 +18,7 @@ from stage import (
 )
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
-from app.presenters.base import Progress, Tone
+from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm
@@ -26,7 +26,7 @@ from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
-from app.presenters.window import RECONNECT, WindowContext, WindowPresenter
+from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
 
 
@@ -126,7 +126,7 @@ def test_a_lost_device_is_said_with_a_way_back(desk: Desk) -> None:
     assert (notice.text, notice.tone, notice.action) == (
         "COM7 is gone. Plug it in again",
         Tone.BAD,
-        RECONNECT,
+        NoticeAction.RECONNECT,
     )
     assert window.start.state.connected == ""
     assert window.record.state.guidance.instruction == "Connect an amplifier"
@@ -144,7 +144,7 @@ def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None
     window.tick()
     assert window.state.notice is not None
     assert window.state.notice.text == "The disk is full. Free some space"
-    assert window.state.notice.action == ""
+    assert window.state.notice.action is None
     desk.analysis()
     window.dismiss_notice()
     assert window.state.notice is None

@@ -311,7 +311,7 @@ def test_a_full_series_is_told_from_others_in_any_language(
     theme: Theme, qtbot: QtBot, use_language: Callable[[str], None], language: str
 ) -> None:
     use_language(language)
-    strip = PlanStrip()
+    strip = PlanStrip(lambda _: None)
     qtbot.addWidget(strip)
     progress = tuple(SeriesProgress(name, done, 3) for name, done in (("A", 3), ("B", 1), ("C", 0)))
     strip.show_plan(PlanState(text="", progress=progress), "B", choosable=True)

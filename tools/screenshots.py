@@ -1,4 +1,4 @@
-"""Pictures of every screen with real content: `python -m app.qt.screenshots FOLDER`.
+"""Pictures of every screen with real content: `python -m tools.screenshots FOLDER`.
 
 A pullback is recorded from the simulated stand meanwhile, and a campaign simulated, so it takes some
 minutes. Each moment is drawn in both themes and two sizes, without a window system.
@@ -49,15 +49,7 @@ class ScreenshotError(Exception):
 
 
 class Camera:
-    """Draws a window in every theme and size.
-
-    Parameters
-    ----------
-    theme : Theme
-    window : MainWindow
-    folder : Path
-        Where the pictures go.
-    """
+    """Draws a window in every theme and size, into files of `folder`."""
 
     def __init__(self, theme: Theme, window: MainWindow, folder: Path) -> None:
         self._theme = theme
@@ -251,8 +243,9 @@ class _Patience:
 
 
 def main() -> int:
+    """Return the exit code: 1 if a picture could not be taken, 2 without a folder."""
     if len(sys.argv) != 2:
-        sys.stderr.write("usage: python -m app.qt.screenshots FOLDER\n")
+        sys.stderr.write("usage: python -m tools.screenshots FOLDER\n")
         return 2
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     with tempfile.TemporaryDirectory(prefix="slipstand-") as recordings:
