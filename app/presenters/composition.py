@@ -8,11 +8,11 @@ from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.navigator import ConnectForm
-from app.presenters.record.state import StandContext
+from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.settings_screen import PersonalSettings, SettingsFile
 from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
-from app.presenters.window import WindowContext, WindowPresenter, Workers
+from app.presenters.window import WindowContext, WindowPresenter
+from app.presenters.worker import Worker, WorkerPool
 from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.client import SimulatedStand
@@ -64,7 +64,8 @@ def make_window_presenter(
     context = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
         Connection(start_engine, SimulatedStand.start, errors.report),
-        Workers.sharing(errors.report),
+        Worker(errors.report),
+        WorkerPool(errors.report),
         WindowContext(
             context,
             _start_state(context, simulation),

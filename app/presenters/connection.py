@@ -1,7 +1,6 @@
 """Connection of the window: an engine, and the simulated stand if that is the device."""
 
 import logging
-import queue
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -19,6 +18,7 @@ from config.files import published_row
 from messages.message import message, message_of
 
 _log = logging.getLogger(__name__)
+Answer = TypeVar("Answer")
 
 
 @dataclass(slots=True)
@@ -47,7 +47,7 @@ class Connection:
         self._start_engine = start_engine
         self._start_stand = start_stand
         self._report_error = report_error
-        self._background = DaemonExecutor("slipstand-session")
+        self._thread: threading.Thread | None = None
         self._opening: Future[_Opened] | None = None
         self._opened: _Opened | None = None
         self._listeners: list[Callable[[RingRows], None]] = []
@@ -103,14 +103,17 @@ class Connection:
         opening, opened = self._opening, self._opened
         self._opening = self._opened = None
         if opening is not None:
-            self._background.submit(lambda: self._end_opening(opening))
+            self._submit(lambda: self._end_opening(opening))
         if opened is not None:
-            self._background.submit(lambda: self._end(opened))
+            self._submit(lambda: self._end(opened))
 
     def close(self) -> None:
         """End the connection and wait until it has ended, at most `CLOSE_S`."""
         self.disconnect()
-        if not self._background.close(self.CLOSE_S):
+        if self._thread is None:
+            return
+        self._thread.join(self.CLOSE_S)
+        if self._thread.is_alive():
             late = message(
                 "Engine or simulated stand did not end within {seconds} s. Runs that are left unfinished"
                 " are offered for recovery at the next start",
@@ -120,7 +123,27 @@ class Connection:
 
     def _open(self, open_it: Callable[[], _Opened]) -> None:
         self.disconnect()
-        self._opening = self._background.submit(open_it)
+        self._opening = self._submit(open_it)
+
+    def _submit(self, call: Callable[[], Answer]) -> Future[Answer]:
+        """Make a call in another thread, after the calls submitted before.
+
+        Unlike those of an executor, a daemon thread does not keep the program from ending.
+        """
+        future: Future[Answer] = Future()
+        before = self._thread
+
+        def run() -> None:
+            if before is not None:
+                before.join()
+            try:
+                future.set_result(call())
+            except Exception as error:
+                future.set_exception(error)
+
+        self._thread = threading.Thread(target=run, name="slipstand-connection", daemon=True)
+        self._thread.start()
+        return future
 
     def _simulate(self, options: SimulatedStandOptions) -> _Opened:
         stand = self._start_stand(options)
@@ -157,41 +180,3 @@ class Connection:
                     end()
             except Exception as error:
                 self._report_error(error_report(error))
-
-
-Answer = TypeVar("Answer")
-
-
-class DaemonExecutor:
-    """Makes calls in the order in which they were submitted.
-
-    Unlike an executor's, the thread does not keep the program from ending if a call never returns.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
-        self._thread.start()
-
-    def submit(self, call: Callable[[], Answer]) -> Future[Answer]:
-        """Make `call` after those before it; the future has what it returns or raises."""
-        future: Future[Answer] = Future()
-
-        def run() -> None:
-            try:
-                future.set_result(call())
-            except Exception as error:
-                future.set_exception(error)
-
-        self._calls.put(run)
-        return future
-
-    def close(self, patience_s: float) -> bool:
-        """Make the submitted calls, and end; False if that takes longer than `patience_s`."""
-        self._calls.put(None)
-        self._thread.join(patience_s)
-        return not self._thread.is_alive()
-
-    def _work(self) -> None:
-        while (call := self._calls.get()) is not None:
-            call()

@@ -1,11 +1,39 @@
-"""Where a screen can lead: implemented by the window presenter."""
+"""What the window gives to its screens: settings of the stand, and where a screen can lead."""
 
+import datetime
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from app.acquisition.messages import PortSettings
+from app.acquisition.pullback.plan import AllowedPlateRange, allowed_plate_range, default_excursion
 from app.simulated_stand.options import SimulatedStandOptions
-from config.schema import Gauges
+from config.schema import Gauges, Stand
+
+
+@dataclass(frozen=True, slots=True)
+class StandContext:
+    """Settings of the stand and the folder of its runs."""
+
+    stand: Stand
+    gauges: Gauges
+    all_series: tuple[str, ...]
+    directory: Path
+    today: Callable[[], datetime.date] = datetime.date.today
+    """Current date, for the validity of calibrations."""
+    clock: Callable[[], float] = time.monotonic
+    """Monotonic time (s)."""
+
+    def pullback_m(self, series: str) -> float:
+        return self.stand.series(series).pullback_m
+
+    def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
+        """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
+        range_m = self.gauges.relative.range_m
+        excursion_m = default_excursion(self.pullback_m(series))
+        return None if range_m is None else allowed_plate_range(range_m, excursion_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +52,16 @@ class ConnectForm:
 
 
 class Navigator(Protocol):
-    """Opens screens, connections and runs for the presenters of single screens."""
+    """Opens screens, connections and runs; implemented by the window presenter."""
 
-    def show_start(self) -> None:
-        """Show Start, where a device is connected."""
+    def show_start(self) -> None: ...
+    def show_record(self) -> None: ...
+
+    def show_runs(self, folder: str, series: str) -> None:
+        """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
+
+    def open_run(self, path: str) -> None:
+        """Show a run on Identify."""
 
     def fill_connection(self, form: ConnectForm) -> None:
         """Show Start with `form` filled in."""
@@ -38,11 +72,8 @@ class Navigator(Protocol):
     def open_simulated(self, series: str) -> None:
         """Start the simulated stand with its usual options, and record from it."""
 
-    def open_stand(self, options: SimulatedStandOptions) -> None:
-        """Start a simulated stand, and record from it."""
-
-    def open_port(self, port: PortSettings) -> None:
-        """Record from an amplifier."""
+    def open_stand(self, options: SimulatedStandOptions) -> None: ...
+    def open_port(self, port: PortSettings) -> None: ...
 
     def reconnect(self) -> None:
         """Connect to the same device again."""
@@ -52,12 +83,3 @@ class Navigator(Protocol):
 
     def set_gauges(self, gauges: Gauges) -> None:
         """Use these calibrations from now on."""
-
-    def show_record(self) -> None:
-        """Show Record."""
-
-    def show_runs(self, folder: str, series: str) -> None:
-        """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
-
-    def open_run(self, path: str) -> None:
-        """Show a run on Identify."""

@@ -13,23 +13,18 @@ from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Notice, NoticeAction, Presenter, Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
-from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.error_reports import ErrorReporter
 from app.presenters.events import SimulationStarted, TaskFailed, TaskFailure, TaskProgress
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.navigator import ConnectForm
+from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import (
-    Connecting,
-    Disconnected,
-    RunsChanged,
-    StandContext,
-)
+from app.presenters.record.state import Connecting, Notification
 from app.presenters.recovery import RecoveryReport
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
-from app.presenters.screens import Screen, ScreenContext
+from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
@@ -65,74 +60,45 @@ class WindowContext:
     """Number of runs in the folder that a crash has left unfinished."""
 
 
-@dataclass(frozen=True, slots=True)
-class Workers:
-    """Workers of the screens: tasks of one worker are carried out in turn, those of two at the same time."""
-
-    analysis: Worker
-    """Identifies recorded and opened runs, in a process of its own that has the analysis loaded."""
-    record: Worker
-    runs: EventWorker
-    batch: EventWorker
-    campaign: Worker
-    gauges: Worker
-    ports: Worker
-    pool: WorkerPool = field(default_factory=WorkerPool)
-    report_error: Callable[[ErrorReport], None] = lambda _error: None
-
-    @classmethod
-    def sharing(cls, report_error: Callable[[ErrorReport], None]) -> "Workers":
-        """Make workers that share processes, all but the analysis."""
-        pool = WorkerPool()
-        record = Worker(report_error, pool)
-        runs, batch = EventWorker(Worker(report_error, pool)), EventWorker(Worker(report_error, pool))
-        campaign, gauges, ports = (Worker(report_error, pool) for _ in range(3))
-        analysis = Worker(report_error)
-        return cls(analysis, record, runs, batch, campaign, gauges, ports, pool, report_error)
-
-    def make(self) -> Worker:
-        """Make one more worker that shares the processes."""
-        return Worker(self.report_error, self.pool)
-
-
 class WindowPresenter(Presenter[WindowState]):
-    """Owns the presenters of all screens, the connection and the workers; shows the reports of `errors`."""
+    """Owns the presenters of all screens, the connection and the workers; shows the reports of `errors`.
+
+    `analysis` identifies recorded and opened runs, in a process of its own that has the analysis loaded. The
+    other workers share the processes of `pool`. Each screen has a presenter, an attribute of its name.
+    """
 
     def __init__(
         self,
         connection: Connection,
-        workers: Workers,
+        analysis: Worker,
+        pool: WorkerPool,
         context: WindowContext,
         errors: ErrorReporter | None = None,
     ) -> None:
         super().__init__(WindowState())
         self._errors = errors or ErrorReporter()
         self._connection = connection
-        self._workers = workers
+        self._analysis = analysis
+        self._pool = pool
         self._count_unfinished = context.count_unfinished
         self._folder = str(context.stand.directory)
         self._open_again: Callable[[], None] | None = None
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
+        runs, batch = EventWorker(pool.make_worker()), EventWorker(pool.make_worker())
         self.start = StartPresenter(context.start, self, context.list_ports)
-        self.record = RecordPresenter(connection, stand, workers.record, author)
-        self.identify = IdentifyPresenter(workers.analysis, workers.analysis.poll)
-        self.gauges = GaugesPresenter(workers.gauges, workers.ports, stand.gauges, self)
+        self.record = RecordPresenter(connection, stand, pool.make_worker(), author)
+        self.identify = IdentifyPresenter(analysis, analysis.poll)
+        self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
             context.simulation, context.start.all_series, self.open_stand, lambda: connection.stand
         )
-        self.runs = RunsPresenter(
-            workers.runs, workers.batch, self._folder, stand.all_series, author, self.open_run
-        )
-        self.campaign = CampaignPresenter(workers.campaign, self._folder, stand.all_series, author, self)
+        self.runs = RunsPresenter(runs, batch, self._folder, stand.all_series, author, self.open_run)
+        self.campaign = CampaignPresenter(pool.make_worker(), self._folder, stand.all_series, author, self)
         self.settings = SettingsPresenter(context.personal, self._apply_settings)
-        screen_context = ScreenContext(stand, self, workers.make)
-        self.presenters: dict[Screen, Presenter[Any]] = {
-            screen: screen.make_presenter(screen_context) if screen.make_presenter else getattr(self, screen)
-            for screen in Screen
-        }
+        self.presenters: dict[Screen, Presenter[Any]] = {screen: getattr(self, screen) for screen in Screen}
         self._apply_settings(context.personal.settings)
         if context.personal.fault:
             text = gettext("{fault}. The usual settings are used until then", fault=context.personal.fault)
@@ -214,7 +180,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def warm_up(self) -> None:
         """Load the analysis, so that the first one is as fast as the others."""
-        self._workers.analysis.submit(analysis_task.warm_up)
+        self._analysis.submit(analysis_task.warm_up)
 
     def tick(self) -> None:
         """Process events of engine and workers, and new samples; called some 60 times a second."""
@@ -224,14 +190,14 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_engine_event(event)
         for presenter in self.presenters.values():
             presenter.tick()
-        self._workers.analysis.poll()
+        self._analysis.poll()
 
     def close(self) -> None:
         self._connection.close()
-        self._workers.analysis.close()
+        self._analysis.close()
         for presenter in self.presenters.values():
             presenter.close()
-        self._workers.pool.close()
+        self._pool.close()
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.dispatch(settings)
@@ -259,7 +225,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
-        self.record.dispatch(Disconnected())
+        self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
         self.start.set_connected("")
 
@@ -294,7 +260,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _recover_runs(self) -> None:
         self._update(notice=recovery.recovery_progress())
-        self._workers.analysis.submit(
+        self._analysis.submit(
             analysis_task.recover_runs,
             self._folder,
             done=self._on_recovered,
@@ -304,13 +270,13 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _on_recovered(self, report: RecoveryReport) -> None:
         self._update(notice=recovery.recovery_outcome(report))
-        self.record.dispatch(RunsChanged())
+        self.record.dispatch(Notification.RUNS_CHANGED)
 
     def _on_recovery_failed(self, failure: TaskFailure) -> None:
         self._update(notice=recovery.offer_recovery(sentence(failure.message)))
 
     def _analyse(self, path: str) -> None:
-        self._workers.analysis.submit(
+        self._analysis.submit(
             analysis_task.analyse_run,
             path,
             done=self._on_analysed,

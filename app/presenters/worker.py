@@ -65,11 +65,16 @@ class LazyFunction:
 class WorkerPool:
     """Child processes that workers share: a worker holds one only while it has tasks.
 
-    `close` must be called, after the workers are closed.
+    `close` must be called, after the workers are closed. `report_error` as in `Worker`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, report_error: Callable[[ErrorReport], None] = _ignore) -> None:
+        self._report_error = report_error
         self._idle: list[_TaskProcess] = []
+
+    def make_worker(self) -> "Worker":
+        """Make a worker that shares the processes; close it before the pool."""
+        return Worker(self._report_error, self)
 
     def acquire(self) -> "_TaskProcess":
         while self._idle:

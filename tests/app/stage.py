@@ -30,9 +30,8 @@ from app.acquisition.messages import (
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
 from app.presenters.events import TaskFailure
-from app.presenters.record.state import StandContext
-from app.presenters.window import Workers
-from app.presenters.worker import CANCELLED
+from app.presenters.navigator import StandContext
+from app.presenters.worker import CANCELLED, WorkerPool
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -354,7 +353,8 @@ class FakeWorker:
         self.closed = True
 
 
-def fake_workers(**given: Any) -> Workers:
-    """Workers of a window: fakes, but for those given."""
-    names = ("analysis", "record", "runs", "batch", "campaign", "gauges", "ports")
-    return Workers(**{name: given.get(name) or FakeWorker() for name in names})  # type: ignore[arg-type]
+class FakePool(WorkerPool):
+    """Makes fake workers."""
+
+    def make_worker(self) -> Any:
+        return FakeWorker()

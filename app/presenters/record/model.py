@@ -1,7 +1,7 @@
 """Model of the Record screen: everything that its state is derived from, immutable."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.acquisition.guidance import PullbackSituation
@@ -9,22 +9,18 @@ from app.acquisition.messages import PullbackState, RunEnded, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.navigator import StandContext
 from app.presenters.record.live import GaugeMonitor, LiveTraces
 from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.state import (
     Action,
-    KeepRun,
     LiveEstimate,
-    MoveToTrash,
-    RecordTask,
-    StandContext,
     StatusBar,
     Traces,
 )
-from app.presenters.results import FRICTION, Result, make_row, sentence
+from app.presenters.results import FRICTION, Result, make_row
 from config.schema import Gauges
 from messages.i18n import gettext
-from messages.message import Message
 
 _NOT_RECORDING = {PullbackState.CONNECTING, PullbackState.IDLE, PullbackState.CLOSING}
 RECORDING_STATES = frozenset(PullbackState) - _NOT_RECORDING
@@ -93,52 +89,14 @@ class RunDecisions:
             return gettext("Bring back {name}", name=self.last.name)
         return gettext("Decide again about {name}", name=self.last.name) if is_free else ""
 
-    def with_note(self, note: str) -> "RunDecisions":
-        if self.pending is None:
-            return self
-        return replace(self, pending=replace(self.pending, edited_note=note))
 
-    def without_last(self) -> "RunDecisions":
-        """Drop message and undo: another run has ended."""
-        return replace(self, message=EMPTY_CHIP, last=None, trash_path="")
+@dataclass(frozen=True, slots=True)
+class ArmedRun:
+    """Series, name of the file and note of the run that was armed last."""
 
-    def decided(self) -> "RunDecisions":
-        """Take the pending run as decided about."""
-        if self.pending is None:
-            return self
-        return replace(self, pending=None, last=self.pending, trash_path="")
-
-    def moving(self, run: RecordedRun) -> "RunDecisions":
-        message = Chip(gettext("Moving {name} to the trash", name=run.name))
-        return replace(self, is_moving=True, message=message)
-
-    def keeping(self, run: RecordedRun) -> "RunDecisions":
-        return replace(self, storing={**self.storing, run.path: run}, message=run.storing_message)
-
-    def undone(self) -> "RunDecisions":
-        return replace(self, last=None, trash_path="")
-
-    def again(self, run: RecordedRun) -> "RunDecisions":
-        """Ask about a run once more; its note may or may not have been stored."""
-        return replace(self, pending=replace(run, note=None), message=EMPTY_CHIP)
-
-    def after_keeping(self, task: KeepRun) -> "RunDecisions":
-        """A run is kept; a newer message stays."""
-        storing = dict(self.storing)
-        run = storing.pop(task.path, None)
-        message = run.stored_message if run and self.message == run.storing_message else self.message
-        return replace(self, storing=storing, message=message)
-
-    def after_moving(self, task: MoveToTrash, trash_path: str) -> "RunDecisions":
-        is_last = self.last is not None and self.last.path == task.path
-        message = Chip(gettext("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, trash_path)
-        path = trash_path if is_last else self.trash_path
-        return replace(self, is_moving=False, trash_path=path, message=message)
-
-    def after_failure(self, task: RecordTask, message: Message) -> "RunDecisions":
-        """A task failed; the files are as they were."""
-        is_moving = self.is_moving and not isinstance(task, MoveToTrash)
-        return replace(self, is_moving=is_moving, message=Chip(sentence(message), Tone.BAD))
+    series: str = ""
+    name: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +118,7 @@ class Session:
     device: str = ""
     heard_s: float = 0.0
     """Time of the last event of the engine."""
-    series: str = ""
-    run_name: str = ""
-    run_note: str = ""
-    """Series, name of the file and note of the run that was armed last."""
+    run: ArmedRun = ArmedRun()
     remaining_runs: int = 0
     """Runs that follow without a command."""
     live_estimate: LiveEstimate = field(default_factory=LiveEstimate)
@@ -182,10 +137,7 @@ class EndedRun:
     """A run from its end until the operator goes on."""
 
     event: RunEnded
-    series: str
-    name: str
-    note: str
-    """Series, name of the file, and note that the run was armed with."""
+    run: ArmedRun
     result: Result | None = None
     """None while the run is being identified."""
     progress: Progress | None = None

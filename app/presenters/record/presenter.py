@@ -9,6 +9,7 @@ from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
 from app.presenters.events import TaskDone, TaskFailed
+from app.presenters.navigator import StandContext
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
@@ -18,14 +19,13 @@ from app.presenters.record.state import (
     GuidanceState,
     KeepRun,
     MoveToTrash,
+    Notification,
     PullbackTarget,
     RecordEvent,
     RecordState,
     RecordTask,
     RestoreFromTrash,
     SavePlan,
-    ScreenEntered,
-    StandContext,
     Step,
     StepStatus,
 )
@@ -92,7 +92,7 @@ class RecordPresenter(Presenter[RecordState]):
             self._set_state(record_state(self._model))
 
     def enter(self) -> None:
-        self.dispatch(ScreenEntered())
+        self.dispatch(Notification.SCREEN_ENTERED)
 
     def tick(self) -> None:
         """Take answers of the worker and new samples; to be called some 60 times a second."""

@@ -23,7 +23,7 @@ from app.acquisition.messages import (
 from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Chip, Progress, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.record.live import (
     PIXELS_MIN,
@@ -36,6 +36,7 @@ from app.presenters.record.live import (
 )
 from app.presenters.record.model import (
     RECORDING_STATES,
+    ArmedRun,
     EndedRun,
     RecordedRun,
     RecordModel,
@@ -48,20 +49,18 @@ from app.presenters.record.state import (
     ClockTicked,
     Connecting,
     CountCompletedRuns,
-    Disconnected,
     KeepRun,
     LiveEstimate,
     LoadPlan,
     MoveToTrash,
     NoteEdited,
+    Notification,
     PlanEdited,
     PlotResized,
     RecordEvent,
     RecordTask,
     RestoreFromTrash,
     RunForm,
-    RunsChanged,
-    ScreenEntered,
     SeriesChosen,
     StatusBar,
 )
@@ -102,7 +101,7 @@ class _Reduction:
                 self._on_clock(now_s)
             case Action():
                 self._on_action(event)
-            case ScreenEntered():
+            case Notification.SCREEN_ENTERED:
                 self._load_plan()
             case SeriesChosen(series):
                 self._choose_series(series)
@@ -114,7 +113,8 @@ class _Reduction:
                 if not self.model.next_runs.plan.error:
                     self._save(self.model.next_runs)
             case NoteEdited(note):
-                self._set(decisions=model.decisions.with_note(note))
+                if (pending := model.decisions.pending) is not None:
+                    self._set_decisions(pending=replace(pending, edited_note=note))
             case PlotResized(width_px):
                 self._set(live=replace(model.live, width_px=max(width_px, PIXELS_MIN)))
             case TaskDone(task, answer):
@@ -128,7 +128,7 @@ class _Reduction:
                 self._set_session(true_friction=None, waiting_for=waiting_for)
                 self._load_plan()
                 self._start_over(PullbackState.CONNECTING, device)
-            case Disconnected():
+            case Notification.DISCONNECTED:
                 self._set_session(simulated=False)
                 self._set(next_runs=model.next_runs.with_fixed_series("", ""))
                 self._start_over(None, "")
@@ -141,7 +141,7 @@ class _Reduction:
                 self._set(sounds=event.sounds, next_runs=next_runs)
             case Gauges():
                 self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
-            case RunsChanged():
+            case Notification.RUNS_CHANGED:
                 self._count_completed()
             case _:
                 self._on_engine(event)
@@ -161,13 +161,15 @@ class _Reduction:
             case Action.UNDO if model.undo_text:
                 self._undo()
             case Action.UNTARE if Action.TARE in model.allowed:
-                self._set(live=model.live.untared(), decisions=model.decisions.without_last())
+                self._set(live=model.live.untared())
+                self._forget_last()
             case _ if action not in model.allowed:
                 return
             case Action.TARE:
                 tared = model.live.tared()
-                self._set(live=tared or model.live, decisions=model.decisions.without_last())
-                self._say(tare_chip(tared))
+                self._set(live=tared or model.live)
+                self._forget_last()
+                self._set_decisions(message=tare_chip(tared))
             case Action.ARM:
                 self._arm()
             case Action.STOP:
@@ -177,7 +179,7 @@ class _Reduction:
                 self._close_ended()
             case Action.REPEAT if model.ended is not None:
                 self._move_to_trash()
-                self._choose_series(model.ended.series)
+                self._choose_series(model.ended.run.series)
                 self._arm(count=1)
             case Action.DISCARD:
                 self._move_to_trash()
@@ -195,29 +197,32 @@ class _Reduction:
             self._close_ended()
             reason = self.model.next_runs.why_not_armed(series)
         if reason.text:
-            self._say(reason)
+            self._set_decisions(message=reason)
             return
         next_runs = self.model.next_runs
         run, count = next_runs.run_settings(self.model.stand.directory), count or next_runs.run_count
-        self._set_session(is_command_pending=True, remaining_runs=count - 1)
-        self._set_session(series=run.series or "", run_note=run.note, run_name="")
+        armed = ArmedRun(run.series or "", note=run.note)
+        self._set_session(is_command_pending=True, remaining_runs=count - 1, run=armed)
         self.effects.append(Arm(run, count))
 
     # --- decisions about runs ---
 
     def _decide(self) -> RecordedRun | None:
         run = self.model.decisions.pending
-        self._set(decisions=self.model.decisions.decided())
+        if run is not None:
+            self._set_decisions(pending=None, last=run, trash_path="")
         return run
 
     def _keep(self, run: RecordedRun) -> None:
-        self._set(decisions=self.model.decisions.keeping(run))
+        storing = {**self.model.decisions.storing, run.path: run}
+        self._set_decisions(storing=storing, message=run.storing_message)
         self.effects.append(KeepRun(run.path, self.model.author, run.note_to_store, run.has_results))
 
     def _move_to_trash(self) -> None:
         run = self._decide()
         if run is not None:
-            self._set(decisions=self.model.decisions.moving(run))
+            message = Chip(gettext("Moving {name} to the trash", name=run.name))
+            self._set_decisions(is_moving=True, message=message)
             self.effects.append(MoveToTrash(run.path, self.model.author, run.note_to_store))
         if self.model.ended is not None and self.model.ended.result is not None:
             self._set(next_runs=self.model.next_runs.with_run(self.model.ended.result.path))
@@ -228,8 +233,7 @@ class _Reduction:
         if ended is None:
             return
         if ended.result is None:
-            to_keep = model.decisions.to_keep | {ended.event.path}
-            self._set(decisions=replace(model.decisions, to_keep=to_keep))
+            self._set_decisions(to_keep=model.decisions.to_keep | {ended.event.path})
         elif ended.result.path:
             self._set(snapshot=Snapshot(ended, model.live.traces, model.next_runs.series))
         run = self._decide()
@@ -237,33 +241,32 @@ class _Reduction:
         if run is not None:
             self._keep(run)
         if run is not None and run.has_results:
-            next_runs = next_runs.with_run(run.path, ended.series).with_next_series()
+            next_runs = next_runs.with_run(run.path, ended.run.series).with_next_series()
         self._set(next_runs=next_runs, live=self.model.live.restarted(), ended=None)
         self._set_session(live_estimate=LiveEstimate())
 
     def _undo(self) -> None:
         decisions = self.model.decisions
         run, trash_path = decisions.last, decisions.trash_path
-        self._set(decisions=decisions.undone())
+        self._set_decisions(last=None, trash_path="")
         if run is None:
             return
         if trash_path:
-            self._set(decisions=replace(self.model.decisions, restoring=run))
+            self._set_decisions(restoring=run)
             self.effects.append(RestoreFromTrash(trash_path))
             return
-        self._set(decisions=self.model.decisions.again(run))
-        if self.model.snapshot is not None and self.model.snapshot.ended.result is not None:
-            self._show_again(self.model.snapshot.ended.result.path)
+        self._ask_again(run)
 
-    def _show_again(self, path: str) -> None:
-        """Show the previous run, which is at `path` now, until it is decided about."""
+    def _ask_again(self, run: RecordedRun) -> None:
+        """Show the previous run until it is decided about; its note may or may not have been stored."""
+        self._set_decisions(pending=replace(run, note=None), message=EMPTY_CHIP)
         snapshot = self.model.snapshot
         if snapshot is None or snapshot.ended.result is None:
             return
-        ended = replace(snapshot.ended, result=replace(snapshot.ended.result, path=path))
+        ended = replace(snapshot.ended, result=replace(snapshot.ended.result, path=run.path))
         self._set(ended=ended, live=self.model.live.held(snapshot.traces))
         self._choose_series(snapshot.next_series)
-        self._set(next_runs=self.model.next_runs.with_undecided(path))
+        self._set(next_runs=self.model.next_runs.with_undecided(run.path))
 
     # --- answers of the worker ---
 
@@ -274,32 +277,48 @@ class _Reduction:
                 self._save(model.next_runs.with_loaded_plan(answer))
             case CountCompletedRuns():
                 self._set(next_runs=model.next_runs.with_completed(answer).with_next_series())
-            case KeepRun():
-                self._set(decisions=model.decisions.after_keeping(task))
-            case MoveToTrash():
-                self._set(decisions=model.decisions.after_moving(task, answer))
+            case KeepRun(path):
+                self._on_kept(path)
+            case MoveToTrash(path):
+                self._on_moved(path, answer)
             case RestoreFromTrash():
                 self._on_restored(answer)
         if isinstance(task, KeepRun | MoveToTrash | RestoreFromTrash):
             self._count_completed()
 
+    def _on_kept(self, path: str) -> None:
+        decisions = self.model.decisions
+        storing = dict(decisions.storing)
+        run = storing.pop(path, None)
+        self._set_decisions(storing=storing)
+        if run is not None and decisions.message == run.storing_message:  # a newer message stays
+            self._set_decisions(message=run.stored_message)
+
+    def _on_moved(self, path: str, trash_path: str) -> None:
+        last, text = self.model.decisions.last, gettext("Moved {name} to the trash", name=Path(path).stem)
+        self._set_decisions(is_moving=False, message=Chip(text, Tone.WARN, trash_path))
+        if last is not None and last.path == path:
+            self._set_decisions(trash_path=trash_path)
+
     def _on_restored(self, path: str) -> None:
         """Ask about a restored run again, or keep it if another one is shown."""
         restoring = self.model.decisions.restoring
-        self._set(decisions=replace(self.model.decisions, restoring=None))
+        self._set_decisions(restoring=None)
         if restoring is None:
             return
         run = replace(restoring, path=path)
         if self.model.is_run_shown:
             self._keep(run)
-            self._say(Chip(gettext("Brought back {name}: it counts again", name=run.name), Tone.OK))
+            text = gettext("Brought back {name}: it counts again", name=run.name)
         else:
-            self._set(decisions=self.model.decisions.again(run))
-            self._show_again(path)
-            self._say(Chip(gettext("Brought back {name}", name=run.name), Tone.OK))
+            self._ask_again(run)
+            text = gettext("Brought back {name}", name=run.name)
+        self._set_decisions(message=Chip(text, Tone.OK))
 
     def _on_task_failed(self, task: RecordTask, message: Message) -> None:
-        self._set(decisions=self.model.decisions.after_failure(task, message))
+        """Show why a task failed; the files are as they were."""
+        is_moving = self.model.decisions.is_moving and not isinstance(task, MoveToTrash)
+        self._set_decisions(is_moving=is_moving, message=Chip(sentence(message), Tone.BAD))
         if isinstance(task, LoadPlan):  # the stored plan cannot be read; the runs can
             self._count_completed()
 
@@ -334,21 +353,21 @@ class _Reduction:
                 self._set_result(ended, result, RecordedRun.of(event))
             case TaskFailed(_, message):
                 result = results.failed_result(message, path, ended.event.ended)
-                self._set_result(ended, result, RecordedRun(path, ended.note, ended.note))
+                self._set_result(ended, result, RecordedRun(path, ended.run.note, ended.run.note))
 
     def _on_late_identification(self, event: AnalysedRun | TaskFailed | TaskProgress, path: str) -> None:
         """Keep a run that the operator has gone on from; without a result it stays as it is."""
-        decisions = self.model.decisions
-        if isinstance(event, TaskProgress) or path not in decisions.to_keep:
+        to_keep = self.model.decisions.to_keep
+        if isinstance(event, TaskProgress) or path not in to_keep:
             return
-        self._set(decisions=replace(decisions, to_keep=decisions.to_keep - {path}))
+        self._set_decisions(to_keep=to_keep - {path})
         if isinstance(event, AnalysedRun):
-            self._set(decisions=self.model.decisions.undone())
+            self._set_decisions(last=None, trash_path="")
             self._keep(RecordedRun.of(event))
 
     def _set_result(self, ended: EndedRun, result: Result, pending: RecordedRun) -> None:
-        decisions = replace(self.model.decisions, pending=pending)
-        self._set(ended=replace(ended, result=result, progress=None), decisions=decisions)
+        self._set(ended=replace(ended, result=result, progress=None))
+        self._set_decisions(pending=pending)
 
     # --- engine and connection ---
 
@@ -382,7 +401,7 @@ class _Reduction:
             case LiveResult():
                 self._set_session(live_estimate=live_estimate(event))
             case RunStarted(path):
-                self._set_session(run_name=Path(path).stem)
+                self._set_session(run=replace(self.model.session.run, name=Path(path).stem))
             case RunEnded():
                 self._on_run_ended(event)
 
@@ -403,15 +422,15 @@ class _Reduction:
     def _on_run_ended(self, event: RunEnded) -> None:
         session = self.model.session
         self._set_session(is_command_pending=False, remaining_runs=event.remaining)
-        ended = EndedRun(event, session.series, session.run_name, session.run_note)
+        ended = EndedRun(event, session.run)
         if event.path:
             self._save(self.model.next_runs.with_undecided(event.path).after_recording())
             ended = replace(ended, progress=Progress(gettext("Identifying")))
         else:
             reason = event.message or gettext("nothing was recorded")
             ended = replace(ended, result=results.failed_result(reason, "", event.ended))
-        decisions = self.model.decisions.without_last()
-        self._set(ended=ended, live=self.model.live.stopped(), decisions=decisions)
+        self._set(ended=ended, live=self.model.live.stopped())
+        self._forget_last()
 
     def _set_loss(self, reason: str) -> None:
         self._set_session(loss_reason=reason)
@@ -439,18 +458,21 @@ class _Reduction:
         model, session = self.model, self.model.session
         if not model.is_run_shown:
             return Chip(model.next_runs.run_text(model.next_runs.series))
-        shown = model.ended or session
-        name = model.ended.name if model.ended else session.run_name
-        text = model.next_runs.run_text(shown.series or model.next_runs.series)
+        run = model.ended.run if model.ended else session.run
+        text = model.next_runs.run_text(run.series or model.next_runs.series)
         if session.remaining_runs:
             text += gettext(", {count} more by themselves", count=session.remaining_runs)
-        return Chip(text, hint=name)
+        return Chip(text, hint=run.name)
 
-    def _say(self, message: Chip) -> None:
-        self._set(decisions=replace(self.model.decisions, message=message))
+    def _forget_last(self) -> None:
+        """Drop message and undo: something else has happened since the last decision."""
+        self._set_decisions(message=EMPTY_CHIP, last=None, trash_path="")
 
     def _set(self, **changes: Any) -> None:
         self.model = replace(self.model, **changes)
+
+    def _set_decisions(self, **changes: Any) -> None:
+        self.model = replace(self.model, decisions=replace(self.model.decisions, **changes))
 
     def _set_session(self, **changes: Any) -> None:
         self.model = replace(self.model, session=replace(self.model.session, **changes))

@@ -1,15 +1,10 @@
 """State of the Record screen: what the view draws, tasks for its worker, and events that change it."""
 
-import datetime
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import StrEnum
-from pathlib import Path
+from enum import Enum, StrEnum, auto
 from typing import Any
 
 from app.acquisition.messages import Event
-from app.acquisition.pullback.plan import AllowedPlateRange, allowed_plate_range, default_excursion
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
@@ -17,35 +12,12 @@ from app.presenters.decimated_history import Polyline
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.results import Result, ResultRow
 from app.runs.next_tests import NextTests
-from config.schema import Gauges, Settings, Stand
+from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
 
 _NO_DEVICE = Chip(N_("no device"))
 _DOTS_MAX = 6
 """More dots cannot be counted at a glance: figures are shown instead."""
-
-
-@dataclass(frozen=True, slots=True)
-class StandContext:
-    """Settings of the stand and the folder of its runs."""
-
-    stand: Stand
-    gauges: Gauges
-    all_series: tuple[str, ...]
-    directory: Path
-    today: Callable[[], datetime.date] = datetime.date.today
-    """Current date, for the validity of calibrations."""
-    clock: Callable[[], float] = time.monotonic
-    """Monotonic time (s)."""
-
-    def pullback_m(self, series: str) -> float:
-        return self.stand.series(series).pullback_m
-
-    def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
-        """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
-        range_m = self.gauges.relative.range_m
-        excursion_m = default_excursion(self.pullback_m(series))
-        return None if range_m is None else allowed_plate_range(range_m, excursion_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,9 +311,13 @@ class RestoreFromTrash:
 RecordTask = LoadPlan | CountCompletedRuns | SavePlan | KeepRun | MoveToTrash | RestoreFromTrash
 
 
-@dataclass(frozen=True, slots=True)
-class ScreenEntered:
-    """The screen is shown."""
+class Notification(Enum):
+    """Events without data that the window sends."""
+
+    SCREEN_ENTERED = auto()
+    DISCONNECTED = auto()
+    RUNS_CHANGED = auto()
+    """Runs were added to the folder or removed from it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,39 +351,27 @@ class Connecting:
 
 
 @dataclass(frozen=True, slots=True)
-class Disconnected:
-    """No device is connected any more."""
-
-
-@dataclass(frozen=True, slots=True)
 class ClockTicked:
     """Time has passed; `now_s` on the clock of `StandContext`."""
 
     now_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class RunsChanged:
-    """Runs were added to the folder or removed from it."""
-
-
 RecordEvent = (
     Action
-    | ScreenEntered
+    | Notification
     | SeriesChosen
     | RunForm
     | PlanEdited
     | NoteEdited
     | PlotResized
     | Connecting
-    | Disconnected
     | SimulationStarted
     | RingRows
     | ClockTicked
     | AnalysedRun
     | Settings
     | Gauges
-    | RunsChanged
     | TaskDone[Any]
     | TaskFailed
     | TaskProgress

@@ -225,7 +225,9 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorRe
     session.close()
     (words,) = said(faults)
     assert words.startswith("Engine or simulated stand did not end within 0.05 s")
-    (thread,) = [one for one in threading.enumerate() if one.name == "slipstand-session" and one.is_alive()]
+    (thread,) = [
+        one for one in threading.enumerate() if one.name == "slipstand-connection" and one.is_alive()
+    ]
     assert thread.daemon, "it would keep the program from ending"
     Hangs.go_on.set()
     thread.join(5.0)

@@ -25,7 +25,7 @@ from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
     Connecting,
-    Disconnected,
+    Notification,
     RunForm,
     SeriesChosen,
     StepStatus,
@@ -291,7 +291,7 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
 def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.TAIL, 9.0)
     presenter.dispatch(ended(reason=EndReason.DEVICE_LOST))
-    presenter.dispatch(Disconnected())
+    presenter.dispatch(Notification.DISCONNECTED)
     assert presenter.state.guidance.instruction == "Finding friction"
     presenter.dispatch(analysed(ended="device-lost"))
     assert presenter.state.result is not None
@@ -373,7 +373,7 @@ def test_the_truth_of_a_simulated_stand_is_not_held_against_a_real_one(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     presenter.dispatch(SimulationStarted("1FFM0", 0.2))
-    presenter.dispatch(Disconnected())
+    presenter.dispatch(Notification.DISCONNECTED)
     presenter.dispatch(Connecting("COM7"))
     came_to(presenter, PullbackState.IDLE, 0.0)
     assert presenter.state.guidance.instruction == "Arm when the stand is at rest"

@@ -15,10 +15,10 @@ from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
     Action,
     Connecting,
-    Disconnected,
     KeepRun,
     LiveEstimate,
     MoveToTrash,
+    Notification,
     RecordEvent,
     StepStatus,
 )
@@ -131,7 +131,7 @@ def test_the_live_estimate_is_of_one_pull_only(screen: Screen) -> None:
 
 
 def test_another_connection_takes_no_result_away(screen: Screen) -> None:
-    screen.send(analysed(), Disconnected())
+    screen.send(analysed(), Notification.DISCONNECTED)
     assert screen.model.ended is not None
     screen.send(Action.NEXT, Connecting("COM8"))
     assert screen.model.ended is None

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from stage import FakeLauncher, FakeWorker, bench, fake_workers
+from stage import FakeLauncher, FakePool, FakeWorker, bench
 
 from app.acquisition.messages import Failed
 from app.presenters import recovery
@@ -27,7 +27,12 @@ class Desk:
         self.session = Connection(*self.launcher.starters, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         context = WindowContext(bench(), start, count_unfinished=lambda: self.unfinished)
-        self.window = WindowPresenter(self.session, fake_workers(analysis=self.worker), context)
+        self.window = WindowPresenter(
+            self.session,
+            self.worker,  # type: ignore[arg-type]
+            FakePool(),
+            context,
+        )
 
     @property
     def notice(self) -> Notice:

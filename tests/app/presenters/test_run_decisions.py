@@ -27,12 +27,12 @@ from app.presenters.record.state import (
     LoadPlan,
     MoveToTrash,
     NoteEdited,
+    Notification,
     PlanEdited,
     RecordTask,
     RestoreFromTrash,
     RunForm,
     SavePlan,
-    ScreenEntered,
 )
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, PlannedSeries
@@ -437,7 +437,7 @@ def test_what_cannot_be_is_said_and_nothing_is_recorded_with_it(form: RunForm, w
 def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     desk = Desk()
     fresh = RecordPresenter(desk.recorder, bench(), desk.worker, "me")  # type: ignore[arg-type]
-    fresh.dispatch(ScreenEntered())
+    fresh.dispatch(Notification.SCREEN_ENTERED)
     (call,) = desk.worker.calls
     desk.worker.calls.clear()
     call.fail("next-tests.json: cannot be used. Mend it")

@@ -9,12 +9,12 @@ from stage import (
     RUN,
     Call,
     FakeLauncher,
+    FakePool,
     FakeWorker,
     RecordingView,
     analysed,
     bench,
     ended,
-    fake_workers,
 )
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
@@ -36,12 +36,12 @@ class Desk:
     def __init__(self, personal: PersonalSettings | None = None) -> None:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.runs_worker = FakeWorker()
         self.session = Connection(*self.launcher.starters, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
-            fake_workers(analysis=self.worker, runs=self.runs_worker),
+            self.worker,  # type: ignore[arg-type]
+            FakePool(),
             WindowContext(bench(), start, personal or PersonalSettings()),
         )
 

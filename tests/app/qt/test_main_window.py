@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
     QPushButton,
 )
 from pytestqt.qtbot import QtBot
-from stage import RUN, FakeLauncher, FakeWorker, analysed, bench, fake_workers
+from stage import RUN, FakeLauncher, FakePool, FakeWorker, analysed, bench
 
 from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
@@ -57,7 +57,8 @@ class Desk:
         )
         self.presenter = WindowPresenter(
             Connection(*self.launcher.starters, ErrorReporter().report),
-            fake_workers(analysis=self.worker),
+            self.worker,  # type: ignore[arg-type]
+            FakePool(),
             WindowContext(
                 bench(),
                 start,
@@ -77,6 +78,10 @@ class Desk:
 
     def click(self, text: str) -> None:
         self.qtbot.mouseClick(self.button(text), Qt.MouseButton.LeftButton)
+
+    def press_number_of(self, screen: Screen) -> None:
+        number = list(Screen).index(screen) + 1
+        self.qtbot.keyClick(self.window, str(number), Qt.KeyboardModifier.ControlModifier)
 
     def words(self) -> str:
         return visible_words(self.window)
@@ -165,9 +170,9 @@ def test_unfinished_runs_are_asked_about_in_words_that_fit(desk: Desk) -> None:
 
 def test_screens_are_reached_by_keys_and_built_when_first_shown(desk: Desk) -> None:
     assert list(desk.window._screens) == [Screen.START]
-    desk.qtbot.keyClick(desk.window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
+    desk.press_number_of(Screen.IDENTIFY)
     assert desk.presenter.state.screen is Screen.IDENTIFY
-    desk.qtbot.keyClick(desk.window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    desk.press_number_of(Screen.RECORD)
     assert desk.presenter.state.screen is Screen.RECORD
     desk.click("Connect")
     assert desk.presenter.state.screen is Screen.START
@@ -246,12 +251,12 @@ def test_an_exception_in_a_slot_is_said_and_the_window_goes_on(
         desk.button("More settings").clicked.connect(lambda: {}["nothing"])
         desk.click("More settings")
         desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=5000)
-    desk.qtbot.keyClick(desk.window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
+    desk.press_number_of(Screen.STAND)
     assert desk.presenter.state.screen is Screen.STAND
 
 
 def test_f1_lists_the_keys_of_the_screen_and_of_the_window(desk: Desk) -> None:
-    desk.qtbot.keyClick(desk.window, Qt.Key.Key_4, Qt.KeyboardModifier.ControlModifier)
+    desk.press_number_of(Screen.RUNS)
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_F1)
     (shown,) = desk.window.findChildren(HelpDialog)
     desk.qtbot.wait(1)
