@@ -186,7 +186,7 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     presenter.show_screen(Screen.CAMPAIGN)
     wait(lambda: campaign.state.is_gathered, "the run is gathered")
     camera.shoot("campaign-first-run")
-    campaign.simulate_campaign(campaign.state.folder)
+    campaign.simulate_campaign()
     wait(lambda: campaign.state.summary.series_count > 1, "a whole campaign is simulated and gathered")
     camera.shoot("campaign")
     campaign.save_results()

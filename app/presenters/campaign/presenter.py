@@ -92,10 +92,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         if self.state.summary.run_count:
             self._submit(products.write_product, self.state.folder, product, target, done=self._on_written)
 
-    def simulate_campaign(self, folder: str) -> None:
-        """Simulate a campaign into a new folder below `folder`, and show it."""
+    def simulate_campaign(self) -> None:
+        """Simulate a campaign into a new folder below that of the runs, and show it."""
         self._update(progress=Progress(gettext("Simulating the campaign")))
-        self._submit(tasks.simulate, folder, done=self.choose_folder)
+        self._submit(tasks.simulate, self.state.folder, done=self.choose_folder)
 
     def tick(self) -> None:
         self._worker.poll()

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.presenters.campaign.state import Bar, ContactBars
 from app.qt.theme import Theme, colour
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack
 from messages.i18n import gettext
 
@@ -34,11 +35,9 @@ class FrictionPlot(QWidget):
         self._stack = PlotStack(theme, ((title, "text"),), interactive=False)
         self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
         self._stack.resized.connect(lambda _: self._name())
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._stack)
+        make_column(self._stack, of=self)
         theme.changed.connect(self._draw)
-        self._draw()
+        self.show_contacts(())
 
     def show_contacts(self, contacts: tuple[ContactBars, ...]) -> None:
         self._contacts = contacts

@@ -7,7 +7,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QMenu,
     QPushButton,
     QStackedWidget,
@@ -19,7 +18,7 @@ from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, CampaignSummary, Product
 from app.qt.campaign.friction_plot import FrictionPlot
-from app.qt.campaign.sections import Sections, SelectedRuns
+from app.qt.campaign.sections import SelectedRuns, clear, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ProgressBar, ask_for_folder, make_button
@@ -44,51 +43,61 @@ class CampaignScreen(QWidget):
     def __init__(self, theme: Theme, presenter: CampaignPresenter) -> None:
         super().__init__()
         self._presenter = presenter
-        self._shown: CampaignState | None = None
+        self._shown = CampaignState("", CampaignSummary(()))
         self._title = label(role=TextRole.HEADING)
         self._message = label()
         self._working = _Working(presenter)
-        self._keep = QPushButton()
+        self._keep = make_button("", presenter.save_results)
+        self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
         self._export = QPushButton(gettext("Export…"))
-        self._undo = QPushButton(gettext("Undo"))
-        self._folder = QPushButton(gettext("Folder…"))
-        self._refresh = QPushButton(gettext("Refresh"))
+        self._undo = make_button(gettext("Undo"), presenter.undo)
+        self._folder = make_button(gettext("Folder…"), self._choose_folder)
+        refresh = make_button(gettext("Refresh"), presenter.refresh)
         self._table = SeriesTable(theme)
+        self._table.row_selected.connect(presenter.select_series)
+        self._table.row_opened.connect(presenter.open_row)
         self._plot = FrictionPlot(theme)
         self._chosen = SelectedRuns(presenter)
         self._sections = QVBoxLayout()
         self._empty = _Empty(presenter, self._choose_folder)
         self._stack = QStackedWidget()
-        self._lay_out()
-        self._connect()
+        self._stack.addWidget(self._make_page())
+        self._stack.addWidget(self._empty)
+        buttons = (self._keep, self._export, self._undo, self._folder, refresh)
+        top = make_row(self._title, (self._working, 1), *buttons, spacing=8, margins=(4, 0))
+        make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
+        menu = QMenu(self)
+        for product in Product:
+            action = menu.addAction(gettext(product.value))
+            action.triggered.connect(partial(self._ask_for_target, product))
+        self._export.setMenu(menu)
+        add_shortcut(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
+        bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
+        bind_button(refresh, "F5", gettext("Gather the folder again"), self)
+        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
 
     def show_state(self, state: CampaignState) -> None:
         old, self._shown = self._shown, state
+        summary, before = state.summary, old.summary
         self._show_head(state)
-        is_empty = not state.summary.run_count and not state.summary.faults
+        is_empty = not summary.run_count and not summary.faults
         self._stack.setCurrentIndex(1 if is_empty else 0)
         if is_empty:
             self._empty.show_state(state)
-        if old is None or state.columns != old.columns:
+        if state.columns != old.columns:
             self._table.show_columns(state.columns)
-        summary, before = state.summary, old.summary if old else None
-        if before is None or summary.rows != before.rows:
+        if summary.rows != before.rows:
             self._table.show_rows(summary.rows)
-        if before is None or summary.contacts != before.contacts:
+        if summary.contacts != before.contacts:
             self._plot.show_contacts(summary.contacts)
-        if old is None or (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
+        if (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
             self._chosen.show_runs(state.selected, state.selected_runs)
         if summary != before:
-            self._show_sections(summary)
-        if before is not None and len(summary.excluded) > len(before.excluded):
+            clear(self._sections)
+            self._sections.addWidget(make_sections(summary, self._presenter))
+        if len(summary.excluded) > len(before.excluded) and old.is_gathered:
             self._chosen.clear_reason()
             self._table.setFocus()  # in the field of the reason Ctrl+Z would take back letters
-
-    def _show_sections(self, summary: CampaignSummary) -> None:
-        while (item := self._sections.takeAt(0)) is not None:
-            if (old := item.widget()) is not None:
-                old.deleteLater()
-        self._sections.addWidget(Sections(summary, self._presenter))
 
     def _show_head(self, state: CampaignState) -> None:
         summary = state.summary
@@ -105,54 +114,22 @@ class CampaignScreen(QWidget):
 
     def _choose_folder(self) -> None:
         title = gettext("Gather the runs of a folder")
-        ask_for_folder(self, title, self._start_folder(), self._presenter.choose_folder)
+        ask_for_folder(self, title, self._shown.folder, self._presenter.choose_folder)
 
     def _ask_for_target(self, product: Product) -> None:
         kinds, name = _TARGETS[product]
         export = partial(self._presenter.export, product)
         if not kinds:
-            ask_for_folder(self, gettext("Export"), self._start_folder(), export)
+            ask_for_folder(self, gettext("Export"), self._shown.folder, export)
             return
-        dialog = QFileDialog(self, gettext("Export"), self._start_folder(), gettext(kinds))
+        dialog = QFileDialog(self, gettext("Export"), self._shown.folder, gettext(kinds))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(name)
         dialog.fileSelected.connect(export)
         dialog.open()
 
-    def _start_folder(self) -> str:
-        return self._shown.folder if self._shown else ""
-
-    def _connect(self) -> None:
-        menu = QMenu(self)
-        for product in Product:
-            action = menu.addAction(gettext(product.value))
-            action.triggered.connect(partial(self._ask_for_target, product))
-        self._export.setMenu(menu)
-        add_shortcut(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
-        self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
-        bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
-        bind_button(self._refresh, "F5", gettext("Gather the folder again"), self)
-        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
-        self._keep.clicked.connect(self._presenter.save_results)
-        self._undo.clicked.connect(self._presenter.undo)
-        self._folder.clicked.connect(self._choose_folder)
-        self._refresh.clicked.connect(self._presenter.refresh)
-        self._table.row_selected.connect(self._presenter.select_series)
-        self._table.row_opened.connect(self._presenter.open_row)
-
-    def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setContentsMargins(4, 0, 0, 0)
-        top.addWidget(self._title)
-        top.addWidget(self._working, 1)
-        for button in (self._keep, self._export, self._undo, self._folder, self._refresh):
-            top.addWidget(button)
-        self._stack.addWidget(self._filled())
-        self._stack.addWidget(self._empty)
-        make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
-
-    def _filled(self) -> QWidget:
+    def _make_page(self) -> QWidget:
         page = QWidget()
         tables, figures = (make_frame(self._table), _TABLE_SHARE), (make_frame(self._plot), _FIGURE_SHARE)
         left = make_column(tables, figures, spacing=8)
@@ -192,39 +169,28 @@ class _Empty(QFrame):
     def __init__(self, presenter: CampaignPresenter, choose_folder: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._presenter = presenter
-        self._words = label(role=TextRole.HEADING, wrap=True)
+        text = gettext("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
+        title = label(text, TextRole.HEADING, wrap=True)
         self._where = label(muted=True, wrap=True)
-        for words in (self._words, self._where):
+        for words in (title, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         hint = gettext("Simulate 36 series, three tests each, into a new folder: some minutes")
-        self._folder = ""
         self._buttons = (
             make_button(gettext("Record"), presenter.navigator.show_record),
             make_button(gettext("Choose another folder"), choose_folder),
-            make_button(gettext("Make the synthetic campaign"), self._make, hint),
+            make_button(gettext("Make the synthetic campaign"), presenter.simulate_campaign, hint),
         )
-        layout = make_column(STRETCH, self._words, self._where, spacing=16, margins=(24, 24), of=self)
+        layout = make_column(STRETCH, title, self._where, spacing=16, margins=(24, 24), of=self)
         for button in self._buttons:
             layout.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
 
     def show_state(self, state: CampaignState) -> None:
-        self._folder = state.folder
         for button in self._buttons:
             button.setVisible(state.progress is None)
-        self._words.setText(
-            gettext("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
-        )
-        self._where.setText(gettext(_where(state), folder=break_path(state.folder)))
-
-    def _make(self) -> None:
-        self._presenter.simulate_campaign(self._folder)
-
-
-def _where(state: CampaignState) -> str:
-    if state.progress is not None:
-        return N_("Looking through {folder}.")
-    if state.is_gathered:
-        return N_("There are no runs in {folder} yet.")
-    return N_("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
+        text = N_("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
+        if state.progress is not None:
+            text = N_("Looking through {folder}.")
+        elif state.is_gathered:
+            text = N_("There are no runs in {folder} yet.")
+        self._where.setText(gettext(text, folder=break_path(state.folder)))

@@ -1,117 +1,95 @@
 """The right column of Campaign: runs of a series, next test, effects, repeatability, exclusions, warnings."""
 
+from collections.abc import Iterator
 from functools import partial
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QLayout, QLineEdit, QVBoxLayout, QWidget
 
 from analysis.formatting import THIN_SPACE
 from app.presenters.base import Chip, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.state import CampaignSummary, NextTest, RepeatabilityRow, RunRow
+from app.presenters.campaign.state import CampaignSummary, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import make_button
-from app.qt.widgets.layouts import STRETCH, make_column, make_row
+from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
-_SPREAD_SHOWN = 8
+_REPEATABILITY_SHOWN = 8
 
 
-class Sections(QWidget):
-    """Built anew whenever the campaign was summed up."""
-
-    def __init__(self, summary: CampaignSummary, presenter: CampaignPresenter) -> None:
-        super().__init__()
-        self._presenter = presenter
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(8)
-        if summary.next_test is not None:
-            self._add_next(layout, summary.next_test)
-        self._add_effects(layout, summary)
-        self._add_spread(layout, summary.repeatability)
-        self._add_left_out(layout, summary.excluded)
-        _add_lines(layout, gettext("Without a result"), summary.faults, Tone.BAD)
-        _add_lines(layout, gettext("To know"), summary.warnings, Tone.WARN)
-        layout.addStretch(1)
-
-    def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
-        _section(layout, gettext("Next test"))
-        if test.series:
-            layout.addWidget(label(test.series, TextRole.NUMBER))
-        layout.addWidget(label(test.reason, wrap=True))
-        for text in test.expectations:
-            layout.addWidget(label(text, muted=True, wrap=True))
-        if test.series:
-            show_record = self._presenter.navigator.show_record
-            record = make_button(gettext("Record"), show_record, gettext("Go to Record"))
-            layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
-
-    def _add_effects(self, layout: QVBoxLayout, summary: CampaignSummary) -> None:
-        if not summary.effects:
-            return
-        _section(layout, gettext("What f<sub>d</sub> depends on"))
-        for effect in summary.effects:
-            line = make_row(
-                label(effect.cause, TextRole.STRONG),
-                STRETCH,
-                label(effect.conclusion, TextRole.STRONG if effect.is_found else TextRole.TEXT),
-                spacing=6,
-            )
-            layout.addLayout(line)
-            layout.addWidget(label(effect.sentence, muted=True, wrap=True))
-
-    def _add_spread(self, layout: QVBoxLayout, rows: tuple[RepeatabilityRow, ...]) -> None:
-        if not rows:
-            return
-        _section(layout, gettext("How f<sub>d</sub> repeats"))
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(4)
-        for column, title in enumerate(
-            (gettext("series"), gettext("runs"), gettext("scatter"), gettext("Birge"))
-        ):
-            grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, _side(column))
-        line = 1
-        for row in rows[:_SPREAD_SHOWN]:
-            for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge_ratio)):
-                grid.addWidget(label(text), line, column, _side(column))
-            if row.status.tone is not Tone.OK:
-                grid.addWidget(_chip(row.status, wrap=True), line + 1, 0, 1, 4)
-            line += 2
-        grid.setColumnStretch(0, 1)
-        layout.addLayout(grid)
-        more = len(rows) - _SPREAD_SHOWN
-        if more > 0:
-            words = gettext("{count} more series repeat as well or better.", count=more)
-            layout.addWidget(label(words, TextRole.LABEL, muted=True, wrap=True))
-
-    def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunRow, ...]) -> None:
-        if not lines:
-            return
-        _section(layout, gettext("Left out"))
-        for line in lines:
-            row = QHBoxLayout()
-            row.addWidget(label(f"{line.name}: {line.reason}", wrap=True), 1)
-            if line.can_return:
-                back = make_button(gettext("Take in"), partial(self._presenter.include_run, line.path))
-                back.setAccessibleName(gettext("Let {run} count again", run=line.name))
-                row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
-            layout.addLayout(row)
+def make_sections(summary: CampaignSummary, presenter: CampaignPresenter) -> QWidget:
+    """Make the sections of a campaign; those without content are left out."""
+    sections: tuple[tuple[str, list[Item]], ...] = (
+        (gettext("Next test"), list(_next_test(summary, presenter))),
+        (gettext("What f<sub>d</sub> depends on"), list(_effects(summary))),
+        (gettext("How f<sub>d</sub> repeats"), list(_repeatability(summary.repeatability))),
+        (gettext("Left out"), [_excluded_row(run, presenter) for run in summary.excluded]),
+        (gettext("Without a result"), [_chip(Chip(text, Tone.BAD), wrap=True) for text in summary.faults]),
+        (gettext("To know"), [_chip(Chip(text, Tone.WARN), wrap=True) for text in summary.warnings]),
+    )
+    column: list[Item] = []
+    for title, parts in sections:
+        if parts:
+            heading = label(title, TextRole.HEADING)
+            heading.setContentsMargins(0, 8, 0, 0)
+            column += [heading, *parts]
+    made = QWidget()
+    make_column(*column, STRETCH, spacing=8, margins=(16, 16), of=made)
+    return made
 
 
-def _add_lines(layout: QVBoxLayout, title: str, lines: tuple[str, ...], tone: Tone) -> None:
-    if not lines:
+def _next_test(summary: CampaignSummary, presenter: CampaignPresenter) -> Iterator[Item]:
+    test = summary.next_test
+    if test is None:
         return
-    _section(layout, title)
-    for text in lines:
-        layout.addWidget(_chip(Chip(text, tone), wrap=True))
+    if test.series:
+        yield label(test.series, TextRole.NUMBER)
+    yield label(test.reason, wrap=True)
+    yield from (label(text, muted=True, wrap=True) for text in test.expectations)
+    if test.series:
+        button = make_button(gettext("Record"), presenter.navigator.show_record, gettext("Go to Record"))
+        yield make_row(button, STRETCH)
 
 
-def _section(layout: QVBoxLayout, title: str) -> None:
-    layout.addSpacing(8)
-    layout.addWidget(label(title, TextRole.HEADING))
+def _effects(summary: CampaignSummary) -> Iterator[Item]:
+    for effect in summary.effects:
+        conclusion = label(effect.conclusion, TextRole.STRONG if effect.is_found else TextRole.TEXT)
+        yield make_row(label(effect.cause, TextRole.STRONG), STRETCH, conclusion, spacing=6)
+        yield label(effect.sentence, muted=True, wrap=True)
+
+
+def _repeatability(rows: tuple[RepeatabilityRow, ...]) -> Iterator[Item]:
+    if not rows:
+        return
+    grid = QGridLayout()
+    grid.setHorizontalSpacing(12)
+    grid.setVerticalSpacing(4)
+    grid.setColumnStretch(0, 1)
+    titles = (gettext("series"), gettext("runs"), gettext("scatter"), gettext("Birge"))
+    for column, title in enumerate(titles):
+        grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, _side(column))
+    for number, row in enumerate(rows[:_REPEATABILITY_SHOWN]):
+        line = 2 * number + 1
+        for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge_ratio)):
+            grid.addWidget(label(text), line, column, _side(column))
+        if row.status.tone is not Tone.OK:
+            grid.addWidget(_chip(row.status, wrap=True), line + 1, 0, 1, 4)
+    yield grid
+    more = len(rows) - _REPEATABILITY_SHOWN
+    if more > 0:
+        text = gettext("{count} more series repeat as well or better.", count=more)
+        yield label(text, TextRole.LABEL, muted=True, wrap=True)
+
+
+def _excluded_row(run: RunRow, presenter: CampaignPresenter) -> QLayout:
+    row = make_row((label(f"{run.name}: {run.reason}", wrap=True), 1), spacing=6)
+    if run.can_return:
+        button = make_button(gettext("Take in"), partial(presenter.include_run, run.path))
+        button.setAccessibleName(gettext("Let {run} count again", run=run.name))
+        row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
+    return row
 
 
 def _chip(chip: Chip, *, wrap: bool = False) -> QLabel:
@@ -125,55 +103,50 @@ def _side(column: int) -> Qt.AlignmentFlag:
 
 
 class SelectedRuns(QWidget):
-    """Hidden while no series is chosen."""
+    """Runs of the selected series; hidden without one."""
 
     def __init__(self, presenter: CampaignPresenter) -> None:
         super().__init__()
         self._presenter = presenter
         self._title = label(role=TextRole.HEADING)
-        self._lines = QVBoxLayout()
-        self._lines.setSpacing(8)
+        self._rows = QVBoxLayout()
+        self._rows.setSpacing(8)
         self._reason = QLineEdit()
         self._reason.setPlaceholderText(gettext("Why a run is left out"))
         self._reason.setAccessibleName(gettext("Reason for leaving a run out"))
-        layout = QVBoxLayout(self)
+        layout = make_column(self._title, self._rows, self._reason, spacing=8, of=self)
         layout.setContentsMargins(16, 16, 16, 8)
-        layout.setSpacing(8)
-        layout.addWidget(self._title)
-        layout.addLayout(self._lines)
-        layout.addWidget(self._reason)
         self.hide()
 
     def show_runs(self, series: str, runs: tuple[RunRow, ...]) -> None:
         self.setVisible(bool(runs))
         self._title.setText(gettext("Runs of {series}", series=series))
-        while (item := self._lines.takeAt(0)) is not None:
-            if (widget := item.widget()) is not None:
-                widget.deleteLater()
+        clear(self._rows)
         for run in runs:
-            self._lines.addWidget(self._line(run))
+            self._rows.addWidget(self._row(run))
 
     def clear_reason(self) -> None:
         self._reason.clear()
 
-    def _line(self, run: RunRow) -> QWidget:
-        made = QWidget()
+    def _row(self, run: RunRow) -> QWidget:
         open_run = partial(self._presenter.navigator.open_run, run.path)
         name = make_button(run.name, open_run, gettext("Show this run on Identify"))
         name.setProperty("role", "row")
-        out = make_button(
+        exclude = make_button(
             gettext("Leave out"),
             lambda: self._presenter.exclude_run(run.path, self._reason.text()),
             gettext("Leave this run out, for the reason below"),
         )
-        out.setAccessibleName(gettext("Leave {run} out", run=run.name))
-        chip = _chip(run.status)
-        below = make_row(
-            label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}"),
-            chip,
-            STRETCH,
-            out,
-            spacing=6,
-        )
+        exclude.setAccessibleName(gettext("Leave {run} out", run=run.name))
+        friction = label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}")
+        made = QWidget()
+        below = make_row(friction, _chip(run.status), STRETCH, exclude, spacing=6)
         make_column(name, below, spacing=2, of=made)
         return made
+
+
+def clear(layout: QLayout) -> None:
+    """Remove and delete the widgets of a layout."""
+    while (item := layout.takeAt(0)) is not None:
+        if (widget := item.widget()) is not None:
+            widget.deleteLater()

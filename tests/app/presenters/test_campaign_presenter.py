@@ -230,7 +230,7 @@ def test_giving_up_leaves_what_was_shown(stage: Stage) -> None:
 
 
 def test_a_synthetic_campaign_is_made_and_then_gathered(stage: Stage) -> None:
-    stage.presenter.simulate_campaign(FOLDER)
+    stage.presenter.simulate_campaign()
     assert stage.asked() == ("simulate", FOLDER)
     stage.last.done("/recordings/synthetic-campaign-1")
     assert stage.asked() == ("collect", "/recordings/synthetic-campaign-1", ALL_SERIES, False)
