@@ -20,7 +20,6 @@ from analysis.record import AnalysisError
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.campaign.state import (
-    Bar,
     CampaignSummary,
     Cell,
     ContactBars,
@@ -88,10 +87,10 @@ def _contact_bars(runs: CollectedRuns, campaign: Campaign) -> tuple[ContactBars,
         ContactBars(
             friction.contact or gettext("unknown"),
             names.get(friction.contact, ""),
-            None if friction.static is None else _bar(friction.static),
-            None if friction.dynamic is None else _bar(friction.dynamic),
-            tuple(map(_bar, friction.static_of_series.values())),
-            tuple(map(_bar, friction.dynamic_of_series.values())),
+            friction.static,
+            friction.dynamic,
+            tuple(friction.static_of_series.values()),
+            tuple(friction.dynamic_of_series.values()),
             tuple(friction.static_at_least.values()),
             "" if (ratio := ratios.get(friction.contact)) is None else _with_uncertainty(ratio),
         )
@@ -199,11 +198,6 @@ def _mark(row: SeriesRow) -> Chip:
         if code in said:
             return Chip(gettext(words), tone, "\n".join(sentence(message) for message in said.values()))
     return EMPTY_CHIP
-
-
-def _bar(quantity: Quantity) -> Bar:
-    low, high = quantity.interval_95
-    return Bar(quantity.value, low, high)
 
 
 def _scatter(pooled: PooledQuantity) -> str:

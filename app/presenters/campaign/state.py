@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from analysis.catalogue import Place, table_columns
+from analysis.quantities import Quantity
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from messages.i18n import gettext
 
@@ -44,26 +45,17 @@ def column_titles() -> tuple[tuple[str, str], ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Bar:
-    """Value and 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True)
 class ContactBars:
     """Bars of Fig. 2 for one contact: means over its series, and the series."""
 
     contact: str
     """Code and name."""
     name: str
-    static: Bar | None
+    static: Quantity | None
     """None if no series determined it."""
-    dynamic: Bar | None
-    static_of_series: tuple[Bar, ...] = ()
-    dynamic_of_series: tuple[Bar, ...] = ()
+    dynamic: Quantity | None
+    static_of_series: tuple[Quantity, ...] = ()
+    dynamic_of_series: tuple[Quantity, ...] = ()
     static_at_least: tuple[float, ...] = ()
     """Lower bounds of f_s, from series without a value."""
     ratio: str = ""

@@ -1,6 +1,6 @@
 """Fig. 2 of the paper on the screen: static and dynamic friction by contact, with intervals and series."""
 
-from collections.abc import Iterable
+import math
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from app.presenters.campaign.state import Bar, ContactBars
+from analysis.arrays import Floats
+from analysis.quantities import Quantity
+from app.presenters.campaign.state import ContactBars
 from app.qt.theme import Theme, colour
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack
@@ -34,15 +36,15 @@ class FrictionPlot(QWidget):
         )
         self._stack = PlotStack(theme, ((title, "text"),), interactive=False)
         self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
-        self._stack.resized.connect(lambda _: self._name())
+        self._stack.resized.connect(lambda _: self._name_contacts())
         make_column(self._stack, of=self)
         theme.changed.connect(self._draw)
         self.show_contacts(())
 
     def show_contacts(self, contacts: tuple[ContactBars, ...]) -> None:
         self._contacts = contacts
-        said = "; ".join(_spoken(one) for one in contacts)
-        self.setAccessibleName(gettext("Friction by contact: {said}", said=said or gettext("nothing yet")))
+        texts = "; ".join(map(_accessible_text, contacts)) or gettext("nothing yet")
+        self.setAccessibleName(gettext("Friction by contact: {said}", said=texts))
         self._draw()
 
     def _draw(self) -> None:
@@ -53,78 +55,62 @@ class FrictionPlot(QWidget):
         self._stack.restyle()
         self._stack.set_time_title("")
         tokens = self._theme.tokens
-        for place, one in enumerate(self._contacts):
-            self._bar(place - _WIDTH / 2, one.static, one.static_of_series, tokens.channel_1, hatched=True)
-            self._bar(place + _WIDTH / 2, one.dynamic, one.dynamic_of_series, tokens.channel_2, hatched=False)
-            self._least(place - _WIDTH / 2, one.static_at_least)
-        self._name()
+        tops: list[float] = []
+        for x, bars in enumerate(self._contacts):
+            static_x, dynamic_x = x - _WIDTH / 2, x + _WIDTH / 2
+            self._draw_bar(static_x, bars.static, bars.static_of_series, tokens.channel_1, hatched=True)
+            self._draw_bar(dynamic_x, bars.dynamic, bars.dynamic_of_series, tokens.channel_2, hatched=False)
+            xs, brush = _spread_out(static_x, len(bars.static_at_least)), pg.mkBrush(tokens.channel_1)
+            bounds = list(bars.static_at_least)
+            self._add(pg.ScatterPlotItem(x=xs, y=bounds, size=7, symbol="t1", pen=None, brush=brush))
+            quantities = (bars.static, bars.dynamic, *bars.static_of_series, *bars.dynamic_of_series)
+            tops += [quantity.interval_95[1] for quantity in quantities if quantity] + bounds
+        self._name_contacts()
         self._stack.set_time_range(-0.6, max(len(self._contacts), 1) - 0.4)
-        plot.set_value_range(0.0, _HEADROOM * max(_tops(self._contacts), default=1.0))
+        plot.set_value_range(0.0, _HEADROOM * max(filter(math.isfinite, tops), default=1.0))
 
-    def _name(self) -> None:
+    def _name_contacts(self) -> None:
         has_room = self.width() > _ROOM * max(len(self._contacts), 1)
-        ticks = [(place, _named(one, has_room=has_room)) for place, one in enumerate(self._contacts)]
+        ticks = [(x, _tick_text(bars, has_room=has_room)) for x, bars in enumerate(self._contacts)]
         self._stack.plots[0].bottom.setTicks([ticks])
 
-    def _bar(
-        self, place: float, mean: Bar | None, series: tuple[Bar, ...], token: str, *, hatched: bool
+    def _draw_bar(
+        self, x: float, mean: Quantity | None, series: tuple[Quantity, ...], token: str, *, hatched: bool
     ) -> None:
         if mean is None:
             return
         brush = pg.mkBrush(colour(token, 0.45 if hatched else 0.30))
         if hatched:
             brush.setStyle(Qt.BrushStyle.BDiagPattern)
-        pen = pg.mkPen(token, width=1)
-        self._add(pg.BarGraphItem(x=[place], height=[mean.value], width=_WIDTH * 0.92, brush=brush, pen=pen))
-        ink = self._theme.tokens.text
-        self._intervals(_beside(place, len(series)), series, pg.mkPen(colour(ink, 0.5), width=1), 0.0)
-        values = [one.value for one in series]
-        self._add(
-            pg.ScatterPlotItem(
-                x=_beside(place, len(series)), y=values, size=4, pen=None, brush=pg.mkBrush(ink)
-            )
-        )
-        self._intervals([place], (mean,), pg.mkPen(ink, width=2), 0.08)
-
-    def _intervals(self, places: Iterable[float], bars: tuple[Bar, ...], pen: Any, beam: float) -> None:
-        values = np.array([one.value for one in bars])
-        above = np.array([one.high for one in bars]) - values
-        below = values - np.array([one.low for one in bars])
-        self._add(
-            pg.ErrorBarItem(x=np.array(list(places)), y=values, top=above, bottom=below, beam=beam, pen=pen)
-        )
-
-    def _least(self, place: float, least: tuple[float, ...]) -> None:
-        brush = pg.mkBrush(self._theme.tokens.channel_1)
-        places = _beside(place, len(least))
-        self._add(pg.ScatterPlotItem(x=places, y=list(least), size=7, symbol="t1", pen=None, brush=brush))
+        pen, ink = pg.mkPen(token, width=1), self._theme.tokens.text
+        self._add(pg.BarGraphItem(x=[x], height=[mean.value], width=_WIDTH * 0.92, brush=brush, pen=pen))
+        xs, values = _spread_out(x, len(series)), [quantity.value for quantity in series]
+        self._add(_intervals(xs, series, pg.mkPen(colour(ink, 0.5), width=1), 0.0))
+        self._add(pg.ScatterPlotItem(x=xs, y=values, size=4, pen=None, brush=pg.mkBrush(ink)))
+        self._add(_intervals(np.array([x]), (mean,), pg.mkPen(ink, width=2), 0.08))
 
     def _add(self, item: Any) -> None:
         (plot,) = self._stack.plots
         self._items.append(plot.add(item))
 
 
-def _beside(place: float, count: int) -> list[float]:
+def _intervals(xs: Floats, quantities: tuple[Quantity, ...], pen: Any, beam: float) -> Any:
+    values = np.array([quantity.value for quantity in quantities])
+    low, high = np.array([quantity.interval_95 for quantity in quantities]).reshape(-1, 2).T
+    return pg.ErrorBarItem(x=xs, y=values, top=high - values, bottom=values - low, beam=beam, pen=pen)
+
+
+def _spread_out(x: float, count: int) -> Floats:
     """Places of points that would hide one another; none in the middle, where the mean's interval is."""
     even = count + count % 2
-    return [float(x) for x in place + np.linspace(-_SPREAD / 2, _SPREAD / 2, even)[:count]]
+    return x + np.linspace(-_SPREAD / 2, _SPREAD / 2, even)[:count]
 
 
-def _tops(contacts: tuple[ContactBars, ...]) -> list[float]:
-    found = [
-        bar.high
-        for one in contacts
-        for bar in (one.static, one.dynamic, *one.static_of_series, *one.dynamic_of_series)
-        if bar is not None and np.isfinite(bar.high)
-    ]
-    return [*found, *(low for one in contacts for low in one.static_at_least)]
+def _tick_text(bars: ContactBars, *, has_room: bool) -> str:
+    text = f"{bars.contact}: {bars.name}" if bars.name and has_room else bars.contact
+    return f"{text}\nf_s/f_d = {bars.ratio}" if bars.ratio else text
 
 
-def _named(one: ContactBars, *, has_room: bool) -> str:
-    words = f"{one.contact}: {one.name}" if one.name and has_room else one.contact
-    return f"{words}\nf_s/f_d = {one.ratio}" if one.ratio else words
-
-
-def _spoken(one: ContactBars) -> str:
-    said = [f"{name} {bar.value:.3f}" for name, bar in (("f_s", one.static), ("f_d", one.dynamic)) if bar]
-    return f"{one.contact} {' '.join(said)}"
+def _accessible_text(bars: ContactBars) -> str:
+    values = [f"{name} {bar.value:.3f}" for name, bar in (("f_s", bars.static), ("f_d", bars.dynamic)) if bar]
+    return f"{bars.contact} {' '.join(values)}"

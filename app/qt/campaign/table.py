@@ -1,7 +1,7 @@
 """Table 1 as it fills: a row a series, each cell a value above its uncertainty."""
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -16,10 +16,12 @@ from app.presenters.campaign.state import Cell, TableRow
 from app.qt.theme import TextRole, Theme, font
 from messages.i18n import gettext, ngettext
 
-_SPREAD, _BOLD, _TONE = (Qt.ItemDataRole.UserRole + number for number in (1, 2, 3))
+_LINES = Qt.ItemDataRole.UserRole + 1
 _PADDING, _ROW_HEIGHT = 6, 38
 _MARKS = {"bad": "■ ", "warn": "▲ ", "ok": "✓ "}
 _Index = QModelIndex | QPersistentModelIndex
+_Line = tuple[str, TextRole, str]
+"""Text, font, and name of the theme's colour."""
 
 
 class SeriesTable(QTableWidget):
@@ -31,7 +33,7 @@ class SeriesTable(QTableWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._rows: tuple[TableRow, ...] = ()
-        self.setItemDelegate(_TwoLines(theme, self))
+        self.setItemDelegate(_LinesDelegate(theme, self))
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -46,7 +48,7 @@ class SeriesTable(QTableWidget):
         header.setProperty("role", "tight")  # in line with the cells
         header.setFont(font(TextRole.LABEL))
         self.setAccessibleName(gettext("Table 1: quantities of each series"))
-        self.itemSelectionChanged.connect(self._choose)
+        self.itemSelectionChanged.connect(lambda: self.row_selected.emit(self._chosen()))
         self.itemDoubleClicked.connect(lambda _: self._open())
 
     def show_columns(self, columns: tuple[tuple[str, str], ...]) -> None:
@@ -64,9 +66,9 @@ class SeriesTable(QTableWidget):
         self.blockSignals(True)
         self.setRowCount(len(rows))
         for line, row in enumerate(rows):
-            self.setItem(line, 0, _head(row))
+            self.setItem(line, 0, _series_item(row))
             for column, cell in enumerate(row.cells, start=1):
-                self.setItem(line, column, _item(cell))
+                self.setItem(line, column, _cell_item(cell))
         labels = [row.label for row in rows]
         self.clearSelection()
         if chosen in labels:
@@ -95,86 +97,68 @@ class SeriesTable(QTableWidget):
         lines = self.selectionModel().selectedRows() if self._rows else []
         return self._rows[lines[0].row()].label if lines else ""
 
-    def _choose(self) -> None:
-        self.row_selected.emit(self._chosen())
-
     def _open(self) -> None:
         if chosen := self._chosen():
             self.row_opened.emit(chosen)
 
 
-class _TwoLines(QStyledItemDelegate):
-    """Draws a cell's text, and below it smaller and muted what stands behind it."""
+class _LinesDelegate(QStyledItemDelegate):
+    """Draws the lines of a cell (`_LINES`) below one another."""
 
     def __init__(self, theme: Theme, table: SeriesTable) -> None:
         super().__init__(table)
         self._theme = theme
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: _Index) -> QSize:  # noqa: N802
-        lines = zip(_lines(index), _fonts(index), strict=True)
-        widths = (_width(text, used) for text, used in lines)
-        return QSize(max(widths) + 2 * _PADDING, _ROW_HEIGHT)
+        widths = [QFontMetrics(font(role)).horizontalAdvance(text) for text, role, _ in _lines(index)]
+        return QSize(max(widths, default=0) + 2 * _PADDING, _ROW_HEIGHT)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
-        widget = option.widget
-        style = widget.style()
-        style.drawPrimitive(QStyle.PrimitiveElement.PE_PanelItemViewItem, option, painter, widget)
+        style = option.widget.style()
+        style.drawPrimitive(QStyle.PrimitiveElement.PE_PanelItemViewItem, option, painter, option.widget)
         selected = bool(option.state & QStyle.StateFlag.State_Selected)
-        colours = self._colours(index, option.palette, selected=selected)
-        lines, side = _lines(index), Qt.AlignmentFlag(index.data(Qt.ItemDataRole.TextAlignmentRole))
+        side = Qt.AlignmentFlag(index.data(Qt.ItemDataRole.TextAlignmentRole)) | Qt.AlignmentFlag.AlignVCenter
         place = QRectF(option.rect).adjusted(_PADDING, 3, -_PADDING, -3)
-        shown = [line for line in zip(lines, _fonts(index), colours, strict=True) if line[0]]
-        height = place.height() / max(1, len(shown))
+        lines = _lines(index)
+        height = place.height() / max(1, len(lines))
         painter.save()
-        for number, (text, used, ink) in enumerate(shown):
-            painter.setFont(used)
-            painter.setPen(ink)
-            at = QRectF(place.left(), place.top() + number * height, place.width(), height)
-            painter.drawText(at, side | Qt.AlignmentFlag.AlignVCenter, text)
+        for number, (text, role, token) in enumerate(lines):
+            painter.setFont(font(role))
+            ink = QColor(getattr(self._theme.tokens, token))
+            painter.setPen(option.palette.color(QPalette.ColorRole.HighlightedText) if selected else ink)
+            line = QRectF(place.left(), place.top() + number * height, place.width(), height)
+            painter.drawText(line, side, text)
         painter.restore()
 
-    def _colours(self, index: _Index, palette: QPalette, *, selected: bool) -> tuple[QColor, QColor]:
-        if selected:
-            both = palette.color(QPalette.ColorRole.HighlightedText)
-            return both, both
-        tokens = self._theme.tokens
-        tone = index.data(_TONE)
-        second = getattr(tokens, tone) if tone in _MARKS else tokens.muted
-        return QColor(tokens.text), QColor(second)
+
+def _lines(index: _Index) -> list[_Line]:
+    return index.data(_LINES) or []
 
 
-def _head(row: TableRow) -> QTableWidgetItem:
-    said = ngettext("{count} run", "{count} runs", len(row.runs)) if row.runs else gettext("no run yet")
+def _series_item(row: TableRow) -> QTableWidgetItem:
+    runs = ngettext("{count} run", "{count} runs", len(row.runs)) if row.runs else gettext("no run yet")
     tone = row.status.tone.value
-    below = f"{_MARKS.get(tone, '')}{row.status.text}" if row.status.text else said
-    item = _filled(row.label, below, Qt.AlignmentFlag.AlignLeft, f"{said}\n{row.status.hint}".strip())
-    item.setData(_BOLD, bool(row.runs))
-    item.setData(_TONE, tone)
-    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.label}, {said}, {row.status.text}")
+    status = f"{_MARKS.get(tone, '')}{row.status.text}" if row.status.text else runs
+    item = _item(
+        (row.label, TextRole.STRONG if row.runs else TextRole.TEXT, "text"),
+        (status, TextRole.LABEL, tone if tone in _MARKS else "muted"),
+        Qt.AlignmentFlag.AlignLeft,
+        f"{runs}\n{row.status.hint}".strip(),
+    )
+    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.label}, {runs}, {row.status.text}")
     return item
 
 
-def _item(cell: Cell) -> QTableWidgetItem:
-    item = _filled(cell.value, cell.uncertainty, Qt.AlignmentFlag.AlignRight, cell.hint)
+def _cell_item(cell: Cell) -> QTableWidgetItem:
+    value = (cell.value, TextRole.TEXT, "text")
+    item = _item(value, (cell.uncertainty, TextRole.LABEL, "muted"), Qt.AlignmentFlag.AlignRight, cell.hint)
     item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{cell.value} {cell.uncertainty}".strip() or cell.hint)
     return item
 
 
-def _filled(text: str, below: str, side: Qt.AlignmentFlag, hint: str) -> QTableWidgetItem:
-    item = QTableWidgetItem(text)
+def _item(first: _Line, second: _Line, side: Qt.AlignmentFlag, hint: str) -> QTableWidgetItem:
+    item = QTableWidgetItem(first[0])
     item.setTextAlignment(side)
-    item.setData(_SPREAD, below)
+    item.setData(_LINES, [line for line in (first, second) if line[0]])
     item.setToolTip(hint)
     return item
-
-
-def _lines(index: _Index) -> tuple[str, str]:
-    return index.data(Qt.ItemDataRole.DisplayRole) or "", index.data(_SPREAD) or ""
-
-
-def _fonts(index: _Index) -> tuple[QFont, QFont]:
-    return font(TextRole.STRONG if index.data(_BOLD) else TextRole.TEXT), font(TextRole.LABEL)
-
-
-def _width(text: str, used: QFont) -> int:
-    return QFontMetrics(used).horizontalAdvance(text)

@@ -93,7 +93,8 @@ def test_the_figure_holds_means_series_and_least_values(stage: Stage) -> None:
     ff, ss = stage.presenter.state.summary.contacts
     assert (ff.contact, ff.name) == ("FF", "fluoroplastic on fluoroplastic")
     assert ff.dynamic is not None
-    assert ff.dynamic.low < 0.100 < ff.dynamic.high
+    low, high = ff.dynamic.interval_95
+    assert low < 0.100 < high
     assert len(ff.dynamic_of_series) == 2
     assert ff.static is None
     assert ff.static_at_least == pytest.approx((0.12, 0.12), abs=5e-4)
