@@ -23,7 +23,7 @@ from app.cli import output as out
 from app.cli.device_options import CalibrateOptions, CertificateOptions, ReadingOptions
 from app.cli.errors import CommandError
 from app.cli.option_values import calibration_file, figure_file, port_settings
-from app.cli.options import LinkOptions
+from app.cli.shared_options import LinkOptions
 from app.runs.analysis_json import budget_documents, quantity_document, warning_documents
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, read_points, write_points
 from config.files import activate_calibration, config_directory, load_gauges, save_calibration

@@ -10,6 +10,15 @@ from app.cli.options import command_function
 from app.log import start_log
 from app.version import __version__
 
+_EXAMPLES = {
+    "record:record": "record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
+    "simulate:simulate": "simulate --series 1FFM0 --friction 0.12 -o motion.csv",
+    "plan:plan": "plan --series 1FFM0 --pullback 0.008 --rate 500",
+    "import_record:import_record": "import test.csv --time t --table u1 --relative u2 --unit mm"
+    " --series 1FFM0 -o test.h5",
+}
+"""Shown below the help of a command, by its target."""
+
 
 class CommandEntry(NamedTuple):
     """A command before its modules are imported."""
@@ -19,19 +28,18 @@ class CommandEntry(NamedTuple):
     """Module and class of its options, imported when the command is named: "run_file_options:Runs"."""
     target: str
     """Module and function that does the work, imported when the command runs."""
-    example: str = ""
-    """Shown below the help."""
     group: type[TyperGroup] | None = None
     """Group of the commands below this one."""
 
     def load(self) -> Any:
         """Import the options, and return the Click command."""
+        example = _EXAMPLES.get(self.target)
         function = command_function(_load(self.options), self._run)
         commands = _typer()
         if self.group:
             commands.callback(cls=self.group, invoke_without_command=True)(function)
         else:
-            commands.command(self.name, epilog=self.example or None)(function)
+            commands.command(self.name, epilog=example and f"Example: slipstand {example}")(function)
         command = typer.main.get_command(commands)
         command.name = self.name
         return command
@@ -73,32 +81,11 @@ class SlipstandGroup(LazyGroup):
 
     entries = (
         CommandEntry("demo", "measurement_options:DemoOptions", "demo:demo"),
-        CommandEntry(
-            "record",
-            "measurement_options:RecordOptions",
-            "record:record",
-            example="Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
-        ),
+        CommandEntry("record", "measurement_options:RecordOptions", "record:record"),
         CommandEntry("analyze", "result_options:AnalyzeOptions", "analyze:analyze"),
-        CommandEntry(
-            "simulate",
-            "measurement_options:SimulateOptions",
-            "simulate:simulate",
-            example="Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv",
-        ),
-        CommandEntry(
-            "plan",
-            "measurement_options:PlanOptions",
-            "plan:plan",
-            example="Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500",
-        ),
-        CommandEntry(
-            "import",
-            "run_file_options:ImportOptions",
-            "import_record:import_record",
-            example="Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm"
-            " --series 1FFM0 -o test.h5",
-        ),
+        CommandEntry("simulate", "measurement_options:SimulateOptions", "simulate:simulate"),
+        CommandEntry("plan", "measurement_options:PlanOptions", "plan:plan"),
+        CommandEntry("import", "run_file_options:ImportOptions", "import_record:import_record"),
         CommandEntry("export", "run_file_options:ExportOptions", "export:export"),
         CommandEntry("table", "result_options:TableOptions", "table:table"),
         CommandEntry("figures", "result_options:FiguresOptions", "figures:figures"),

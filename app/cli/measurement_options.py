@@ -3,33 +3,30 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli import options as opt
-from app.cli.options import ConditionOptions, DeviceOptions, JobOptions, MassOptions
+from app.cli import shared_options as shared
+from app.cli.options import choice, flag, number, option
+from app.cli.shared_options import ConditionOptions, DeviceOptions, JobOptions, MassOptions
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionOptions:
     """Parameters of a motion. A field that is None is taken from the series."""
 
-    series: str | None = opt.series()
-    pullback_m: float | None = opt.number("--pullback", "Pullback (m); negative to the other side.")
-    table_mass_kg: float | None = opt.table_mass()
-    plate_mass_kg: float | None = opt.plate_mass()
-    period_s: float | None = opt.number("--period", "Damped period of the joint motion (s).", above=0.0)
-    stiffness_n_per_m: float | None = opt.number(
+    series: str | None = shared.series()
+    pullback_m: float | None = number("--pullback", "Pullback (m); negative to the other side.")
+    table_mass_kg: float | None = shared.table_mass()
+    plate_mass_kg: float | None = shared.plate_mass()
+    period_s: float | None = number("--period", "Damped period of the joint motion (s).", above=0.0)
+    stiffness_n_per_m: float | None = number(
         "--stiffness", "Stiffness of the elastic plates (N/m).", above=0.0
     )
-    damping_n1_per_s: float | None = opt.number(
-        "--n1", "Damping constant of the joint motion (1/s).", least=0.0
-    )
-    damping_coefficient_kg_per_s: float | None = opt.number(
-        "--damping", "Damping coefficient (kg/s).", least=0.0
-    )
-    friction_dynamic: float | None = opt.number("--friction", "Dynamic friction coefficient f_d.", least=0.0)
-    friction_static: float | None = opt.number(
+    damping_n1_per_s: float | None = number("--n1", "Damping constant of the joint motion (1/s).", least=0.0)
+    damping_coefficient_kg_per_s: float | None = number("--damping", "Damping coefficient (kg/s).", least=0.0)
+    friction_dynamic: float | None = number("--friction", "Dynamic friction coefficient f_d.", least=0.0)
+    friction_static: float | None = number(
         "--static-friction", "Static friction f_s; f_d if absent.", least=0.0
     )
-    tilt_rad: float = opt.number("--tilt", "Tilt of the sliding plane (rad).", 0.0)
+    tilt_rad: float = number("--tilt", "Tilt of the sliding plane (rad).", 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,17 +39,17 @@ class DemoOptions:
     as runs; their table is held against the truth.
     """
 
-    series: str | None = opt.option("--series", "Series code; with --campaign several, 1FFM0,1FFM1.")
-    friction: float | None = opt.number("--friction", "True f_d; the series' if absent.", above=0.0)
-    directory: Path | None = opt.directory()
-    campaign: bool = opt.flag("--campaign", "All series of Table 1, each some times, not in real time.")
-    repeats: int = opt.option("--repeats", "With --campaign: tests of each series.", 3)
-    scatter: float = opt.option(
+    series: str | None = option("--series", "Series code; with --campaign several, 1FFM0,1FFM1.")
+    friction: float | None = number("--friction", "True f_d; the series' if absent.", above=0.0)
+    directory: Path | None = shared.directory()
+    campaign: bool = flag("--campaign", "All series of Table 1, each some times, not in real time.")
+    repeats: int = option("--repeats", "With --campaign: tests of each series.", 3)
+    scatter: float = option(
         "--scatter", "With --campaign: standard deviation of f_d from run to run, as a share.", 0.0
     )
-    seed: int = opt.option("--seed", "With --campaign: of everything that is drawn.", 1)
+    seed: int = option("--seed", "With --campaign: of everything that is drawn.", 1)
     jobs: JobOptions
-    as_json: bool = opt.as_json()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,28 +62,26 @@ class RecordOptions:
 
     source: DeviceOptions
     masses: MassOptions
-    pullback: float | None = opt.number("--pullback", "Pullback (m), if not the series'.", above=0.0)
-    tolerance: float | None = opt.number(
+    pullback: float | None = number("--pullback", "Pullback (m), if not the series'.", above=0.0)
+    tolerance: float | None = number(
         "--tolerance", "How far off the pullback it may be held (m); 2 % of it if absent.", above=0.0
     )
-    duration: float | None = opt.number(
+    duration: float | None = number(
         "--duration", "Seconds after release, or from the start with --trigger none.", above=0.0
     )
-    until_rest: bool = opt.flag("--until-rest", "End at rest or when enough; the default without --duration.")
-    trigger: str = opt.choice(
+    until_rest: bool = flag("--until-rest", "End at rest or when enough; the default without --duration.")
+    trigger: str = choice(
         "--trigger", ("pullback", "none"), "pullback, or none to record at once.", "pullback"
     )
-    pretrigger: float = opt.option("--pretrigger", "Seconds kept from before the release.", 1.0)
-    trigger_timeout: float = opt.number(
-        "--trigger-timeout", "Seconds to wait for a release.", 600.0, above=0.0
-    )
-    calibration: Path | None = opt.calibration()
-    directory: Path | None = opt.directory()
-    operator: str = opt.option("--operator", "Who records.", "")
-    note: str = opt.option("--note", "A remark kept with the run.", "")
+    pretrigger: float = option("--pretrigger", "Seconds kept from before the release.", 1.0)
+    trigger_timeout: float = number("--trigger-timeout", "Seconds to wait for a release.", 600.0, above=0.0)
+    calibration: Path | None = shared.calibration()
+    directory: Path | None = shared.directory()
+    operator: str = option("--operator", "Who records.", "")
+    note: str = option("--note", "A remark kept with the run.", "")
     conditions: ConditionOptions
-    count: int = opt.option("--count", "How many runs, one after another.", 1, min=1)
-    as_json: bool = opt.as_json()
+    count: int = option("--count", "How many runs, one after another.", 1, min=1)
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,17 +93,17 @@ class SimulateOptions:
     """
 
     motion: MotionOptions
-    duration: float = opt.number("--duration", "Seconds after release.", 10.0, above=0.0)
-    rate: float = opt.number("--rate", "Samples a second.", 1000.0, above=0.0)
-    method: str = opt.choice(
+    duration: float = number("--duration", "Seconds after release.", 10.0, above=0.0)
+    rate: float = number("--rate", "Samples a second.", 1000.0, above=0.0)
+    method: str = choice(
         "--method", ("exact", "paper"), "exact, or paper for its three-state algorithm.", "exact"
     )
-    step: float = opt.number("--step", "Time step of --method paper (s).", 0.0001, above=0.0)
-    output: Path | None = opt.option(
+    step: float = number("--step", "Time step of --method paper (s).", 0.0001, above=0.0)
+    output: Path | None = option(
         "-o --output", "FILE.csv of the motion, or FILE.h5, a run; numbers are shown if absent."
     )
-    force: bool = opt.force()
-    as_json: bool = opt.as_json()
+    force: bool = shared.force()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,10 +116,10 @@ class PlanOptions:
     """
 
     motion: MotionOptions
-    rate: float = opt.number("--rate", "Samples a second.", 1000.0, above=0.0)
-    noise: float = opt.number(
+    rate: float = number("--rate", "Samples a second.", 1000.0, above=0.0)
+    noise: float = number(
         "--noise", "Standard deviation of both gauges' readings (m); see `device health`.", 2e-05, above=0.0
     )
-    duration: float = opt.number("--duration", "Seconds after release that are recorded.", 10.0, above=0.0)
-    calibration: Path | None = opt.calibration()
-    as_json: bool = opt.as_json()
+    duration: float = number("--duration", "Seconds after release that are recorded.", 10.0, above=0.0)
+    calibration: Path | None = shared.calibration()
+    as_json: bool = shared.as_json()

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from app.acquisition.messages import PortSettings
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import ConditionOptions, DeviceOptions, JobOptions, LinkOptions, MassOptions
+from app.cli.shared_options import ConditionOptions, DeviceOptions, JobOptions, LinkOptions, MassOptions
 from app.runs.batch.executors import ExecutorOptions
 from app.runs.metadata import Conditions
 from app.runs.paths import recordings_directory

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli import options as opt
+from app.cli import shared_options as shared
 from app.cli.errors import CommandError
-from app.cli.options import JobOptions
+from app.cli.options import REQUIRED, argument, choice, flag, number, option
+from app.cli.shared_options import JobOptions
 
 TABLE_FORMATS = ("text", "csv", "json", "markdown", "latex", "xlsx")
 FIGURE_FORMATS = ("png", "svg", "pdf")
@@ -16,12 +17,12 @@ FIGURE_FORMATS = ("png", "svg", "pdf")
 class AddedMassOptions:
     """Mass that was added to the table between two free decays."""
 
-    added_mass: float | None = opt.number(
+    added_mass: float | None = number(
         "--added-mass",
         "With --kind one-mass and two runs: mass (kg) that was added to the table in the second.",
         above=0.0,
     )
-    added_mass_uncertainty: float = opt.number(
+    added_mass_uncertainty: float = number(
         "--added-mass-uncertainty", "Standard uncertainty of --added-mass (kg).", 0.0, least=0.0
     )
 
@@ -40,25 +41,25 @@ class AddedMassOptions:
 class AnalyzeOptions:
     """Identify friction, stiffness and damping of one or more runs."""
 
-    runs: list[Path] = opt.runs_or_folders()
-    model: str = opt.option("--model", "Friction law; auto chooses one.", "auto", metavar="[auto|LAW]")
-    kind: str = opt.choice(
+    runs: list[Path] = shared.runs_or_folders()
+    model: str = option(
+        "--model", "auto chooses a friction law; an unknown one lists all.", "auto", metavar="LAW"
+    )
+    kind: str = choice(
         "--kind", ("two-mass", "one-mass"), "one-mass for a bare table or any free decay.", "two-mass"
     )
-    table_mass: float | None = opt.table_mass()
-    plate_mass: float | None = opt.plate_mass()
-    monte_carlo: int | None = opt.option(
+    table_mass: float | None = shared.table_mass()
+    plate_mass: float | None = shared.plate_mass()
+    monte_carlo: int | None = option(
         "--monte-carlo", "Check the uncertainties by 100,000 draws and N full refits.", metavar="N"
     )
     added: AddedMassOptions
-    save: bool = opt.flag("--save", "Keep the result in the run, unless the same is kept and stands.")
-    anew: bool = opt.flag("--anew", "With --save: analyse and keep it in any case.")
-    figure: Path | None = opt.option(
-        "--figure", "Draw record against simulation to this PNG, SVG or PDF (one run)."
-    )
+    save: bool = flag("--save", "Keep the result in the run, unless the same is kept and stands.")
+    anew: bool = flag("--anew", "With --save: analyse and keep it in any case.")
+    figure: Path | None = option("--figure", "Draw record and simulation: PNG, SVG or PDF, of one run.")
     jobs: JobOptions
-    force: bool = opt.force()
-    as_json: bool = opt.as_json()
+    force: bool = shared.force()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,16 +70,16 @@ class TableOptions:
     taken, else the run is analysed.
     """
 
-    paths: list[Path] = opt.runs_or_folders()
-    format_name: str = opt.choice("--format", TABLE_FORMATS, "Format of the table.", "text")
-    published: bool = opt.flag("--published", "Beside the paper's Table 1, with the audit's flags.")
-    repeats: bool = opt.flag("--repeats", "Text, Markdown: show how the runs of each series differ.")
-    exclude: list[str] | None = opt.exclude()
-    save: bool = opt.flag("--save", "Keep new analyses in their runs.")
-    output: Path | None = opt.option("-o --output", "File to write; xlsx needs one.")
+    paths: list[Path] = shared.runs_or_folders()
+    format_name: str = choice("--format", TABLE_FORMATS, "Format of the table.", "text")
+    published: bool = flag("--published", "Beside the paper's Table 1, with the audit's flags.")
+    repeats: bool = flag("--repeats", "Text, Markdown: show how the runs of each series differ.")
+    exclude: list[str] | None = shared.exclude()
+    save: bool = flag("--save", "Keep new analyses in their runs.")
+    output: Path | None = option("-o --output", "File to write; xlsx needs one.")
     jobs: JobOptions
-    force: bool = opt.force()
-    as_json: bool = opt.as_json()
+    force: bool = shared.force()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,18 +90,18 @@ class FiguresOptions:
     Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
     """
 
-    paths: list[Path] = opt.runs_or_folders()
-    output: Path = opt.option("-o --output", "Folder to write to, made if absent.", opt.REQUIRED)
-    format_name: str = opt.choice("--format", FIGURE_FORMATS, "Format of the files; png has 300 dpi.", "png")
-    series: list[str] | None = opt.option(
+    paths: list[Path] = shared.runs_or_folders()
+    output: Path = option("-o --output", "Folder to write to, made if absent.", REQUIRED)
+    format_name: str = choice("--format", FIGURE_FORMATS, "Format of the files; png has 300 dpi.", "png")
+    series: list[str] | None = option(
         "--series", "Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent."
     )
-    figure: list[str] | None = opt.option(
+    figure: list[str] | None = option(
         "--figure", "Only this figure: 2, 3a, 3b, 4a, 4b, 5a or 5b; repeatable."
     )
     jobs: JobOptions
-    force: bool = opt.force()
-    as_json: bool = opt.as_json()
+    force: bool = shared.force()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,15 +112,15 @@ class ReportOptions:
     The same runs give the same file to the byte, apart from its date.
     """
 
-    paths: list[Path] = opt.runs_or_folders()
-    output: Path = opt.option("-o --output", "PDF file to write.", opt.REQUIRED)
-    date: str = opt.option("--date", "Date of the report; today if absent.", "", metavar="YYYY-MM-DD")
-    title: str = opt.option("--title", "Title of the report.", "")
-    laboratory: str = opt.option("--laboratory", "Who issues it.", "")
-    exclude: list[str] | None = opt.exclude()
+    paths: list[Path] = shared.runs_or_folders()
+    output: Path = option("-o --output", "PDF file to write.", REQUIRED)
+    date: str = option("--date", "Date of the report; today if absent.", "", metavar="YYYY-MM-DD")
+    title: str = option("--title", "Title of the report.", "")
+    laboratory: str = option("--laboratory", "Who issues it.", "")
+    exclude: list[str] | None = shared.exclude()
     jobs: JobOptions
-    force: bool = opt.force()
-    as_json: bool = opt.as_json()
+    force: bool = shared.force()
+    as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,5 +130,5 @@ class AuditOptions:
     Each row is checked for stiffness, damping, velocity, acceleration, breakaway and residual.
     """
 
-    table: Path | None = opt.argument("CSV with Table 1's columns; the paper's if absent.", None)
-    as_json: bool = opt.as_json()
+    table: Path | None = argument("CSV with Table 1's columns; the paper's if absent.", None)
+    as_json: bool = shared.as_json()

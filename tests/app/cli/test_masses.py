@@ -3,7 +3,7 @@
 import pytest
 
 from app.cli.option_values import print_mass_overrides
-from app.cli.options import MassOptions
+from app.cli.shared_options import MassOptions
 from config.schema import ConfigError
 
 
