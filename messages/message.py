@@ -5,10 +5,10 @@ is a look-up of the template (`messages.i18n`); no code reads a sentence.
 """
 
 import enum
-import gettext
 from collections.abc import Mapping, Sequence
+from gettext import NullTranslations
 from pathlib import PurePath
-from typing import Protocol, SupportsFloat, TypeAlias, Union, cast
+from typing import SupportsFloat, TypeAlias, Union, cast
 
 import msgspec
 
@@ -16,19 +16,7 @@ Plain: TypeAlias = str | int | float | bool | None
 # msgspec evaluates the annotation: a forward reference needs Union.
 Value: TypeAlias = Union[Plain, "Message", list[Union[Plain, "Message"]]]
 
-_NO_TRANSLATIONS = gettext.NullTranslations()
-
-
-class Translations(Protocol):
-    """What renders a template in another language; `gettext.NullTranslations` and its subclasses fit."""
-
-    def gettext(self, message: str, /) -> str:
-        """Translate one template; the template itself where there is no translation."""
-        ...
-
-    def ngettext(self, msgid1: str, msgid2: str, n: int, /) -> str:
-        """Translate the template for `n` things."""
-        ...
+_ENGLISH = NullTranslations()
 
 
 class Message(msgspec.Struct, frozen=True):
@@ -45,18 +33,16 @@ class Message(msgspec.Struct, frozen=True):
     """Template where `values["count"]` is not 1; "" where the message counts nothing."""
 
     def __str__(self) -> str:
-        """Render the English sentence."""
         return self.render()
 
     def __bool__(self) -> bool:
-        """Tell whether there is anything to say."""
         return bool(self.template)
 
     def __hash__(self) -> int:
-        """Hash by template: values may be lists."""
+        # Values may be lists.
         return hash((self.template, self.plural))
 
-    def render(self, translations: Translations = _NO_TRANSLATIONS) -> str:
+    def render(self, translations: NullTranslations = _ENGLISH) -> str:
         """Render the sentence in the language of `translations`; English by default."""
         if not self.template:
             return ""
@@ -64,11 +50,8 @@ class Message(msgspec.Struct, frozen=True):
             template = translations.ngettext(self.template, self.plural, cast(int, self.values["count"]))
         else:
             template = translations.gettext(self.template)
-        if not self.values:
-            return template
-        return template.format(
-            **{name: _rendered(value, translations) for name, value in self.values.items()}
-        )
+        values = {name: _rendered(value, translations) for name, value in self.values.items()}
+        return template.format(**values) if values else template
 
 
 class Option(Message, frozen=True):
@@ -80,17 +63,7 @@ EMPTY = Message("")
 
 
 class MessageError(Exception):
-    """Root of errors whose text is a `Message`.
-
-    Parameters
-    ----------
-    template : str or Message
-        Template of the message, or a message that exists already.
-    plural : str
-        As in `Message`.
-    **values
-        Values of the template's fields.
-    """
+    """Root of errors whose text is a `Message`: one that exists, or template, plural and values of one."""
 
     def __init__(self, template: str | Message, /, *, plural: str = "", **values: object) -> None:
         made = template if isinstance(template, Message) else message(template, plural=plural, **values)
@@ -98,16 +71,11 @@ class MessageError(Exception):
 
     @property
     def message(self) -> Message:
-        """The message as template and values."""
         return cast(Message, self.args[0])
 
 
 def message(template: str, /, *, plural: str = "", **values: object) -> Message:
-    """Build a message.
-
-    Values may be of any type. Numbers of NumPy become Python's; enum members become their values; paths and
-    everything else become text.
-    """
+    """Build a message. Numbers of NumPy become Python's; enum members their values; all else becomes text."""
     return Message(template, {name: _value(value) for name, value in values.items()}, plural)
 
 
@@ -129,14 +97,12 @@ def options_in(text: Message) -> tuple[str, ...]:
 
 def replace_options(text: Message, labels: Mapping[str, Message]) -> Message:
     """Replace options by the labels of a window's controls; options without a label stay."""
-    values: dict[str, Value] = {}
+    values: dict[str, Value] = dict(text.values)
     for name, value in text.values.items():
         if isinstance(value, Option):
             values[name] = labels.get(value.template, value)
         elif isinstance(value, Message):
             values[name] = replace_options(value, labels)
-        else:
-            values[name] = value
     return Message(text.template, values, text.plural)
 
 
@@ -175,7 +141,7 @@ def _value(value: object) -> Value:
     return str(value)
 
 
-def _rendered(value: Value, translations: Translations) -> Plain:
+def _rendered(value: Value, translations: NullTranslations) -> Plain:
     if isinstance(value, Message):
         return value.render(translations)
     if isinstance(value, list):

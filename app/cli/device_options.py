@@ -26,13 +26,13 @@ class ListPortsOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ProbeOptions:
-    """Look at ports: what speaks on them, how to record it.
+    """Recognise the devices on ports.
 
-    Also what is plugged in, and which program has it open.
+    Shows how to record from each, what is plugged in, and which program has it open.
     """
 
-    ports: list[str] | None = argument("Ports or URLs to look at; all serial ports if absent.", None)
-    write: bool = flag("--write", "Ask silent devices who they are. Without it nothing is sent to any.")
+    ports: list[str] | None = argument("Ports or URLs; all serial ports if absent.", None)
+    write: bool = flag("--write", "Send an identity query to silent devices; else nothing is sent.")
     as_json: bool = shared.as_json()
 
 
@@ -95,26 +95,26 @@ class StandOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateDeviceOptions:
-    """Be a simulated stand on a port until interrupted.
+    """Run a simulated stand on a port until interrupted.
 
     It does one pullback test after another, on a pseudo-terminal or TCP; what a series brings can be changed.
     """
 
     stand: StandOptions
     settings: list[str] | None = shared.device_settings()
-    control: bool = flag("--control", "Take such faults as lines on stdin, too.")
+    control: bool = flag("--control", "Read such faults from stdin, too, one a line.")
     as_json: bool = shared.as_json()
 
 
 @dataclass(frozen=True, kw_only=True)
 class HealthOptions:
-    """Look at both gauges at rest: noise, drift, hum, range.
+    """Grade both gauges at rest: noise, drift, hum, range.
 
-    Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
+    Each is good, doubtful or bad, with a remedy. Ends with 1 if one is bad.
     """
 
     source: DeviceOptions
-    seconds: float = number("--seconds", "Seconds of watching; the stand rests meanwhile.", 5.0, above=0.0)
+    seconds: float = number("--seconds", "Measuring time in seconds; the stand must rest.", 5.0, above=0.0)
     calibration: Path | None = shared.calibration()
     figure: Path | None = shared.figure()
     as_json: bool = shared.as_json()

@@ -35,19 +35,19 @@ class DemoOptions:
 
     The simulated stand is read over a real serial port; the run is kept, identified and drawn.
 
-    With --campaign the 36 series of Table 1 are simulated, read by gauges that err as they state, and stored
-    as runs; their table is held against the truth.
+    With --campaign the 36 series of Table 1 are simulated, read by gauges with errors as calibrated, and
+    stored as runs; their table is compared with the truth.
     """
 
     series: str | None = option("--series", "Series code; with --campaign several, 1FFM0,1FFM1.")
     friction: float | None = number("--friction", "True f_d; the series' if absent.", above=0.0)
     directory: Path | None = shared.directory()
-    campaign: bool = flag("--campaign", "All series of Table 1, each some times, not in real time.")
+    campaign: bool = flag("--campaign", "All series of Table 1, several tests each, not in real time.")
     repeats: int = option("--repeats", "With --campaign: tests of each series.", 3)
     scatter: float = option(
         "--scatter", "With --campaign: standard deviation of f_d from run to run, as a share.", 0.0
     )
-    seed: int = option("--seed", "With --campaign: of everything that is drawn.", 1)
+    seed: int = option("--seed", "With --campaign: seed of the random numbers.", 1)
     jobs: JobOptions
     as_json: bool = shared.as_json()
 

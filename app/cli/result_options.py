@@ -54,8 +54,8 @@ class AnalyzeOptions:
         "--monte-carlo", "Check the uncertainties by 100,000 draws and N full refits.", metavar="N"
     )
     added: AddedMassOptions
-    save: bool = flag("--save", "Keep the result in the run, unless the same is kept and stands.")
-    anew: bool = flag("--anew", "With --save: analyse and keep it in any case.")
+    save: bool = flag("--save", "Keep the result in the run, unless the same is kept already.")
+    anew: bool = flag("--anew", "With --save: analyse and keep the result in any case.")
     figure: Path | None = option("--figure", "Draw record and simulation: PNG, SVG or PDF, of one run.")
     jobs: JobOptions
     force: bool = shared.force()

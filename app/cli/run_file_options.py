@@ -107,9 +107,9 @@ class RecoverOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class EditOptions:
-    """Change what is known of runs, kept as history.
+    """Edit metadata of runs, and keep the history.
 
-    What was measured is never touched, and --undo gives old values back.
+    Measured data never change; --undo restores old values.
     """
 
     runs: list[Path] = shared.run_files()
@@ -125,7 +125,7 @@ class EditOptions:
         "--condition", "temperature_c=21.5, plate_id=P1, ...; repeatable.", metavar="NAME=VALUE"
     )
     exclude: str | None = option(
-        "--exclude", "The run does not count in tables and reports, and why.", metavar="REASON"
+        "--exclude", "Leave the run out of tables and reports, and why.", metavar="REASON"
     )
     include: bool = flag("--include", "A run that was left out counts again.")
     author: str | None = option("--author", "Who edits; you, if absent.")
