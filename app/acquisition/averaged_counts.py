@@ -14,6 +14,7 @@ from app.acquisition.errors import AcquisitionError
 from app.acquisition.ring import RingRows, timed_rows
 from drivers.arrays import Floats
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
+from messages.i18n import N_
 
 if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
     from app.acquisition.stream.live_stream import LiveStream
@@ -66,13 +67,11 @@ def average_counts(rows: RingRows, channel: int) -> AveragedCounts:
     valid = (rows.status & int(ABSENT_BY_GAUGE[channel] | OVERLOAD_FLAGS[channel])) == 0
     counts = rows.counts[valid, channel].astype(np.float64)
     if len(counts) < max(_VALID_FRACTION * len(rows), 2):
-        raise NoAverageError(
+        template = N_(
             "gauge {gauge} is overloaded or its samples are damaged: {invalid} of {samples}. Move it"
-            " back into its range, or check the cable",
-            gauge=channel + 1,
-            invalid=len(rows) - len(counts),
-            samples=len(rows),
+            " back into its range, or check the cable"
         )
+        raise NoAverageError(template, gauge=channel + 1, invalid=len(rows) - len(counts), samples=len(rows))
     return compute_average(counts)
 
 
@@ -215,12 +214,10 @@ class CountAverager:
             if average is not None:
                 return average
             if not self._changed.wait(max(0.0, until_s - time.monotonic())):
-                raise NoAverageError(
-                    "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the"
-                    " device",
-                    samples=self._samples,
-                    window_s=window_s + TIMEOUT_S,
+                template = N_(
+                    "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device"
                 )
+                raise NoAverageError(template, samples=self._samples, window_s=window_s + TIMEOUT_S)
         raise self._fault
 
     def _read(self) -> None:

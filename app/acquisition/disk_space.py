@@ -7,6 +7,7 @@ from pathlib import Path
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import MARGIN_BYTES, free_bytes
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 ROW_BYTES = 41
@@ -65,21 +66,18 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Mess
     if free is None:
         return EMPTY
     if free < needed:
-        raise DiskSpaceError(
+        template = N_(
             "{folder}: the disk has {free} left, and this run takes {needed}. Free some space or record"
-            " to another disk",
-            folder=folder,
-            free=_megabytes(free),
-            needed=_megabytes(needed),
+            " to another disk"
         )
+        raise DiskSpaceError(template, folder=folder, free=_megabytes(free), needed=_megabytes(needed))
     if free < needed + demand.of_waiting(run):
         waiting_s = (free - needed) / demand.journal_bytes_per_s
-        return message(
+        template = N_(
             "the disk has {free} left, enough for this run if the release comes within {minutes:.0f} minutes:"
-            " free some space",
-            free=_megabytes(free),
-            minutes=waiting_s / 60,
+            " free some space"
         )
+        return message(template, free=_megabytes(free), minutes=waiting_s / 60)
     return EMPTY
 
 

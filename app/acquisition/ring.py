@@ -28,6 +28,7 @@ from app.runs.lock import FileLock, is_held
 from config.schema import Gauges
 from drivers.arrays import Counts, Floats
 from drivers.samples import SampleBlock
+from messages.i18n import N_
 
 _MAGIC = np.uint64(0x32474E495250494C)  # "LIPRING2"
 _WORDS = 5
@@ -177,12 +178,8 @@ def create_ring(path: Path, capacity: int, rate_hz: float, gauges: Gauges) -> Ri
             file.truncate(size)
             mapped = mmap.mmap(file.fileno(), size)
     except OSError as error:
-        raise RingError(
-            "{path}: no room for live samples ({error}). Free {size} MiB there",
-            path=path,
-            error=error,
-            size=size >> 20,
-        ) from None
+        template = N_("{path}: no room for live samples ({error}). Free {size} MiB there")
+        raise RingError(template, path=path, error=error, size=size >> 20) from None
     mapped[8 * _WORDS : 8 * _WORDS + len(settings)] = settings
     np.frombuffer(mapped, np.uint64, _WORDS)[:] = (_MAGIC, capacity, 0, 0, len(settings))
     return RingWriter(mapped, path)

@@ -25,6 +25,7 @@ from app.runs.metadata import EndMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.host_time import host_ns
 from drivers.samples import Losses
+from messages.i18n import N_
 from messages.message import EMPTY, Message, joined, message, message_of
 
 _log = logging.getLogger(__name__)
@@ -241,16 +242,12 @@ class RunFile:
     def _remedy(self, journal_fault: Exception | None = None) -> Message:
         journal = self._journal.path
         if journal_fault is None:
-            return message(
-                "All that came is in {journal}: rebuild the run with slipstand recover {folder}",
-                journal=journal,
-                folder=journal.parent,
-            )
-        return message(
-            "More than the run has is in {journal}: rebuild the run with slipstand recover {folder}",
-            journal=journal,
-            folder=journal.parent,
+            template = N_("All that came is in {journal}: rebuild the run with slipstand recover {folder}")
+            return message(template, journal=journal, folder=journal.parent)
+        template = N_(
+            "More than the run has is in {journal}: rebuild the run with slipstand recover {folder}"
         )
+        return message(template, journal=journal, folder=journal.parent)
 
     def _known_path(self) -> str:
         has_path = self.path.done() and self.path.exception() is None

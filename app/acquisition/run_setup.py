@@ -23,6 +23,7 @@ from app.runs.paths import journal_fallback_folders
 from app.version import __version__
 from config.files import load_checks
 from config.schema import Device, Gauges, Stand
+from messages.i18n import N_
 
 TRIGGERS = ("pullback", "none")
 PRETRIGGER_MAX_S = 60.0
@@ -54,17 +55,11 @@ def _texts(settings: Mapping[str, Any], before: str = "") -> dict[str, str]:
 def check_run_settings(settings: RunSettings) -> None:
     """Raise RunSettingsError for settings that no run can have."""
     if settings.trigger not in TRIGGERS:
-        raise RunSettingsError(
-            "trigger {trigger!r} is not known: give {triggers}",
-            trigger=settings.trigger,
-            triggers=" or ".join(TRIGGERS),
-        )
+        template = N_("trigger {trigger!r} is not known: give {triggers}")
+        raise RunSettingsError(template, trigger=settings.trigger, triggers=" or ".join(TRIGGERS))
     if not 0.0 <= settings.pretrigger_s <= PRETRIGGER_MAX_S:
-        raise RunSettingsError(
-            "pretrigger {pretrigger_s:g} s: give 0 to {longest_s:g} s",
-            pretrigger_s=settings.pretrigger_s,
-            longest_s=PRETRIGGER_MAX_S,
-        )
+        template = N_("pretrigger {pretrigger_s:g} s: give 0 to {longest_s:g} s")
+        raise RunSettingsError(template, pretrigger_s=settings.pretrigger_s, longest_s=PRETRIGGER_MAX_S)
     for name in ("duration_s", "trigger_timeout_s", "pullback_tolerance_m"):
         value = getattr(settings, name)
         if value is not None and not 0.0 < value < math.inf:

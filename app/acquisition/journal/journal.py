@@ -28,6 +28,7 @@ from app.runs.disk import is_disk_full
 from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
 from drivers.clock import TimeBase
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 _log = logging.getLogger(__name__)
@@ -71,12 +72,11 @@ class Journal:
             return message(
                 "the folder of the run is full: the received bytes are kept in {path}", path=self.path
             )
-        return message(
+        template = N_(
             "the folder of the run cannot be written any more ({reason}): the received bytes are kept in"
-            " {path}",
-            reason=error.strerror or error,
-            path=self.path,
+            " {path}"
         )
+        return message(template, reason=error.strerror or error, path=self.path)
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
         """Append a record without waiting; return the byte of the journal at which it begins.
@@ -85,11 +85,8 @@ class Journal:
         """
         self._check()
         if self._records.qsize() >= self._QUEUE_RECORDS:
-            raise JournalError(
-                "{path}: the disk is too slow, {reads} reads wait. Use a faster disk",
-                path=self.path,
-                reads=self._QUEUE_RECORDS,
-            )
+            template = N_("{path}: the disk is too slow, {reads} reads wait. Use a faster disk")
+            raise JournalError(template, path=self.path, reads=self._QUEUE_RECORDS)
         record = encode_record(data, arrival_ns, kind)
         with self._appending:
             self._records.put(record)
@@ -105,11 +102,8 @@ class Journal:
         self._thread.join(self._CLOSE_S)
         self._check()
         if self._thread.is_alive():
-            raise JournalError(
-                "{path}: the disk hangs, {reads} reads wait. Check the disk, or its network",
-                path=self.path,
-                reads=self._records.qsize(),
-            )
+            template = N_("{path}: the disk hangs, {reads} reads wait. Check the disk, or its network")
+            raise JournalError(template, path=self.path, reads=self._records.qsize())
 
     def remove(self) -> None:
         self._file.remove()

@@ -14,6 +14,7 @@ from app.runs.journal import JournalRecord, RecordKind, read_journal
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from drivers.clock import TimeBase
 from drivers.samples import Losses
+from messages.i18n import N_
 
 
 class JournalHeader(msgspec.Struct, frozen=True, tag=True):
@@ -199,8 +200,5 @@ def _decode(path: Path, record: JournalRecord) -> MetadataRecord:
         return decode_metadata_record(record.data)
     except msgspec.DecodeError as error:
         fault = " ".join(str(error).split())[:120]
-        raise RecoveryError(
-            "{path} is of another version of Slipstand ({fault}). Recover it with that one",
-            path=path,
-            fault=fault,
-        ) from None
+        template = N_("{path} is of another version of Slipstand ({fault}). Recover it with that one")
+        raise RecoveryError(template, path=path, fault=fault) from None

@@ -32,6 +32,7 @@ from app.runs.file_operations import (
 from app.runs.journal import find_journals
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.schema import SUFFIX
+from messages.i18n import N_
 from messages.message import EMPTY, Message, as_message, message, message_of
 
 _log = logging.getLogger(__name__)
@@ -146,11 +147,8 @@ def _recover(summary: JournalSummary, place: Path, progress: Progress) -> Recove
         made = folder / (earlier.name if earlier else f"{_stem(summary)}_001{SUFFIX}")
         rebuilt = rebuild(summary, made, progress)
         if rebuilt is None:
-            raise RecoveryError(
-                "{path} holds {bytes} bytes but no sample. Delete it if it is not needed",
-                path=summary.path,
-                bytes=summary.wire_bytes,
-            )
+            template = N_("{path} holds {bytes} bytes but no sample. Delete it if it is not needed")
+            raise RecoveryError(template, path=summary.path, bytes=summary.wire_bytes)
         return _placed(summary, place, rebuilt, earlier)
 
 

@@ -15,6 +15,7 @@ from drivers.clock import Skew
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
 from drivers.source import SampleSource
+from messages.i18n import N_
 
 _READS_MAX = 4096
 
@@ -89,11 +90,8 @@ class Replay:
         try:
             blocks = [block for read in reads for block in self._decoded(read)]
         except DriverError as error:
-            raise RecoveryError(
-                "{path}: its bytes make no sense ({error}). It stays as it is",
-                path=self._summary.path,
-                error=error,
-            ) from None
+            template = N_("{path}: its bytes make no sense ({error}). It stays as it is")
+            raise RecoveryError(template, path=self._summary.path, error=error) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = calibrate(_joined(blocks), self._summary.header.metadata.gauges) if blocks else None
         return ReplayedReads(rows, self._losses - before, reads[0].start, is_in_run)

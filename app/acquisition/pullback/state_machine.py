@@ -19,6 +19,7 @@ from app.acquisition.pullback.averages import (
 from app.acquisition.pullback.free_motion import FreeMotion, Hold, HoldReference
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
 from drivers.arrays import Floats
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 NOT_HELD_NOTE = message(
@@ -387,10 +388,8 @@ class PullbackStateMachine:
         if self.state is PullbackState.HELD:
             drift_m_per_s = self._readings.table.drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
             if drift_m_per_s or now >= self._filled_index:
-                return message(
-                    "The table drifts by {drift_mm_per_s:.2f} mm/s. Hold it still",
-                    drift_mm_per_s=1e3 * abs(drift_m_per_s),
-                )
+                template = N_("The table drifts by {drift_mm_per_s:.2f} mm/s. Hold it still")
+                return message(template, drift_mm_per_s=1e3 * abs(drift_m_per_s))
             return message(
                 "The {pretrigger_s:g} s that are kept from before the release are not there yet. Go on"
                 " holding",

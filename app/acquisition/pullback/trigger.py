@@ -7,6 +7,7 @@ from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Tra
 from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.acquisition.stream.live_stream import ReadHistory
 from app.runs.blocks import CalibratedBlock
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 _CONTEXT_S = 1.0
@@ -101,10 +102,8 @@ def _no_room_note(plan: PullbackPlan) -> Message:
     """Remark on a gauge 2 whose range is too short for the slip, wherever the plate stands; else empty."""
     if plan.plate_range is None or plan.plate_range.exists:
         return EMPTY
-    return message(
-        "The slip may leave the range of gauge 2 (±{range_mm:g} mm) wherever the plate stands",
-        range_mm=1e3 * (plan.relative_range_m or 0.0),
-    )
+    template = N_("The slip may leave the range of gauge 2 (±{range_mm:g} mm) wherever the plate stands")
+    return message(template, range_mm=1e3 * (plan.relative_range_m or 0.0))
 
 
 def _armed_test(plan: PullbackPlan, armed_index: int, history: ReadHistory) -> PullbackStateMachine:

@@ -185,12 +185,11 @@ class StallDetector:
 
     def message(self) -> Message:
         if not self._garbage:
-            return message(
+            template = N_(
                 "port {port} is open but silent for {limit_s:g} s: check the device, reset it and record"
-                " again",
-                port=self._port,
-                limit_s=self._limit_s,
+                " again"
             )
+            return message(template, port=self._port, limit_s=self._limit_s)
         return message(
             "port {port} has brought no sample for {limit_s:g} s: {cause}",
             port=self._port,

@@ -34,7 +34,7 @@ from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, wr
 from config import files
 from config.files import load_checks, load_gauges, settings_file
 from config.schema import ConfigError, GaugeChecks, Gauges
-from messages.i18n import gettext, translate
+from messages.i18n import N_, gettext, translate
 
 _GAUGES: Final[tuple[Literal["table"], Literal["relative"]]] = ("table", "relative")
 
@@ -94,11 +94,8 @@ def _write_points(name: str, counts: list[float], dial_m: list[float]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_points(path, counts, dial_m)
     except OSError as error:
-        raise ConfigError(
-            "{path}: cannot be written ({strerror}). Check the folder, its rights and its disk",
-            path=path,
-            strerror=error.strerror,
-        ) from None
+        template = N_("{path}: cannot be written ({strerror}). Check the folder, its rights and its disk")
+        raise ConfigError(template, path=path, strerror=error.strerror) from None
 
 
 def _calibration_fit(found: Calibration) -> CalibrationFit:
