@@ -47,16 +47,12 @@ class StreamDecoder(Protocol[Decoded_co]):
     """Turns bytes, cut anywhere, into messages. Keeps what is not a whole message yet."""
 
     def feed(self, data: bytes) -> Iterator[Decoded_co]:
-        """Yield the messages that `data` completes. Raises ValueError for others."""
+        """Raises ValueError for what is no message."""
         ...
 
 
 class LineDecoder(Generic[Decoded]):
-    """Decodes messages of one line each. Blank lines are skipped.
-
-    `decode` takes a line without its newline and raises ValueError. `on_invalid` receives the error of an
-    undecodable line, which is skipped; without it, `feed` raises the error.
-    """
+    """Decodes one message a line; `on_invalid` gets the ValueErrors of `decode`, else `feed` raises."""
 
     def __init__(
         self, decode: Callable[[bytes], Decoded], on_invalid: Callable[[Exception], None] | None = None
@@ -66,7 +62,6 @@ class LineDecoder(Generic[Decoded]):
         self._rest = b""
 
     def feed(self, data: bytes) -> Iterator[Decoded]:
-        """Yield the messages of all lines that `data` completes. Raises what `decode` raises."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in filter(bytes.strip, lines):
             try:
@@ -155,10 +150,7 @@ class ChildProcess(Generic[Command, Event]):
         return self._process.poll() is None
 
     def send(self, command: Command, timeout_s: float = 0.0) -> bool:
-        """Queue a command for the child; a child that has ended takes everything.
-
-        Returns False when the queue is full, and stays full for `timeout_s`: the child takes nothing.
-        """
+        """Queue a command. False when the queue stays full for `timeout_s`: the child takes nothing."""
         return self._put(self._encode(command), timeout_s)
 
     def stop(self, timeout_s: float, *, wait_while_active: bool = False) -> None:
@@ -182,7 +174,6 @@ class ChildProcess(Generic[Command, Event]):
             thread.join(_KILLED_S)
 
     def kill(self) -> None:
-        """Kill the process, if it lives, without waiting for its end."""
         if self.is_running:
             _log.info("child %d is killed", self.pid)
             self._is_killed = True
@@ -196,14 +187,12 @@ class ChildProcess(Generic[Command, Event]):
         return True
 
     def _write(self) -> None:
-        """Write queued commands until the end is queued, or the child has ended."""
         with contextlib.suppress(OSError), self._stdin:
             while (data := self._commands.get()) is not None:
                 self._stdin.write(data)
                 self._stdin.flush()
 
     def _read(self) -> None:
-        """Deliver events until the child ends."""
         with contextlib.suppress(OSError, ValueError), self._stdout:
             while data := self._stdout.read1(READ_BYTES):  # type: ignore[attr-defined]
                 self._last_event_s = time.monotonic()
@@ -289,7 +278,6 @@ class EventSender(Generic[Event]):
             self._events.put(event)
 
     def close(self) -> None:
-        """Write the queued events, and wait for that up to 2 s."""
         self._events.put(None)
         self._thread.join(self._CLOSE_S)
 
@@ -317,10 +305,7 @@ def ignore_session_signals(*more: str) -> None:
 
 
 def json_decoder(kind: Any) -> Callable[[bytes], Any]:  # mypy has no type for a union as a value
-    """Return a function that decodes one line of JSON as `kind`.
-
-    It raises ValueError, of which msgspec.DecodeError is a kind.
-    """
+    """Return a function that decodes one line of JSON as `kind`, or raises ValueError."""
     decoder = msgspec.json.Decoder(kind)
 
     def decode(line: bytes) -> Any:

@@ -38,7 +38,6 @@ class AveragedCounts:
     """Counts of one gauge over a window."""
 
     counts: float
-    """Mean."""
     noise_counts: float
     """Standard deviation of a sample."""
     samples: int
@@ -47,7 +46,7 @@ class AveragedCounts:
 
     @property
     def is_steady(self) -> bool:
-        """Whether noise alone explains the difference of the halves."""
+        """Noise alone explains the difference of the halves."""
         return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
 
@@ -162,10 +161,7 @@ class ReadingAverager:
 
 
 class CountAverager:
-    """Averages counts of a stream, which a thread reads so that none are lost; use it with `with`.
-
-    The stream is open and is not closed here. Channel 0 is gauge 1, channel 1 is gauge 2.
-    """
+    """Averages counts of an open stream, which a thread reads so that none are lost; use it with `with`."""
 
     def __init__(self, stream: "LiveStream", channel: int) -> None:
         self._stream = stream

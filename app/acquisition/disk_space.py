@@ -31,13 +31,11 @@ class DiskDemand:
     """What a run writes."""
 
     rate_hz: float
-    """Samples a second."""
     wire_bytes_per_s: float
     """What the device sends."""
 
     @property
     def journal_bytes_per_s(self) -> float:
-        """Received bytes, each read with its time."""
         return self.wire_bytes_per_s + _RECORD_BYTES * _READS_PER_S
 
     @property
@@ -55,7 +53,6 @@ class DiskDemand:
         return _CLOSING_BYTES + length_s * self.bytes_per_s
 
     def of_waiting(self, run: RunSettings) -> float:
-        """Bytes of the journal until the latest possible release."""
         return self.journal_bytes_per_s * run.trigger_timeout_s if run.trigger == "pullback" else 0.0
 
 
@@ -98,10 +95,7 @@ class DiskSpaceMonitor:
         self._is_warned = False
 
     def update(self, free: int | None, journal_bytes: int) -> DiskWarning | None:
-        """Return a new warning, None without one. Call it a few times a second.
-
-        `free` bytes are left, None if unknown. The journal is copied into the run when it ends.
-        """
+        """Return a new warning about `free` bytes, None without one. Call it a few times a second."""
         if free is None:
             return None
         spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
@@ -152,7 +146,6 @@ class FreeSpacePoller:
             self.free_bytes = free_bytes(folder)
 
     def stop(self) -> None:
-        """End, without waiting for a disk that hangs."""
         self._stopping.set()
 
     def _poll(self) -> None:

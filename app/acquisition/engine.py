@@ -132,11 +132,7 @@ class Engine:
         self._is_quitting = False
 
     def run(self) -> None:
-        """Work until told to quit, or until the owner is gone.
-
-        Raises StreamEndedError when no more samples come; a run was ended and stored then. Raises
-        AcquisitionError, ConfigError, RunError for a run that cannot be recorded as asked.
-        """
+        """Work until told to quit, or the owner is gone. An error is raised when the run is stored."""
         try:
             while not (self._is_quitting and self._recording is None):
                 self._step()
@@ -228,7 +224,6 @@ class Engine:
             self._sequence.begin(run, count)
 
     def _try_to_arm(self, run: messages.RunSettings) -> bool:
-        """Arm a run; report it, and return False, when there is no place for it."""
         try:
             self._arm(run)
         except DiskSpaceError as error:
@@ -320,13 +315,11 @@ class Engine:
             self._send_health()
 
     def _send_idle(self, note: Message = EMPTY) -> None:
-        """Nothing is recorded: report whether anything could be."""
         is_away, states = self._stream.is_disconnected, messages.PullbackState
         state = states.CONNECTING if is_away else states.IDLE
         self._events.send(messages.StateChanged(state, self._history.next_index / self._rate_hz, note))
 
     def _send_health(self) -> None:
-        """Twice a second, check the disk and report the state of the stream."""
         now_s = time.monotonic()
         if now_s < self._health_due_s:
             return
@@ -347,7 +340,6 @@ class Engine:
         )
 
     def _follow_disk(self) -> None:
-        """Warn of a disk that fills up, and end a run while it can still be closed."""
         recording = self._recording
         if recording is None or self._disk is None or recording.is_ending:
             return

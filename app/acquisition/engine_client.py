@@ -20,11 +20,7 @@ _WAIT_S = 0.1
 
 
 class EngineClient:
-    """An engine in a process of its own. It outlives this handle only to finish a run.
-
-    Make it with `EngineClient.start`; use it in a `with` statement, or call `close`. One thread at a time may
-    take events and rows.
-    """
+    """An engine in a process of its own, which outlives this handle only to finish a run."""
 
     _QUEUE_EVENTS = 1024
     """Health and live results are dropped while so many events wait."""
@@ -50,10 +46,7 @@ class EngineClient:
     def start(
         cls, port: messages.PortSettings, stand_file: str, gauges_file: str, *, low_latency: bool = False
     ) -> Self:
-        """Start an engine and let it connect; `Connected` or `Failed` will be among its events.
-
-        With `low_latency`, new rows are in the ring within about 20 ms, else within 0.14 s at less cost.
-        """
+        """Start an engine and connect it; new rows come within 20 ms with `low_latency`, else 0.14 s."""
         engine = cls(spawn("app.acquisition.engine"))
         engine.send(messages.Connect(port, stand_file, gauges_file, low_latency))
         return engine
@@ -178,7 +171,6 @@ def record_runs(
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Catch SIGINT and SIGTERM, where this thread may: only the main one."""
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield interrupted

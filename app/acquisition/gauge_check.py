@@ -26,7 +26,6 @@ class ReferenceStep:
     standard_uncertainty: float | None = None
     """In the same unit."""
     unit: Literal["m", "count"] = "m"
-    """`m`, or `count` for a shunt that is known by its counts."""
     kind: Literal["displacement", "shunt"] = "displacement"
     """`displacement`, or `shunt`, which shifts the amplifier's input while nothing moves."""
 
@@ -95,5 +94,4 @@ def _displacement_m(counts: float, gauge: Gauge) -> float:
 
 
 def _step_m(counts: float, step: float, gauge: Gauge) -> float:
-    """Displacement (m) of a step of counts from the present reading."""
     return _displacement_m(counts + step, gauge) - _displacement_m(counts, gauge)

@@ -18,10 +18,7 @@ class NoSamplesError(AcquisitionError):
 
 
 def collect_samples(stream: LiveStream, seconds: float, gauges: Gauges) -> tuple[GaugeSamples, GaugeSamples]:
-    """Collect samples of both gauges from now on; whatever else the stream brings is dropped.
-
-    Raises NoSamplesError if too few come, or AcquisitionError or DriverError if the stream has ended.
-    """
+    """Collect samples of both gauges from now on. Raises NoSamplesError, AcquisitionError, DriverError."""
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
     ends_s = time.monotonic() + seconds + TIMEOUT_S
     while sum(map(len, taken)) < wanted:

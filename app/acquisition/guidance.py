@@ -57,7 +57,6 @@ class PullbackSituation:
     plate_range: AllowedPlateRange | None = None
     """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
     simulated: bool = False
-    """The stand pulls and releases by itself."""
     note: Message | str = ""
     """What did not go as expected."""
     loss_reason: Message | str = ""

@@ -97,10 +97,7 @@ class LiveClient:
 
 
 class LiveIdentifier:
-    """Has runs identified while they are recorded.
-
-    `time_base` gives the time base of the rows from a given one on; `start` starts the process.
-    """
+    """Has runs identified while they are recorded; `time_base` gives the time base from a row on."""
 
     def __init__(
         self,
@@ -116,7 +113,6 @@ class LiveIdentifier:
         self._timed_s = 0.0
 
     def prepare(self) -> None:
-        """Make ready for a run, while the table is pulled back."""
         if self._client is not None and self._client.has_ended:
             self.stop()
         if self._client is None:

@@ -56,7 +56,7 @@ def _follow(
 
 
 def warm_up() -> None:
-    """Compile, or load from the cache, what an identification needs, before there is anything to identify."""
+    """Compile, or load from the cache, what an identification needs."""
     synthetic = simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
     LiveIdentification().update(synthetic)
 
@@ -74,7 +74,7 @@ class RunFollower:
         self._identification = LiveIdentification()
 
     def answer(self) -> LiveAnswer | None:
-        """Identify the run; None without new rows, or when the run was followed long enough."""
+        """Identify the run; None without new rows, or when it was followed long enough."""
         rows = self._ring.read_since(self._next_row)
         if not len(rows) or rows.first_index > self._last_row:
             return None

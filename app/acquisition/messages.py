@@ -36,11 +36,9 @@ class PullbackState(StrEnum):
     NO_SLIP = "no-slip"
     """Released, but the plate stays on the table."""
     TAIL = "tail"
-    """Both plates move together."""
     RECORDING = "recording"
     """Everything is recorded, whatever the stand does (trigger `none`)."""
     CLOSING = "closing"
-    """The run file is being completed and checked."""
 
 
 class EndReason(StrEnum):
@@ -108,7 +106,6 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
     stand_file: str
     gauges_file: str
     low_latency: bool = False
-    """Samples reach the ring sooner, at more cost, because somebody watches them."""
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
@@ -144,7 +141,6 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
     firmware: str
     rate_hz: float
     ring_path: str
-    """File that `app.acquisition.ring.RingReader` maps."""
 
 
 class StandPosition(msgspec.Struct, frozen=True):
@@ -171,7 +167,6 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
     state: PullbackState
     since_s: float
     note: Message = EMPTY
-    """What did not go as it should."""
     position: StandPosition = StandPosition()
 
 
@@ -208,10 +203,8 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     release_s: float | None = None
     """On the run's time axis."""
     message: Message = EMPTY
-    """What went wrong, if anything did."""
     time_base: TimeBase = TimeBase()
     remaining: int = 0
-    """Runs that follow by themselves."""
 
 
 class Health(msgspec.Struct, frozen=True, tag=True):
@@ -245,7 +238,6 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     """Some 25 times a second after the release: what is known of the run so far, None before it can be."""
 
     time_s: float
-    """Newest sample that was seen, on the ring's time axis."""
     friction_dynamic: LiveValue | None = None
     period: LiveValue | None = None
     damping_n1: LiveValue | None = None

@@ -56,15 +56,11 @@ class RecordingContext:
     """What a recording needs of the engine that it runs in."""
 
     read_queue: ReadQueue
-    """Gives the journal each read before it is decoded."""
     history: ReadHistory
-    """Holds each read before the recording takes it."""
     writer: WriterClient
     """Idle."""
     time_base: Callable[[int, int], TimeBase]
-    """Returns the time base of the samples from one index to another."""
     emit: Callable[[Event], None]
-    """Sends an event to the owner of the engine."""
 
 
 class Recording:
@@ -118,12 +114,10 @@ class Recording:
 
     @property
     def confirmed_start_index(self) -> int | None:
-        """First sample of a run whose release is confirmed; None before that."""
         return self._trigger.start_index if self._trigger.measurement.release_confirmed else None
 
     @property
     def observed_slip(self) -> ObservedSlip | None:
-        """How far the plate went; None where that was not seen."""
         measurement = self._trigger.measurement
         if measurement.excursion is None or not measurement.release_confirmed or not measurement.pulled_m:
             return None
@@ -131,7 +125,6 @@ class Recording:
 
     @property
     def journal_bytes(self) -> int:
-        """Size of the journal, which is copied into the run file at the end."""
         return self._journal.size
 
     @property
@@ -148,10 +141,7 @@ class Recording:
             self._follow_pending()
 
     def end(self, reason: EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
-        """End the run and keep it; without a release, what is there of the time since arming.
-
-        With `keep_rest` false, a run in which the table was not even pulled back leaves no file.
-        """
+        """End the run; unless `keep_rest`, one in which the table was not pulled back leaves no file."""
         self._follow_pending()
         if self.is_ending:
             return
@@ -179,7 +169,6 @@ class Recording:
             self.end(EndReason.ENOUGH)
 
     def add_note(self, note: Message) -> None:
-        """Show the operator a note that is stored with the run."""
         if not self.is_ending:
             self._store_note(note)
             self.show_note(note)
@@ -216,7 +205,6 @@ class Recording:
             self.end(end_reason(error), message_of(error))
 
     def _open_tap(self) -> None:
-        """Begin the journal with the reads of the history, and let it continue with all that come."""
         reads, read_queue = list(self._history.reads()), self._context.read_queue
         read_queue.open_tap(self._tap.on_read, (RawRead(read.arrival_ns, read.data) for read in reads))
         try:

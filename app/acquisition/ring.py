@@ -79,9 +79,7 @@ class _Ring:
         settings_end = 8 * _WORDS + int(self._header[4])
         settings = msgspec.json.decode(mapped[8 * _WORDS : settings_end], type=_RingSettings)
         self.capacity = int(self._header[1])
-        """Rows that the ring holds."""
         self.rate_hz = settings.rate_hz
-        """Nominal samples a second."""
         self._gauges = settings.gauges
         start = _columns_start(settings_end)
         counts = np.frombuffer(mapped, np.float64, 2 * self.capacity, offset=start)
@@ -90,7 +88,6 @@ class _Ring:
 
     @property
     def written(self) -> int:
-        """Rows written since the stream began; the number of the next one."""
         return int(self._header[3])
 
     def close(self) -> None:
@@ -138,10 +135,7 @@ class RingReader(_Ring):
     """Reads a ring that another process writes; make it with `open_ring`."""
 
     def read_since(self, row: int) -> RingRows:
-        """Rows from number `row` on; where the writer has overtaken it, from the oldest that is left.
-
-        The next call starts at the `end_index` of these rows.
-        """
+        """Rows from number `row` on, or the oldest that are left. Call it with their `end_index` next."""
         for _ in range(_LAPPED_TRIES):
             end = self.written
             first = min(max(row, end - self.capacity), end)
@@ -200,7 +194,6 @@ def open_ring(path: Path | str) -> RingReader:
 
 
 def _columns_start(settings_end: int) -> int:
-    """Byte at which the columns begin: the first whole page behind the settings."""
     return -(-settings_end // _PAGE_BYTES) * _PAGE_BYTES
 
 
@@ -212,11 +205,7 @@ _SETTLED_S = 60.0
 
 @contextlib.contextmanager
 def live_folder() -> Iterator[Path]:
-    """Make a folder that nobody else may enter; folders of engines that were killed are removed.
-
-    POSIX systems give it mode 0700. Windows gives it the rights of the user's own temporary folder, which
-    admits only the user and administrators.
-    """
+    """Make a folder for this user alone, and remove those of engines that were killed."""
     _remove_abandoned(Path(tempfile.gettempdir()))
     folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
     try:

@@ -39,11 +39,9 @@ class SampleStatistics:
         self._reads = Losses()
 
     def add(self, rows: CalibratedBlock) -> None:
-        """Count rows by their flags."""
         self._rows += count_flags(rows.status)
 
     def remove(self, rows: CalibratedBlock) -> None:
-        """Take back rows that were counted before."""
         self._rows -= count_flags(rows.status)
 
     def add_losses(self, added: Losses) -> None:
@@ -116,11 +114,9 @@ class RunFile:
     ) -> None:
         self.start_index = start_index
         self.next_index = start_index
-        """Sample that is stored next."""
         self.statistics = SampleStatistics()
         """Of the rows that were taken; once the file is closed, of those that are held."""
         self.close_result: Future[CloseResult] = Future()
-        """How the closing went, once it is done."""
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
@@ -135,7 +131,6 @@ class RunFile:
                 Opened(start_index, started, request.layout, wire_start, tap.decoded_reads)
             )
         self.path: Future[Path] = writer.open(request)
-        """Where it is, once it is there."""
 
     def append_all(self, reads: Iterable[DecodedRead], end_index: int | None = None) -> None:
         """Store the rows of several reads; raises the first RunError when all rows are counted."""
@@ -162,7 +157,6 @@ class RunFile:
             self._pass_on()
 
     def time_s(self, index: int | None) -> float | None:
-        """Time of a sample in the base of this run; negative before it began."""
         return None if index is None else (index - self.start_index) / self._rate_hz
 
     def current_time(self) -> datetime.datetime:
@@ -280,7 +274,7 @@ def start_time(read: DecodedRead, start_index: int, rate_hz: float) -> datetime.
 
 
 def _fault_of(step: Callable[[], None]) -> Exception | None:
-    """Run a step and return its error, whatever it is: the steps after it are done all the same."""
+    """Run a step and return its error, whatever it is."""
     try:
         step()
     except Exception as error:

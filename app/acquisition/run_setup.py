@@ -69,11 +69,7 @@ def check_run_settings(settings: RunSettings) -> None:
 
 
 def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
-    """Metadata of a run when it is armed.
-
-    Raises ConfigError or MetadataError for a series that the stand has not, a value that cannot be stored, or
-    a history of gauge checks that cannot be read.
-    """
+    """Metadata of a run when it is armed. Raises ConfigError, MetadataError."""
     return create_metadata(
         stand,
         gauges,
@@ -112,7 +108,7 @@ class RunSequence:
 
     @property
     def is_repeat(self) -> bool:
-        """Tell whether the run that is recorded now was armed without being asked for."""
+        """The run that is recorded now was armed without being asked for."""
         return self._done > 0
 
     def begin(self, run: RunSettings, count: int) -> None:
@@ -122,10 +118,7 @@ class RunSequence:
         self._remaining = 0
 
     def next_after(self, ended: RunEnded) -> tuple[RunEnded, RunSettings | None]:
-        """Add to a run's end how many runs follow, and return the next one; None if there is none.
-
-        Only a run that came to its end by itself is followed; any other needs attention.
-        """
+        """Add how many runs follow, and return the next one; only a normal end is followed."""
         if not ended.ended.is_normal or self._next is None or self._remaining == 0:
             self._remaining = self._done = 0
             return ended, None

@@ -51,9 +51,7 @@ class JournalFile:
         self, path: Path, file: IO[bytes], first: bytes, lock: FileLock, fallback_folders: Sequence[Path] = ()
     ) -> None:
         self.path = path
-        """Where it is now."""
         self.move_cause: OSError | None = None
-        """Error for which it moved."""
         self._file = file
         self._first = first
         self.size = len(first)
@@ -74,16 +72,13 @@ class JournalFile:
                 return
 
     def begin_sync(self) -> None:
-        """Begin a sync in a thread, so that new records need not wait for a slow disk.
-
-        Does nothing while the last one is not done. Raises OSError where no folder takes the records.
-        """
+        """Begin a sync in a thread unless one is under way. Raises OSError where no folder takes it."""
         if self._sync is None or not self._sync.is_alive():
             self._finish_sync()
             self._sync = FileSync(self._file.fileno())
 
     def sync(self) -> None:
-        """Bring everything to disk, and wait for it. Raises OSError where no folder takes it."""
+        """Wait until all is on disk. Raises OSError where no folder takes it."""
         self._finish_sync()
         try:
             os.fsync(self._file.fileno())
@@ -152,7 +147,6 @@ class JournalFile:
         return is_readable
 
     def _pieces(self) -> Iterator[bytes]:
-        """All whole records, some at a time. Raises _UnreadableError."""
         left = self.size
         try:
             with self.path.open("rb") as old:
@@ -167,16 +161,13 @@ class JournalFile:
 
 
 class _UnreadableError(Exception):
-    """What was written can no longer be read."""
+    pass
 
 
 def create_journal_file(
     path: Path, first_record: bytes, fallback_folders: Sequence[Path] = ()
 ) -> JournalFile:
-    """Create a journal with its first record, in one write; its folder is made if there is none.
-
-    Raises OSError (FileExistsError: nothing is overwritten), or LockHeldError if another program writes it.
-    """
+    """Create a journal with its first record. Raises OSError, FileExistsError, LockHeldError."""
     first = MAGIC + first_record
     with _new_file(path) as (file, lock):
         _write_all(file, first)

@@ -59,7 +59,6 @@ class Journal:
 
     @property
     def path(self) -> Path:
-        """Where it is now: it moves when its folder takes no more."""
         return self._file.path
 
     @property
@@ -79,10 +78,7 @@ class Journal:
         return message(template, reason=error.strerror or error, path=self.path)
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
-        """Append a record without waiting; return the byte of the journal at which it begins.
-
-        Raises JournalFullError, or JournalError if the disk failed or thousands of records wait.
-        """
+        """Append a record without waiting; return the byte at which it begins. Raises JournalError."""
         self._check()
         if self._records.qsize() >= self._QUEUE_RECORDS:
             template = N_("{path}: the disk is too slow, {reads} reads wait. Use a faster disk")
@@ -110,10 +106,7 @@ class Journal:
         self.release()
 
     def release(self) -> None:
-        """Release the lock of a closed journal; where it was not removed, a recovery may take it.
-
-        One that hangs may still be written: its lock is released when this process ends.
-        """
+        """Release the lock of a closed journal; one that hangs may still be written, and keeps it."""
         if not self._thread.is_alive():
             self._file.release()
 
@@ -138,7 +131,6 @@ class Journal:
                 self._next()
 
     def _next(self, timeout_s: float | None = None) -> bytes | None:
-        """The next record, None for the end. Raises queue.Empty."""
         record = self._records.get(timeout=timeout_s)
         self._is_ending = record is None
         return record
@@ -162,12 +154,7 @@ class Journal:
 
 
 def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:
-    """Create the journal of a run; its folder is made if there is none.
-
-    Raises JournalError if the folder cannot be made or written to, or the name is taken.
-
-    It moves to one of the `fallback_folders` when the folder of `path` fails.
-    """
+    """Create a journal, which moves to a fallback folder when its own fails. Raises JournalError."""
     record = encode_record(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
         file = create_journal_file(path, record, fallback_folders)
@@ -198,7 +185,6 @@ class JournalTap:
 
     def __init__(self, journal: Journal) -> None:
         self.decoded_reads = 0
-        """Reads that were decoded."""
         self._journal = journal
         self._starts: deque[int] = deque()
         self._failure: JournalError | None = None
@@ -214,10 +200,7 @@ class JournalTap:
             self._failure = error
 
     def note_decoded(self, read: DecodedRead, oldest_index: int) -> None:
-        """Note the samples of the next read, in order; no run begins before `oldest_index` any more.
-
-        Raises JournalError if the read did not get into the journal.
-        """
+        """Note the next read's samples; no run begins before `oldest_index` any more. Raises JournalError."""
         if not self._starts and self._failure is not None:
             raise self._failure
         self.decoded_reads += 1
@@ -255,10 +238,7 @@ class CheckpointWriter:
         self._due = 0
 
     def update(self, reads: int, next_index: int, measurement: PullbackMeasurement) -> None:
-        """Take what is known after so many reads of the journal; `next_index` is of the sample after theirs.
-
-        A failure of the journal is reported at the next read.
-        """
+        """Take what is known after so many reads. A failure of the journal is reported at the next read."""
         known = msgspec.convert(measurement, Known, from_attributes=True)
         if known == self._known and next_index < self._due:
             return

@@ -36,11 +36,7 @@ class RebuiltRun:
 
 
 def rebuild(summary: JournalSummary, path: Path, progress: Callable[[float], None]) -> RebuiltRun | None:
-    """Write the run of a journal to `path`, which must not exist; None where the journal holds no sample.
-
-    `progress` receives the fraction of the journal that is done. Raises RecoveryError if the bytes cannot be
-    decoded. Raises RunError if the file cannot be written.
-    """
+    """Write the run of a journal to `path`; None where it holds no sample. Raises RecoveryError, RunError."""
     opened = summary.opened or _opening(summary)
     if opened is None:
         return None

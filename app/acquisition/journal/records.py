@@ -25,7 +25,6 @@ class JournalHeader(msgspec.Struct, frozen=True, tag=True):
     metadata: RunMetadata
     """With the time of arming for the start."""
     identifier: str
-    """UUID that the run file has too."""
     program: str
 
 
@@ -46,7 +45,6 @@ class Mark(msgspec.Struct, frozen=True, tag=True):
     """Checkpoint: how far the stream had come after so many reads, and what was known of the run then."""
 
     next_index: int
-    """Index of the next sample, counted from the first one of the stream."""
     armed_index: int
     known: Known
     time_base: TimeBase
@@ -58,7 +56,6 @@ class Opened(msgspec.Struct, frozen=True, tag=True):
     """The run file is begun: the run is confirmed."""
 
     start_index: int
-    """Sample that is stored first."""
     start_time: datetime.datetime
     layout: BlockLayout
     wire_start: int
@@ -77,7 +74,6 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     """Nothing more is recorded; the file is only to be completed."""
 
     end_index: int
-    """Sample before which the run ends."""
     ending: EndMetadata
 
 
@@ -123,12 +119,11 @@ _DECODER: msgspec.json.Decoder[MetadataRecord] = msgspec.json.Decoder(MetadataRe
 
 
 def encode_metadata_record(note: MetadataRecord) -> bytes:
-    """Encode the data of a record of kind `RecordKind.NOTE`."""
     return msgspec.json.encode(note)
 
 
 def decode_metadata_record(data: bytes) -> MetadataRecord:
-    """Decode the data of such a record. Raises msgspec.DecodeError, or ValueError from what it holds."""
+    """Raises msgspec.DecodeError, or ValueError from what it holds."""
     return _DECODER.decode(data)
 
 
@@ -137,14 +132,12 @@ class JournalSummary:
     """The last metadata record of each kind in a journal; None for those that its engine could not write."""
 
     path: Path
-    """Of the journal."""
     header: JournalHeader
     checkpoint: Mark | None
     opened: Opened | None
     named: Named | None
     ended: Ended | None
     wire_bytes: int
-    """Received bytes that it holds."""
     is_torn: bool
     """There is more behind the last whole record."""
 
@@ -155,10 +148,7 @@ class JournalSummary:
 
 
 def read_summary(path: Path) -> JournalSummary:
-    """Read the metadata records of a journal.
-
-    Raises RecoveryError if it cannot be read, is no journal, or was cut off before its first sample.
-    """
+    """Read the metadata records of a journal. Raises RecoveryError if it cannot be read or is no journal."""
     records: dict[type[MetadataRecord], Any] = {}
     wire_bytes, end = 0, 0
     try:

@@ -181,7 +181,6 @@ def _placed(summary: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: 
 
 
 def _is_whole(before: ExistingRun, rebuilt: RebuiltRun) -> bool:
-    """Tell whether the run was closed regularly, so that only its journal was left over."""
     return before.samples == rebuilt.stored.samples and before.end == rebuilt.ending
 
 
@@ -229,10 +228,7 @@ def _stem(summary: JournalSummary) -> str:
 
 @contextlib.contextmanager
 def _workshop(place: Path, journal: str) -> Iterator[Path]:
-    """Make a hidden folder on the same disk, so that the new file can be moved at once.
-
-    It is named after the journal, whose lock is held: an existing one was left by an interrupted recovery.
-    """
+    """Make a hidden folder on the same disk; an existing one was left by an interrupted recovery."""
     folder = place / f".recovering-{journal}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()

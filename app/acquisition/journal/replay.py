@@ -25,9 +25,7 @@ class ReplayedReads:
     """A read of the journal, or several consecutive ones from within the run."""
 
     rows: CalibratedBlock | None
-    """Samples that they completed, with their numbers in the stream; None without any."""
     losses: Losses
-    """What they added to the losses of the stream."""
     start: int
     """Byte of the journal at which the first record begins."""
     is_in_run: bool
@@ -106,7 +104,6 @@ class Replay:
         return blocks
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """Delay of gauge 2 against gauge 1 in these samples; None if they were read at once."""
         offset = self._offset or 0
         return self._source.skew(first_index - offset, end_index - offset)
 

@@ -34,7 +34,6 @@ class BinAverages:
     center: Floats
     """(n,) sample index of the middle of each bin."""
     table_m: Floats
-    """(n,) mean displacements (m)."""
     relative_m: Floats
     """(n,) mean displacements (m), NaN where gauge 2 has no reading."""
 
@@ -54,10 +53,7 @@ class BinAverager:
         self._sums = np.zeros((4, 1))
 
     def add(self, first_index: int, table_m: Floats, relative_m: Floats) -> BinAverages:
-        """Bins that these consecutive samples (n,) complete; NaN is no reading.
-
-        Blocks must join: `first_index` is where the block before ended.
-        """
+        """Bins that samples (n,) complete; NaN is no reading. Blocks must join those before."""
         if not len(table_m):
             return _bins(np.zeros((4, 0)), 0, 1)
         n = self.samples_per_bin
@@ -112,7 +108,7 @@ class SlidingWindow:
         self._count = end
 
     def latest(self, duration_s: float) -> Floats:
-        """Indices and values (n, 2) of the readings not older than `duration_s` before the latest one."""
+        """Indices and values (n, 2) of the readings of the last `duration_s`."""
         rows = self._all()
         return (
             rows[np.searchsorted(rows[:, 0], rows[-1, 0] - duration_s * self._rate_hz) :]
@@ -133,7 +129,6 @@ class SlidingWindow:
         return float(rows[:, 1].mean()) if is_current else math.nan
 
     def stationary(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
-        """Level of the gauge if it stood still, or within a tolerance, for so long."""
         return stationary_level(self.latest(duration_s), duration_s * self._rate_hz, tolerance_m)
 
     def drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
@@ -159,10 +154,7 @@ class RecentAverages:
 
 
 def noise_m(values_m: Floats) -> float:
-    """Standard deviation (m) of the noise of readings (n,), whatever slow motion they show.
-
-    From the median step between neighbours, which few jumps do not change.
-    """
+    """Noise of readings (n,) in m, from the median step of neighbours: slow motion does not change it."""
     if len(values_m) < _PARTS:
         return _RESOLUTION_M
     step = _median(np.abs(values_m[1:] - values_m[:-1]))
@@ -170,10 +162,7 @@ def noise_m(values_m: Floats) -> float:
 
 
 def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> StationaryLevel | None:
-    """Level of a stretch (n, 2) that stood still for `span` indices; None if it moved or is too short.
-
-    It stood still when the means of its quarters agree within six standard errors, or `tolerance_m`.
-    """
+    """Level of a stretch (n, 2) whose quarters agree within six standard errors; None if it moved."""
     if len(stretch) < 2 * _PARTS or stretch[-1, 0] - stretch[0, 0] < 0.9 * span:
         return None
     values = stretch[:, 1]
@@ -187,10 +176,7 @@ def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> Statio
 
 
 def drift(stretch: Floats) -> tuple[float, float]:
-    """Rate of a stretch (n, 2), in its values for one index, and its standard error from the noise.
-
-    Least squares; of fewer than eight readings nothing is known, so the error is infinite.
-    """
+    """Slope of a stretch (n, 2) by least squares, and its standard error: infinite below eight readings."""
     if len(stretch) < 2 * _PARTS:
         return 0.0, math.inf
     index = stretch[:, 0] - stretch[:, 0].mean()
@@ -268,10 +254,7 @@ class ZeroEstimator:
         return self._levels[-1]
 
     def pulled_m(self, table_m: float) -> float:
-        """Distance (m) of the table from where it rested; 0 before any rest.
-
-        From the oldest rest that is kept, so that a slow pull is noticed as well.
-        """
+        """Distance (m) from the oldest rest that is kept, so that a slow pull is noticed as well."""
         return abs(table_m - self._levels[0].table_m) if self._levels else 0.0
 
     def level_before(self, index: float, noticed_m: float) -> ZeroLevel:

@@ -63,17 +63,11 @@ class HoldReference:
     table_m: float
     relative_m: float
     relative_noise_m: float
-    """Of one short average."""
     relative_error_m: float
-    """Of `relative_m`."""
 
 
 class Hold:
-    """A hold of the table, from when it stood still; `detect_release` sees its end.
-
-    `side` is 1 or -1, `pulled_m` has no sign. A release is `bins_to_release` averages in a row beyond the
-    limit.
-    """
+    """A hold of the table; a release is `bins_to_release` averages in a row beyond the limit."""
 
     def __init__(self, level: StationaryLevel, side: float, pulled_m: float, bins_to_release: int) -> None:
         self.start = level.since
@@ -114,10 +108,7 @@ class Hold:
 
 
 class FreeMotion:
-    """Follows one release, noticed at sample `noticed_at`; `measurement` receives what it finds.
-
-    `readings` hold each average before `update` receives it; `remark` is shown once the release is confirmed.
-    """
+    """Follows one release, noticed at sample `noticed_at`; `measurement` receives what it finds."""
 
     def __init__(
         self,
@@ -148,7 +139,7 @@ class FreeMotion:
         return self._measurement.release_confirmed and not is_open
 
     def update(self, bins: BinAverages, samples_per_bin: int, is_tick: bool) -> list[Transition]:
-        """Take the next averages; return the new states. Slow changes are checked at ticks only."""
+        """Take the next averages; return the new states."""
         index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
         self._follow_plate(bins)
         since_s = (index - (self._measurement.release_index or 0)) / self._plan.rate_hz

@@ -83,25 +83,21 @@ class PullbackPlan:
     """What is expected of one test."""
 
     rate_hz: float
-    """Samples a second."""
     pullback_m: float | None = None
     """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
     duration_s: float | None = None
     """Time after release; None until rest, or `enough_s`."""
     trigger_timeout_s: float = math.inf
-    """How long to wait for a release (s)."""
     enough_s: float = 20.0
     """Time after release at which waiting longer no longer helps (s)."""
     tolerance_m: float | None = None
     """How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least."""
     pretrigger_s: float = 0.0
-    """Time to be kept from before the release (s)."""
     first_index: int = 0
     """Oldest sample that is kept: nothing is armed until it is as old as the pretrigger."""
     relative_range_m: float | None = None
     """Gauge 2 reads from minus to plus this (m); None where it is not known."""
     gauge_2_on_base: bool = False
-    """Gauge 2 measures the plate against the base, and not against the table."""
     expected_excursion: Excursion | None = None
     """How far the plate is expected to go; None takes the largest of any plate."""
     side: int = 0
@@ -140,7 +136,6 @@ class Transition:
     state: PullbackState
     index: int
     note: Message = EMPTY
-    """What the operator must know, where something did not go as it should."""
     is_stored: bool = False
     """The note is about the run itself, and is stored in its file."""
     end_reason: EndReason | None = None

@@ -99,10 +99,7 @@ _FREE = (PullbackState.RELEASED, PullbackState.SLIPPING, PullbackState.NO_SLIP, 
 
 
 class PullbackStateMachine:
-    """Follows one test to its end; it needs every sample.
-
-    A release is awaited from sample `armed_index` on; earlier samples are context.
-    """
+    """Follows one test to its end; it needs every sample. Those before `armed_index` are context."""
 
     def __init__(self, plan: PullbackPlan, armed_index: int = 0) -> None:
         self.state = PullbackState.ZERO
@@ -154,10 +151,7 @@ class PullbackStateMachine:
         )
 
     def add_samples(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Transition]:
-        """Take consecutive samples (n,) from `first_index` on, NaN where there is no reading.
-
-        Returns the transitions, in order. The index of the last one, CLOSING, is where the run ends.
-        """
+        """Take consecutive samples (n,), NaN where there is no reading; return the transitions in order."""
         bins, seen = self._binning.add(first_index, table_m, relative_m), 0
         while seen < len(bins):
             until_tick = self._bins_per_tick - self._bins % self._bins_per_tick
@@ -305,7 +299,6 @@ class PullbackStateMachine:
         return 1.0 if self.state is PullbackState.PULLING else _LEEWAY
 
     def _off_m(self) -> float:
-        """Distance (m) by which the table is pulled beyond the target; 0 without one."""
         wanted_m = self._plan.target_m
         return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
@@ -379,7 +372,6 @@ class PullbackStateMachine:
                 self._transitions.append(Transition(self.state, end_index, hint))
 
     def _hint(self, now: float) -> Message:
-        """Reason why the test does not proceed, where the operator may not see it."""
         if now - self._entered_at < self._span(_HINT_AFTER_S):
             return EMPTY
         if self.state is PullbackState.ZERO:

@@ -65,7 +65,6 @@ class Trigger:
 
     @property
     def start_index(self) -> int | None:
-        """First sample to store; None before that is known."""
         if self._is_untriggered:
             return self._armed_index
         if not self.measurement.release_confirmed or self.measurement.release_index is None:

@@ -62,7 +62,6 @@ class ReadQueue:
             self._changed.notify()
 
     def take(self, timeout_s: float) -> RawRead | None:
-        """Oldest read that waits; None when nothing comes in time."""
         with self._changed:
             if not self._waiting:
                 self._changed.wait(timeout_s)
@@ -84,11 +83,7 @@ class ReadQueue:
 def create_source(
     settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
-    """Create the source of the device, or of both devices. Raises SettingsError.
-
-    `rate_hz` is the rate asked for, or that of an earlier recording. `facts` are device settings that an
-    earlier recording noted; they hold the rates of two devices.
-    """
+    """Create the source of one device or two; `facts` are settings noted earlier. Raises SettingsError."""
     protocol = find_driver(settings.protocol)
     if settings.relative_url:
         return make_pair(protocol, settings.device, settings.rate_hz, facts)
@@ -103,10 +98,7 @@ def create_source(
 
 
 class PortOpener:
-    """Opens the port of a device, or the ports of two; from the second time on, those of the same devices.
-
-    Raises SettingsError if both gauges have the same port.
-    """
+    """Opens the port of a device, or of two; later, of the same ones. Raises SettingsError."""
 
     def __init__(self, settings: PortSettings, source: SampleSource) -> None:
         baud = settings.baud or find_driver(settings.protocol).default_baud_for(settings.device)
@@ -152,7 +144,6 @@ class Connection:
 
     @property
     def ended(self) -> ReaderEnd | None:
-        """Why no more will come, once all reads were taken."""
         return self._ended if self._queue.is_empty else None
 
     def close(self, *, stop_device: bool = False) -> None:
@@ -180,11 +171,7 @@ _UNWATCHED_S = 1.0
 
 
 class Reconnection:
-    """A search for a lost device, in a thread of its own.
-
-    `open_port` opens the port of the device, wherever it is now. A read of no bytes in the queue marks the
-    broken link; those of the new connection follow.
-    """
+    """Searches for a lost device in a thread; in the queue, a read of no bytes marks the broken link."""
 
     def __init__(
         self, open_port: Callable[[], OpenPort], source: SampleSource, read_queue: ReadQueue
@@ -217,7 +204,6 @@ class Reconnection:
         return connection
 
     def stop(self) -> None:
-        """End the search, and close a connection that was not taken."""
         self._stopping.set()
         self._thread.join()
         if self._connection is not None:

@@ -44,13 +44,11 @@ class DecodedRead:
     """One read of the port, or several consecutive ones, with the samples that they completed."""
 
     data: bytes
-    """As they came."""
     arrival_ns: int
     """Host's monotonic time after the read."""
     rows: tuple[CalibratedBlock, ...]
     """In order, without holes."""
     losses: Losses
-    """What this read added to the losses of the stream."""
 
 
 def concatenate(parts: tuple[CalibratedBlock, ...]) -> tuple[CalibratedBlock, ...]:
@@ -81,7 +79,6 @@ class ReadHistory:
         self.span = span
         self._reads: deque[DecodedRead] = deque()
         self.next_index = 0
-        """Index of the sample that comes next."""
 
     def add(self, read: DecodedRead) -> None:
         self._reads.append(read)
@@ -105,7 +102,7 @@ class ReadHistory:
 
 
 def _end_index(read: DecodedRead) -> int:
-    """Index after the last sample of a read; reads that completed none go with the next one that did."""
+    """Reads that completed no sample go with the next one that did."""
     return read.rows[-1].end_index if read.rows else -1
 
 
@@ -128,11 +125,7 @@ class StreamFault:
 
 
 class LiveStream:
-    """A device that sends; make it with `open_stream`, use it with `with` or `close`.
-
-    When the device is lost, or sends nothing intelligible for a while, it is looked for until it is back:
-    `reopen` opens its port. `take_events` reports it, and `fault` tells whether a run should still wait.
-    """
+    """A device that sends, looked for whenever it is lost. Make it with `open_stream`; use it with `with`."""
 
     def __init__(
         self,
@@ -145,9 +138,7 @@ class LiveStream:
         self.read_queue = read_queue
         """Where reads wait to be decoded; a journal may take them before that."""
         self.losses = Losses()
-        """Of the whole stream until now."""
         self.rate_hz = source.rate_hz
-        """Nominal samples a second."""
         self._connection: Connection | None = connection
         self._source = source
         self._gauges = gauges
@@ -218,11 +209,7 @@ class LiveStream:
         return events
 
     def next_read(self, timeout_s: float) -> DecodedRead | None:
-        """Decode the next read; None when nothing came within `timeout_s`.
-
-        A read without data marks that the connection was broken before what comes next. Raises
-        StreamEndedError when this computer is too slow to take what comes, or what comes makes no sense.
-        """
+        """Decode the next read; one without data marks a broken connection. Raises StreamEndedError."""
         self._events.extend(StreamNotice(as_message(note)) for note in self._host.check())
         if self._connection is None:
             self._look_for_device(timeout_s)
@@ -234,7 +221,7 @@ class LiveStream:
         return decoded
 
     def set_read_pause(self, pause_s: float) -> None:
-        """Let bytes collect in the port for so long before each read (s): cheaper, and so much later."""
+        """Let bytes collect in the port for so long before each read (s)."""
         self._source.batch_delay_s = pause_s
 
     def close(self) -> None:
@@ -313,11 +300,7 @@ class LiveStream:
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
-    """Open the port, start the device and begin to read; both, where there are two.
-
-    Raises DriverError for an unknown protocol or setting, a port that is absent or busy, or a device that
-    sends nothing intelligible within 3 s.
-    """
+    """Open the port or both ports, start the device and begin to read. Raises DriverError."""
     source = create_source(settings, settings.rate_hz)
     opener = PortOpener(settings, source)
     source.prepare()

@@ -49,10 +49,7 @@ class RateMonitor:
         self._begin()
 
     def estimate(self) -> ClockEstimate | None:
-        """Clock of the device, by the longest stretch without an estimated gap.
-
-        None if that is too short, or has too many holes.
-        """
+        """Clock of the device by the longest stretch without a gap; None if that is too short."""
         present = self._whole.estimate()
         if (
             present is None
@@ -69,10 +66,7 @@ class RateMonitor:
         return self._recent
 
     def add(self, index: int, arrival_ns: int) -> Message:
-        """Take the last sample; return a note when the rate has become wrong, else EMPTY.
-
-        `index` counts from the first sample of the stream, gaps included; `arrival_ns` is the host's time.
-        """
+        """Take the last sample of a read; return a note when the rate has become wrong, else EMPTY."""
         before_ns, self._latest_ns = self._latest_ns, arrival_ns
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
@@ -98,10 +92,7 @@ class RateMonitor:
         self._window, self._window_ns = ClockFit(self._rate_hz), arrival_ns
 
     def _check_window(self, arrival_ns: int) -> Message:
-        """Check the rate at the end of a window: a wrong one is as wrong as in the window before.
-
-        Where a busy host takes the bytes late, each window shows another rate.
-        """
+        """A wrong rate is as wrong as in the window before; on a busy host, windows differ."""
         latest, before = self._window.estimate(), self._before
         self._before = latest
         self._begin_window(arrival_ns)
@@ -144,10 +135,7 @@ may take a second."""
 
 
 class StallDetector:
-    """Measures the time since the last good sample. Bytes without a sample do not count.
-
-    `port` is named in messages; `start_ns` is the host's time at which the connection began.
-    """
+    """Measures the time since the last good sample. Bytes without a sample do not count."""
 
     def __init__(self, port: str, source: SampleSource, start_ns: int) -> None:
         self._port = port
@@ -161,7 +149,6 @@ class StallDetector:
         self._garbage = b""
 
     def add_read(self, arrival_ns: int, data: bytes, *, has_samples: bool) -> None:
-        """Take a read, which held samples or not."""
         if has_samples:
             self._last_sample_ns = self._quiet_ns = arrival_ns
             self._garbage = b""
@@ -172,10 +159,7 @@ class StallDetector:
         return (host_ns() - self._last_sample_ns) * 1e-9
 
     def is_stalled(self, read_ns: int) -> bool:
-        """Tell whether to give the connection up. Ask often.
-
-        `read_ns` is the host's time of the last read of the port, whose thread alone may be kept waiting.
-        """
+        """Tell whether to give the connection up; `read_ns` is the time of the last read. Ask often."""
         now_ns = host_ns()
         is_watched = now_ns - self._checked_ns < _UNWATCHED_S * 1e9
         if not is_watched or now_ns - read_ns > _UNREAD_S * 1e9:  # without a reader, silence proves nothing

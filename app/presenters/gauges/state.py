@@ -36,7 +36,6 @@ class GaugeCard:
 
     name: str
     validity: Chip
-    """Whether it is valid, and until when."""
     values: tuple[LabelledValue, ...]
     check: Chip = EMPTY_CHIP
     """Outcome of the last check against a known displacement."""
@@ -47,18 +46,13 @@ class GaugesState:
     """State of the screen, apart from the tabs that have a presenter of their own."""
 
     cards: tuple[GaugeCard, ...]
-    """Gauge 1 first."""
     file: str = ""
-    """File of the calibrations in use."""
     checks_fault: Chip = EMPTY_CHIP
-    """Why the record of checks cannot be read."""
     tab: GaugesTab = GaugesTab.HEALTH
     device: str = ""
-    """The connected device; empty without one."""
     health: "tuple[GaugeHealthState, ...]" = ()
     """Empty while nothing is known."""
     health_note: str = ""
-    """Why nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +86,7 @@ class PortsState:
 
     ports: tuple[PortCard, ...] = ()
     progress: str = ""
-    """What the probe is doing; empty while none runs."""
     message: Chip = EMPTY_CHIP
-    """Outcome of the last probe."""
     query_silent: bool = False
     """Whether the probe sends identification requests to silent devices."""
 
@@ -127,14 +119,11 @@ class CalibrationData:
     """What a calibration is fitted to, and how."""
 
     points: tuple[CalibrationPoint, ...]
-    """In the order in which they were taken."""
     degree: int
     resolution_m: float
-    """Of the dial gauge."""
     uncertainty_m: float | None
     """Of the dial gauge; None where it is not stated."""
     file_name: str
-    """File of the points, in the folder of settings."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,7 +136,6 @@ class CalibrationFit:
     upward: NDArray[np.bool_]
     """(n,) bool: whether the dial was rising."""
     values: tuple[LabelledValue, ...]
-    """Gain, zero, linearity and uncertainty."""
     warnings: tuple[str, ...]
 
 
@@ -157,7 +145,6 @@ class CalibrationState:
 
     form: CalibrationForm = CalibrationForm()
     live_value: str = ""
-    """Mean counts now; empty without samples."""
     live_note: str = NO_DEVICE
     """Noise of the counts, or why there are none."""
     points: tuple[CalibrationPoint, ...] = ()
@@ -165,7 +152,6 @@ class CalibrationState:
     """Progress of the reading being averaged; empty while none is."""
     fit: CalibrationFit | None = None
     message: Chip = EMPTY_CHIP
-    """Outcome of the last action, or what is missing."""
     can_save: bool = False
     offers_reconnect: bool = False
     """Whether the device is still read with the previous calibration."""
@@ -209,7 +195,6 @@ class CheckState:
     is_started: bool = False
     """Whether a check is under way, which locks the form."""
     instruction: str = ""
-    """The operator's next step; empty without one."""
     reading_status: str = ""
     """Progress of the reading being averaged; empty while none is."""
     outcome: Chip = EMPTY_CHIP
@@ -217,4 +202,3 @@ class CheckState:
     """Known and measured step, tolerance, and the budget of the tolerance."""
     warnings: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
-    """What is missing or failed."""
