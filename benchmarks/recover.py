@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import msgspec
 import numpy as np
 
-from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened, encode_metadata_record
+from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.blocks import BlockLayout
@@ -59,7 +60,7 @@ def write_journal(path: Path, counts: np.ndarray, rate_hz: float) -> None:
         file.write(MAGIC)
 
         def note(content: JournalHeader | Opened | Mark) -> None:
-            file.write(encode_record(encode_metadata_record(content), FIRST_READ_NS, RecordKind.NOTE))
+            file.write(encode_record(msgspec.json.encode(content), FIRST_READ_NS, RecordKind.NOTE))
 
         note(JournalHeader(port, run, metadata, "6b1f0f6e-0000-4000-8000-000000000002", "benchmark"))
         note(Opened(0, start, BlockLayout(), 0))

@@ -78,14 +78,6 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Mess
     return EMPTY
 
 
-@dataclass(frozen=True, slots=True)
-class DiskWarning:
-    """A warning about the free space, and whether the run must end now."""
-
-    note: Message
-    must_end: bool = False
-
-
 class DiskSpaceMonitor:
     """Follows the free space while a run is recorded."""
 
@@ -94,31 +86,22 @@ class DiskSpaceMonitor:
         self._demand = demand
         self._is_warned = False
 
-    def update(self, free: int | None, journal_bytes: int) -> DiskWarning | None:
-        """Return a new warning about `free` bytes, None without one. Call it a few times a second."""
+    def update(self, free: int | None, journal_bytes: int) -> Message:
+        """Return a new warning about `free` bytes, or EMPTY. Raises DiskSpaceError when the run must end."""
         if free is None:
-            return None
+            return EMPTY
         spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
         if spare_s < _CLOSING_S:
-            return DiskWarning(
-                message(
-                    "{folder}: the disk has only {free} left, which closing this run takes. Free some"
-                    " space or record to another disk",
-                    folder=self._folder,
-                    free=_megabytes(free),
-                ),
-                must_end=True,
+            template = N_(
+                "{folder}: the disk has only {free} left, which closing this run takes. Free some"
+                " space or record to another disk"
             )
+            raise DiskSpaceError(template, folder=self._folder, free=_megabytes(free))
         if spare_s > _WARN_S or self._is_warned:
-            return None
+            return EMPTY
         self._is_warned = True
-        return DiskWarning(
-            message(
-                "the disk has {free} left, enough for {spare_s:.0f} s more: free some space now",
-                free=_megabytes(free),
-                spare_s=spare_s,
-            )
-        )
+        template = N_("the disk has {free} left, enough for {spare_s:.0f} s more: free some space now")
+        return message(template, free=_megabytes(free), spare_s=spare_s)
 
 
 def _megabytes(size: float) -> str:

@@ -343,14 +343,13 @@ class Engine:
         recording = self._recording
         if recording is None or self._disk is None or recording.is_ending:
             return
-        warning = self._disk.update(self._space.free_bytes, recording.journal_bytes)
-        if warning is None:
-            return
-        _log.warning("%s", warning.note)
-        if warning.must_end:
-            self._end_all(messages.EndReason.DISK_FULL, warning.note)
+        try:
+            warning = self._disk.update(self._space.free_bytes, recording.journal_bytes)
+        except DiskSpaceError as error:
+            _log.warning("%s", error)
+            self._end_all(messages.EndReason.DISK_FULL, message_of(error))
         else:
-            recording.add_note(warning.note)
+            recording.add_note(warning)
 
     def _disk_demand(self) -> DiskDemand:
         return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)

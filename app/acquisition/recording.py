@@ -169,7 +169,7 @@ class Recording:
             self.end(EndReason.ENOUGH)
 
     def add_note(self, note: Message) -> None:
-        if not self.is_ending:
+        if note and not self.is_ending:
             self._store_note(note)
             self.show_note(note)
 

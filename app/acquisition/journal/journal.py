@@ -20,7 +20,7 @@ import msgspec
 
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.file import JournalFile, create_journal_file
-from app.acquisition.journal.records import JournalHeader, Known, Mark, MetadataRecord, encode_metadata_record
+from app.acquisition.journal.records import JournalHeader, Known, Mark, MetadataRecord
 from app.acquisition.pullback.plan import PullbackMeasurement
 from app.acquisition.stream.connection import RawRead
 from app.acquisition.stream.live_stream import DecodedRead
@@ -90,7 +90,7 @@ class Journal:
         return start
 
     def append_metadata(self, note: MetadataRecord) -> None:
-        self.append(encode_metadata_record(note), time.monotonic_ns(), RecordKind.NOTE)
+        self.append(msgspec.json.encode(note), time.monotonic_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
         """Bring everything to disk and close the file. Raises like `append`."""
@@ -155,7 +155,7 @@ class Journal:
 
 def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:
     """Create a journal, which moves to a fallback folder when its own fails. Raises JournalError."""
-    record = encode_record(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
+    record = encode_record(msgspec.json.encode(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
         file = create_journal_file(path, record, fallback_folders)
     except LockHeldError:

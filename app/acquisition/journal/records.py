@@ -1,6 +1,7 @@
 """Metadata records of a journal: written as facts of the run become known, read by `recovery`."""
 
 import datetime
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -115,16 +116,7 @@ def end_metadata(
 
 
 MetadataRecord = JournalHeader | Mark | Opened | Named | Ended
-_DECODER: msgspec.json.Decoder[MetadataRecord] = msgspec.json.Decoder(MetadataRecord)
-
-
-def encode_metadata_record(note: MetadataRecord) -> bytes:
-    return msgspec.json.encode(note)
-
-
-def decode_metadata_record(data: bytes) -> MetadataRecord:
-    """Raises msgspec.DecodeError, or ValueError from what it holds."""
-    return _DECODER.decode(data)
+decode_metadata_record: Callable[[bytes], MetadataRecord] = msgspec.json.Decoder(MetadataRecord).decode
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,10 @@ from app.presenters.gauges.state import (
     CalibrationPoint,
     CalibrationState,
 )
-from app.presenters.number_text import format_fixed, parse_number
+from app.presenters.number_text import FormError, format_fixed, parse_number
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 
 if TYPE_CHECKING:
     from app.presenters.gauges import tasks
@@ -76,8 +76,8 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         """Begin a reading at the dial reading (mm) that was typed."""
         try:
             dial_mm = _millimetres(dial_text, gettext("Dial"))
-        except ValueError as error:
-            self._update(message=Chip(str(error), Tone.BAD))
+        except FormError as error:
+            self._update(message=Chip(sentence(error.message), Tone.BAD))
             return
         if not self._is_connected or not self._averager.start():
             self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
@@ -110,8 +110,8 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         form, today = self.state.form, self._now().date()
         try:
             data, valid_until = self._data(), _last_day(form.valid_until, today)
-        except ValueError as error:
-            self._update(message=Chip(str(error), Tone.BAD))
+        except FormError as error:
+            self._update(message=Chip(sentence(error.message), Tone.BAD))
             return
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         self._worker.submit(
@@ -193,8 +193,8 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             return
         try:
             data = self._data()
-        except ValueError as error:
-            self._update(can_save=False, message=Chip(str(error), Tone.BAD))
+        except FormError as error:
+            self._update(can_save=False, message=Chip(sentence(error.message), Tone.BAD))
             return
         points = data.points
         self._worker.submit(
@@ -226,7 +226,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         self._update(message=Chip(sentence(failure.message), Tone.BAD), can_save=True)
 
     def _data(self) -> CalibrationData:
-        """What the form asks to fit. Raises ValueError."""
+        """What the form asks to fit. Raises FormError."""
         form, uncertainty_m = self.state.form, None
         if form.uncertainty_mm.strip():
             uncertainty_mm = _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0)
@@ -254,35 +254,24 @@ def _format_counts(average: AveragedCounts) -> tuple[str, str]:
 
 
 def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
-    """Parse a length (mm). Raises ValueError that names value and remedy."""
+    """Parse a length (mm). Raises FormError that names value and remedy."""
     value_mm = parse_number(text)
     if value_mm is None or math.isnan(value_mm) or value_mm < least:
+        template = N_("{name} {text!r} is not a number of millimetres{limit}: write one like 2.5")
         limit = gettext(", 0 or above") if least == 0.0 else ""
-        raise ValueError(
-            gettext(
-                "{name} {text!r} is not a number of millimetres{limit}: write one like 2.5",
-                name=name,
-                text=text.strip(),
-                limit=limit,
-            )
-        )
+        raise FormError(template, name=name, text=text.strip(), limit=limit)
     return value_mm
 
 
 def _last_day(text: str, today: datetime.date) -> datetime.date | None:
-    """Parse the last day of validity. Raises ValueError."""
+    """Parse the last day of validity. Raises FormError."""
     if not text.strip():
         return None
     try:
         day = datetime.date.fromisoformat(text.strip())
     except ValueError:
-        raise ValueError(
-            gettext(
-                "Valid until {text!r} is no day: write it like {day}",
-                text=text.strip(),
-                day=today.isoformat(),
-            )
-        ) from None
+        template = N_("Valid until {text!r} is no day: write it like {day}")
+        raise FormError(template, text=text.strip(), day=today.isoformat()) from None
     if day < today:
-        raise ValueError(gettext("Valid until {day} is past: write a day to come", day=day))
+        raise FormError("Valid until {day} is past: write a day to come", day=day)
     return day

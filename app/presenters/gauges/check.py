@@ -1,6 +1,5 @@
 """Presenter of the tab Check: compares a gauge with a known step, and records the outcome."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -18,7 +17,7 @@ from app.presenters.gauges.state import (
     CheckOutcome,
     CheckState,
 )
-from app.presenters.number_text import parse_number
+from app.presenters.number_text import FormError, parse_field
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
@@ -82,8 +81,8 @@ class CheckPresenter(Presenter[CheckState]):
     def _start(self) -> None:
         try:
             form = _normalised(self.state.form)
-        except ValueError as error:
-            self._update(message=Chip(str(error), Tone.BAD))
+        except FormError as error:
+            self._update(message=Chip(sentence(error.message), Tone.BAD))
             return
         self._rest = None
         self._update(
@@ -127,15 +126,13 @@ class CheckPresenter(Presenter[CheckState]):
 
 
 def _normalised(form: CheckForm) -> CheckForm:
-    """Normalise the fields. Raises ValueError that names field, value and remedy."""
-    known = _number(form.known, gettext("Known"))
+    """Raises FormError that names field, value and remedy."""
+    known = parse_field(form.known, gettext("Known"))
     if known is None or known == 0.0:
-        raise ValueError(gettext("Say how far the gauge is moved, with its sign: a number that is not 0"))
-    uncertainty = _number(form.uncertainty, gettext("Its uncertainty"))
+        raise FormError("Say how far the gauge is moved, with its sign: a number that is not 0")
+    uncertainty = parse_field(form.uncertainty, gettext("Its uncertainty"))
     if uncertainty is not None and uncertainty < 0.0:
-        raise ValueError(
-            gettext("Its uncertainty {text} is below 0: write a standard uncertainty", text=uncertainty)
-        )
+        raise FormError("Its uncertainty {text} is below 0: write a standard uncertainty", text=uncertainty)
     return replace(
         form,
         known=repr(known),
@@ -143,15 +140,6 @@ def _normalised(form: CheckForm) -> CheckForm:
         reference=form.reference.strip(),
         checked_by=form.checked_by.strip(),
     )
-
-
-def _number(text: str, name: str) -> float | None:
-    value = parse_number(text)
-    if value is not None and math.isnan(value):
-        raise ValueError(
-            gettext("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
-        )
-    return value
 
 
 def _rest_instruction(form: CheckForm) -> str:

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFrame,
-    QGridLayout,
     QHeaderView,
     QLineEdit,
-    QScrollArea,
     QTableWidget,
     QTableWidgetItem,
     QWidget,
@@ -30,15 +28,15 @@ from app.presenters.gauges.state import (
 )
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, colour
-from app.qt.widgets.inputs import CheckBox, ComboBox, make_button, show_texts
-from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row
+from app.qt.widgets.inputs import CheckBox, make_button, make_choice, make_fields, show_texts
+from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
-_DEGREES = (N_("line"), N_("polynomial of degree 2"), N_("polynomial of degree 3"))
+_DEGREES = {1: N_("line"), 2: N_("polynomial of degree 2"), 3: N_("polynomial of degree 3")}
 _HOW = N_(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
 )
@@ -52,32 +50,38 @@ _FIELDS = {
 }
 
 
-class CalibratePanel(QScrollArea):
+class CalibratePanel(QWidget):
     """Draws `CalibrationState`."""
 
     def __init__(self, theme: Theme, presenter: CalibrationPresenter, reconnect: Callable[[], None]) -> None:
         super().__init__()
         self._presenter = presenter
         self._form = CalibrationForm()
-        self._readings = _ReadingColumn(presenter, self._fill_gauge)
+        self._readings = _ReadingColumn(presenter, lambda gauge: self._fill(gauge=gauge))
         self._plot = ResidualPlot(theme)
         self._merits = ValueGrid()
         self._cautions = label(muted=True, wrap=True)
-        self._degree = ComboBox()
-        self._degree.addItems([gettext(name) for name in _DEGREES])
-        self._fields = {name: QLineEdit() for name in _FIELDS}
+        self._degree = make_choice(_DEGREES)
+        self._degree.activated.connect(lambda _: self._fill(degree=self._degree.currentData()))
+        self._fields = make_fields(_FIELDS, self._fill)
         self._use = CheckBox(gettext("Take it for all runs from now on"))
+        self._use.clicked.connect(lambda is_used: self._fill(use=is_used))
         self._save = make_button(gettext("Save calibration"), presenter.save)
         hint = gettext("The device is still read by the calibration before")
         self._again = make_button(gettext("Connect again"), reconnect, hint)
         self._shown: CalibrationFit | None = None
-        self._lay_out()
-        self._connect()
+        fields = ((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
+        form = make_form_grid(((gettext("Curve"), self._degree), *fields))
+        buttons = make_row(self._save, self._again, STRETCH, spacing=8)
+        parts = (self._plot, self._merits, self._cautions, form, self._use, buttons, STRETCH)
+        inside = QWidget()
+        make_row(self._readings, (make_column(*parts, spacing=8), 1), spacing=16, margins=(16, 8), of=inside)
+        make_column(make_scroll_area(inside), of=self)
 
     def show_state(self, state: CalibrationState) -> None:
         self._form = state.form
         self._readings.show_state(state)
-        self._degree.setCurrentIndex(state.form.degree - 1)
+        self._degree.setCurrentIndex(self._degree.findData(state.form.degree))
         self._use.setChecked(state.form.use)
         show_texts(self._fields, state.form)
         self._save.setEnabled(state.can_save)
@@ -89,51 +93,12 @@ class CalibratePanel(QScrollArea):
             set_text_or_hide(self._cautions, "\n".join(state.fit.warnings) if state.fit else "")
 
     def add_keys(self, screen: QWidget) -> None:
-        """Let keys do what the buttons do, as long as the screen is shown."""
         bind_button(self._save, "Ctrl+S", gettext("Write a new dated file beside the one in use"), screen)
         self._readings.add_keys(screen)
 
-    def _fill_gauge(self, gauge: int) -> None:
-        self._presenter.set_form(replace(self._form, gauge=gauge))
-
-    def _fill(self) -> None:
-        filled = replace(self._form, degree=self._degree.currentIndex() + 1, use=self._use.isChecked())
-        for name, field in self._fields.items():
-            filled = replace(filled, **{name: field.text()})  # type: ignore[arg-type]  # all of them are texts
-        self._presenter.set_form(filled)
-
-    def _connect(self) -> None:
-        self._degree.activated.connect(lambda _: self._fill())
-        self._use.clicked.connect(lambda _: self._fill())
-        for field in self._fields.values():
-            field.textEdited.connect(lambda _: self._fill())
-
-    def _lay_out(self) -> None:
-        inside = QWidget()
-        buttons = make_row(self._save, self._again, STRETCH, spacing=8)
-        right = make_column(
-            self._plot,
-            self._merits,
-            self._cautions,
-            self._form_grid(),
-            self._use,
-            buttons,
-            STRETCH,
-            spacing=8,
-        )
-        make_row(self._readings, (right, 1), spacing=16, margins=(16, 8), of=inside)
-        self.setProperty("role", "column")
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setWidget(inside)
-        self.setWidgetResizable(True)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-
-    def _form_grid(self) -> QGridLayout:
-        for name, field in self._fields.items():
-            field.setPlaceholderText(gettext(_FIELDS[name][1]))
-        fields = ((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
-        return make_form_grid(((gettext("Curve"), self._degree), *fields))
+    def _fill(self, **changes: Any) -> None:
+        changes |= {name: field.text() for name, field in self._fields.items()}
+        self._presenter.set_form(replace(self._form, **changes))
 
 
 class _ReadingColumn(QWidget):
@@ -143,25 +108,27 @@ class _ReadingColumn(QWidget):
         super().__init__()
         self.setFixedWidth(_COLUMN_WIDTH)
         self._presenter = presenter
-        self._gauge = ComboBox()
-        self._gauge.addItems([gettext(name) for name in NAMES])
+        self._gauge = make_choice(dict(enumerate(NAMES)))
         self._gauge.setAccessibleName(gettext("Gauge to calibrate"))
+        self._gauge.activated.connect(choose)
         self._live = label(role=TextRole.NUMBER)
+        self._live.setAccessibleName(gettext("Counts now"))
         self._spread = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._live.setAccessibleName(gettext("Counts now"))
         self._dial = QLineEdit()
         self._dial.setPlaceholderText(gettext("dial reading, mm"))
         self._dial.setAccessibleName(gettext("Dial reading in millimetres"))
         self._dial.setToolTip(gettext("Enter averages the counts and takes the reading"))
+        self._dial.returnPressed.connect(self._take)
         self._waiting = label(wrap=True)
         self._undo = make_button(gettext("Undo"), presenter.undo)
         hint = gettext("Begin another calibration; the readings stay in their file")
         self._restart = make_button(gettext("Start over"), presenter.restart, hint)
         self._table = _ReadingsTable()
-        self._gauge.activated.connect(choose)
-        self._dial.returnPressed.connect(self._take)
-        self._lay_out()
+        how = label(gettext(_HOW), muted=True, wrap=True)
+        texts = (self._live, self._spread, self._dial, self._waiting, self._message)
+        buttons = make_row(self._undo, self._restart, spacing=8)
+        make_column(self._gauge, how, *texts, buttons, (self._table, 1), spacing=8, of=self)
 
     def show_state(self, state: CalibrationState) -> None:
         self._gauge.setCurrentIndex(state.form.gauge)
@@ -181,21 +148,6 @@ class _ReadingColumn(QWidget):
     def _take(self) -> None:
         self._presenter.take_point(self._dial.text())
         self._dial.selectAll()
-
-    def _lay_out(self) -> None:
-        make_column(
-            self._gauge,
-            label(gettext(_HOW), muted=True, wrap=True),
-            self._live,
-            self._spread,
-            self._dial,
-            self._waiting,
-            self._message,
-            make_row(self._undo, self._restart, spacing=8),
-            (self._table, 1),
-            spacing=8,
-            of=self,
-        )
 
 
 class _ReadingsTable(QTableWidget):

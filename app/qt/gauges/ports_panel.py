@@ -47,7 +47,6 @@ class PortsPanel(QWidget):
             self._list.setWidget(self._rows(state.ports))
 
     def add_keys(self, screen: QWidget) -> None:
-        """Let keys do what the buttons do, as long as the screen is shown."""
         bind_button(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 
     def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:

@@ -126,3 +126,12 @@ def show_texts(fields: Mapping[str, QLineEdit], form: object) -> None:
     for name, field in fields.items():
         if field.text() != getattr(form, name):
             field.setText(getattr(form, name))
+
+
+def make_fields(texts: Mapping[str, tuple[str, str]], edited: Callable[[], object]) -> dict[str, QLineEdit]:
+    """Make line edits by name; the second of each pair of texts stands in the empty field."""
+    fields = {name: QLineEdit() for name in texts}
+    for name, field in fields.items():
+        field.setPlaceholderText(gettext(texts[name][1]))
+        field.textEdited.connect(lambda _text: edited())
+    return fields

@@ -7,6 +7,7 @@ from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import free_bytes, has_free_space
+from messages.message import EMPTY
 
 DEMAND = DiskDemand(rate_hz=10_000.0, wire_bytes_per_s=90_000.0)
 PULLBACK = RunSettings("/runs", duration_s=60.0, pretrigger_s=1.0, trigger_timeout_s=600.0)
@@ -55,13 +56,12 @@ def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_pa
     watch, journal_bytes = DiskSpaceMonitor(tmp_path, DEMAND), 10_000_000
     per_s = DEMAND.run_bytes_per_s + DEMAND.journal_bytes_per_s
     closing = journal_bytes + (4 << 20)
-    assert watch.update(int(closing + 61 * per_s), journal_bytes) is None
-    news = watch.update(int(closing + 59 * per_s), journal_bytes)
-    assert not news.must_end
-    assert "enough for 59 s more" in str(news.note)
-    assert watch.update(int(closing + 59 * per_s), journal_bytes) is None
-    assert watch.update(int(closing + 2.9 * per_s), journal_bytes).must_end
-    assert watch.update(None, journal_bytes) is None
+    assert watch.update(int(closing + 61 * per_s), journal_bytes) == EMPTY
+    assert "enough for 59 s more" in str(watch.update(int(closing + 59 * per_s), journal_bytes))
+    assert watch.update(int(closing + 59 * per_s), journal_bytes) == EMPTY
+    with pytest.raises(DiskSpaceError, match="which closing this run takes"):
+        watch.update(int(closing + 2.9 * per_s), journal_bytes)
+    assert watch.update(None, journal_bytes) == EMPTY
 
 
 def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from engine_kit import gone
 
 from analysis.synthetic import Truth, simulate_readings
-from app.acquisition.live_client import DIED_NOTE, LiveClient, LiveIdentifier
+from app.acquisition.live_client import DIED_NOTE, LiveIdentifier, spawn_live
 from app.acquisition.live_follower import RunFollower
 from app.acquisition.messages import FollowRun, LiveResult
 from app.acquisition.ring import create_ring, open_ring
@@ -29,16 +29,23 @@ TRUTH = Truth(rate_hz=1000.0, duration_s=6.0, offsets_m=(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
-def client():
-    process = LiveClient.start()
-    yield process
-    process.stop()
-
-
-@pytest.fixture
-def ring(tmp_path):
-    with create_ring(tmp_path / "live.ring", 1 << 15, 1000.0, GAUGES) as made:
+def ring(tmp_path_factory):
+    with create_ring(tmp_path_factory.mktemp("ring") / "live.ring", 1 << 15, 1000.0, GAUGES) as made:
         yield made
+
+
+@pytest.fixture(scope="module")
+def time_bases():
+    """The latest one is known to the engine."""
+    return [TIMED]
+
+
+@pytest.fixture(scope="module")
+def identifier(ring, time_bases):
+    made = LiveIdentifier(str(ring.path), lambda _: time_bases[-1])
+    made.prepare()
+    yield made
+    made.stop()
 
 
 @pytest.fixture(scope="module")
@@ -62,25 +69,27 @@ def fill(ring, damaged=slice(0, 0)):
     table, relative = (np.concatenate((np.full(BEFORE, 0.5), column)) for column in (table, relative))
     status = np.zeros(len(table), np.uint8)
     status[BEFORE:][damaged] = SampleStatus.DAMAGED
+    first_row = ring.written + BEFORE
     ring.append(counts_of(table, relative), status)
-    return BEFORE
+    return first_row
 
 
-def result_of(client):
+def result_of(identifier, first_row, metadata, now_s=0.0):
     deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline and not client.has_ended:
-        result = client.take_result()
+    while time.monotonic() < deadline:
+        result = identifier.poll(first_row, metadata, now_s)
         if result is not None:
+            assert result.message != DIED_NOTE
             return result
         time.sleep(0.01)
     raise AssertionError("no result")
 
 
 @pytest.mark.parametrize("damaged", [slice(0, 0), slice(2500, 2530)])
-def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
-    client.follow(FollowRun(str(ring.path), fill(ring, damaged), metadata, TIMED))
+def test_a_run_in_the_ring_is_identified(identifier, ring, metadata, damaged):
+    first_row = fill(ring, damaged)
 
-    result = result_of(client)
+    result = result_of(identifier, first_row, metadata)
 
     friction, period = result.friction_dynamic, result.period
     assert friction is not None
@@ -88,57 +97,57 @@ def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
     assert friction.value == pytest.approx(0.1, abs=4.0 * friction.standard_uncertainty)
     assert period.value == pytest.approx(0.32, abs=4.0 * period.standard_uncertainty)
     assert result.law == "coulomb"
-    assert result.time_s == pytest.approx(BEFORE / 1000.0 + 7.0, abs=0.01)
-    assert result.slip_end_s == pytest.approx(BEFORE / 1000.0 + 1.0 + 3.28, abs=0.01)
+    assert result.time_s == pytest.approx(first_row / 1000.0 + 7.0, abs=0.01)
+    assert result.slip_end_s == pytest.approx(first_row / 1000.0 + 1.0 + 3.28, abs=0.01)
     assert not result.is_enough
-    client.end_run()
+    identifier.end_run()
 
 
-def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
+def test_answers_are_of_the_run_that_is_followed(identifier, ring, metadata):
     first_row = fill(ring)
-    client.follow(FollowRun(str(ring.path), first_row, metadata, TIMED))
-    client.end_run()
-    client.follow(FollowRun(str(ring.path), first_row + 1, metadata, TIMED))
+    identifier.poll(first_row, metadata, 0.0)
+    identifier.end_run()
 
-    assert result_of(client).friction_dynamic is not None
-    client.end_run()
+    assert result_of(identifier, first_row + 1, metadata).friction_dynamic is not None
+    identifier.end_run()
     time.sleep(0.2)
-    client.take_result()
-    assert client.take_result() is None
+    assert identifier.poll(None, metadata, 0.0) is None
 
 
-def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadata):
-    first = fill(ring)
-    client.follow(FollowRun(str(ring.path), first, metadata, TIMED))
+def test_what_nobody_took_of_a_run_is_not_told_of_the_next(identifier, ring, metadata):
+    identifier.poll(fill(ring), metadata, 0.0)
     deadline = time.monotonic() + PATIENCE_S
-    while client._latest is None and time.monotonic() < deadline:
+    while identifier._latest is None and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert client._latest is not None
+    assert identifier._latest is not None
 
-    client.end_run()
+    identifier.end_run()
 
-    assert client.take_result() is None
+    assert identifier.poll(None, metadata, 0.0) is None
 
 
-def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
-    client.follow(FollowRun(str(ring.path), fill(ring), metadata, TIMED))
-    before = result_of(client)
-    client.update_clock(TimeBase(1.001, 1e-5))
+def test_the_clock_may_be_timed_anew_meanwhile(identifier, ring, metadata, time_bases):
+    first_row = fill(ring)
+    before = result_of(identifier, first_row, metadata)
+    time_bases.append(TimeBase(1.001, 1e-5))
+    identifier.poll(first_row, metadata, 2.0)
     more = 100
     ring.append(np.zeros((more, 2)), np.ones(more, np.uint8))
 
-    after = result_of(client)
+    after = result_of(identifier, first_row, metadata, 2.0)
 
     share = 1e-6 / (1e-6 + 1e-10)  # of the timed clock beside the nominal one
     assert after.period.value == pytest.approx(before.period.value * (1.0 + 0.001 * share), rel=2e-5)
     assert after.period.standard_uncertainty < before.period.standard_uncertainty
-    client.end_run()
+    identifier.end_run()
 
 
 def test_it_ends_with_its_pipe_in_the_middle_of_its_start():
-    process = LiveClient.start()
+    process = spawn_live()
+    identifier = LiveIdentifier("no.ring", lambda _: TIMED, lambda: process)
+    identifier.prepare()
 
-    process.stop()
+    identifier.stop()
 
     assert gone(process.pid)
 
@@ -148,7 +157,7 @@ def test_a_process_that_dies_is_told_of_once_and_replaced_at_the_next_arming(tmp
     started = []
 
     def start():
-        started.append(LiveClient.start())
+        started.append(spawn_live())
         return started[-1]
 
     watch = LiveIdentifier(str(tmp_path / "no.ring"), lambda _: TIMED, start)

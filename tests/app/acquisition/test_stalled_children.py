@@ -1,5 +1,6 @@
 """Processes, threads and disks that hang, stand still or die in the middle of a word."""
 
+import datetime
 import os
 import subprocess
 import sys
@@ -11,13 +12,15 @@ from app.acquisition.engine_client import EngineClient
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
-from app.acquisition.live_client import LiveClient
+from app.acquisition.live_client import DIED_NOTE, LiveIdentifier
 from app.acquisition.messages import Failed, Health
 from app.acquisition.stream.connection import Reconnection
 from app.acquisition.stream.monitors import StallDetector
 from app.child_process import encode_line
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
+from app.runs.metadata import create_metadata
+from config.files import load_gauges, load_stand
 from drivers.clock import TimeBase
 from drivers.devices.slipstand_binary.source import make_source
 from drivers.errors import PortUnavailableError
@@ -57,15 +60,17 @@ def test_an_engine_that_has_hung_up_on_everybody_is_killed(monkeypatch):
 
 
 def test_a_live_identification_that_hears_nothing_holds_nobody_up(monkeypatch):
-    monkeypatch.setattr(LiveClient, "_STOP_S", 0.1)
-    client = LiveClient(python(DEAF))
-    for _ in range(200_000):  # some megabytes: no pipe holds them
-        client.update_clock(TimeBase(1.0, 1e-4))
-        if client.has_ended:
+    monkeypatch.setattr(LiveIdentifier, "_STOP_S", 0.1)
+    process, start = python(DEAF), datetime.datetime(2026, 11, 21, 12, tzinfo=datetime.UTC)
+    metadata = create_metadata(load_stand(), load_gauges(), start)
+    identifier = LiveIdentifier("no.ring", lambda _: TimeBase(1.0, 1e-4), lambda: process)
+    identifier.prepare()
+    for second in range(0, 400_000, 2):  # some megabytes: no pipe holds them
+        result = identifier.poll(0, metadata, float(second))
+        if result is not None:
             break
-    assert gone(client.pid), "it is given up"
-    client.stop()
-    assert client.has_ended
+    assert result.message == DIED_NOTE
+    assert gone(process.pid), "it is given up"
 
 
 class HangingFile:

@@ -459,7 +459,7 @@ def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
     [
         ({"known": ""}, "Say how far the gauge is moved"),
         ({"known": "0"}, "Say how far the gauge is moved"),
-        ({"known": "ten"}, "Known ten is not a number"),
+        ({"known": "ten"}, "Known 'ten' is not a number"),
         ({"uncertainty": "-1"}, "is below 0"),
     ],
 )
