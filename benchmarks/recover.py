@@ -25,6 +25,7 @@ from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
 from app.runs.metadata import create_metadata
 from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
+from drivers.clock import TimeBase
 from drivers.devices.slipstand_binary.codec import encode_frames
 from drivers.registry import find_driver
 
@@ -70,7 +71,7 @@ def write_journal(path: Path, counts: np.ndarray, rate_hz: float) -> None:
             sent += len(data)
             whole = sent // frame_bytes() * PER_FRAME
             if whole >= marked:
-                note(Mark(whole, 0, Known()))
+                note(Mark(whole, 0, Known(), TimeBase()))
                 marked += round(rate_hz)
 
 

@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -13,7 +12,8 @@ from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, set_property
-from app.qt.widgets.layouts import STRETCH, make_column
+from app.qt.widgets.inputs import make_button
+from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -32,14 +32,19 @@ class HealthPanel(QStackedWidget):
         super().__init__()
         self._shown: tuple[GaugeHealthState, ...] = ()
         self._words = label(role=TextRole.HEADING, muted=True, wrap=True)
-        self._go = QPushButton(gettext("Connect a device"))
+        self._go = make_button(gettext("Connect a device"), connect_device)
         self._go.setProperty("primary", "true")
-        self._go.clicked.connect(lambda _checked: connect_device())
         self._verdicts = (_Verdict(1), _Verdict(2))
         self._facts = ValueGrid()
         self._spectrum = Spectrum(theme)
-        self.addWidget(self._empty())
-        self.addWidget(self._filled())
+        empty, filled = QWidget(), QWidget()
+        go = make_row(self._go, STRETCH)
+        make_column(STRETCH, self._words, go, spacing=16, margins=(24, 24), of=empty).addStretch(2)
+        verdicts = make_row(*((verdict, 1) for verdict in self._verdicts), spacing=16)
+        parts = (verdicts, self._facts, (self._spectrum, 1))
+        make_column(*parts, spacing=8, margins=(16, 8), of=filled)
+        self.addWidget(empty)
+        self.addWidget(filled)
 
     def show_state(self, state: GaugesState) -> None:
         self._words.setText(state.health_note)
@@ -55,27 +60,6 @@ class HealthPanel(QStackedWidget):
         )
         self._spectrum.show_lines([(card.frequency_hz[1:], card.density_um[1:]) for card in state.health])
 
-    def _empty(self) -> QWidget:
-        page = QWidget()
-        layout = make_column(STRETCH, self._words, spacing=16, margins=(24, 24), of=page)
-        layout.addWidget(self._go, 0, Qt.AlignmentFlag.AlignLeft)
-        layout.addStretch(2)
-        return page
-
-    def _filled(self) -> QWidget:
-        page = QWidget()
-        grid = QGridLayout(page)
-        grid.setContentsMargins(16, 8, 16, 8)
-        grid.setHorizontalSpacing(16)
-        grid.setVerticalSpacing(8)
-        for column, verdict in enumerate(self._verdicts):
-            grid.addWidget(verdict, 0, column)
-            grid.setColumnStretch(column, 1)
-        grid.addWidget(self._facts, 1, 0, 1, 2)
-        grid.addWidget(self._spectrum, 2, 0, 1, 2)
-        grid.setRowStretch(2, 1)
-        return page
-
 
 class _Verdict(QWidget):
     """Name, verdict, and what is wrong with its remedy."""
@@ -86,11 +70,8 @@ class _Verdict(QWidget):
         set_property(self._name, "channel", str(channel))
         self._verdict = label(role=TextRole.STRONG)
         self._symptoms = [(label(wrap=True), label(muted=True, wrap=True)) for _ in range(_SYMPTOMS_SHOWN)]
-        layout = make_column(self._name, self._verdict, spacing=4, of=self)
-        for said, remedy in self._symptoms:
-            layout.addWidget(said)
-            layout.addWidget(remedy)
-        layout.addStretch(1)
+        symptoms = [part for symptom in self._symptoms for part in symptom]
+        make_column(self._name, self._verdict, *symptoms, STRETCH, spacing=4, of=self)
 
     def show_card(self, card: GaugeHealthState) -> None:
         self._name.setText(gettext(card.name))
@@ -104,11 +85,9 @@ class _Verdict(QWidget):
         self.setAccessibleName(f"{gettext(card.name)}: {gettext(_VERDICTS[card.verdict])}. {worst}")
 
 
-def _chip(verdict: HealthGrade, words: str) -> Chip:
-    return Chip(
-        words,
-        {HealthGrade.GOOD: Tone.OK, HealthGrade.DOUBTFUL: Tone.WARN, HealthGrade.BAD: Tone.BAD}[verdict],
-    )
+def _chip(grade: HealthGrade, words: str) -> Chip:
+    tones = {HealthGrade.GOOD: Tone.OK, HealthGrade.DOUBTFUL: Tone.WARN, HealthGrade.BAD: Tone.BAD}
+    return Chip(words, tones[grade])
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QPushButton, QWidget
 
 from app.presenters.gauges.ports import PortsPresenter
 from app.presenters.gauges.state import PortCard, PortsState
@@ -51,39 +51,31 @@ class PortsPanel(QWidget):
 
     def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
         inside = QWidget()
-        layout = QVBoxLayout(inside)
-        layout.setContentsMargins(16, 8, 16, 8)
-        layout.setSpacing(8)
-        if not ports:
-            layout.addWidget(label(gettext(_EMPTY), TextRole.HEADING, muted=True, wrap=True))
         is_pair = sum(card.suggested_form is not None for card in ports) > 1
-        for card in ports:
-            layout.addWidget(self._row(card, is_pair))
-        layout.addStretch(1)
+        rows: list[QWidget] = [self._row(card, is_pair) for card in ports]
+        if not ports:
+            rows.append(label(gettext(_EMPTY), TextRole.HEADING, muted=True, wrap=True))
+        make_column(*rows, STRETCH, spacing=8, margins=(16, 8), of=inside)
         return inside
 
     def _row(self, card: PortCard, is_pair: bool) -> QFrame:
-        row, words = QFrame(), QVBoxLayout()
-        row.setProperty("role", "card")
-        words.setSpacing(4)
         finding = label(role=TextRole.STRONG, wrap=True)
-        words.addWidget(label(card.url, TextRole.HEADING, wrap=True))
-        words.addWidget(label(card.identity or gettext("No USB device"), muted=True, wrap=True))
-        words.addWidget(finding)
         show_chip(finding, card.status)
+        identity = label(card.identity or gettext("No USB device"), muted=True, wrap=True)
+        texts = [label(card.url, TextRole.HEADING, wrap=True), identity, finding]
         if not card.status.text:
-            words.addWidget(label(gettext(_NOT_LOOKED_AT), muted=True, wrap=True))
-        for text in card.description:
-            words.addWidget(label(text, wrap=True))
-        layout = QHBoxLayout(row)
-        layout.setContentsMargins(12, 12, 12, 12)
-        layout.addLayout(words, 1)
+            texts.append(label(gettext(_NOT_LOOKED_AT), muted=True, wrap=True))
+        texts += [label(text, wrap=True) for text in card.description]
+        buttons = []
         if card.suggested_form is not None:
             hint = gettext("Fill in the start page for {url}", url=card.url)
             use = make_button(gettext("Use this port"), partial(self._presenter.fill_port, card.url), hint)
             use.setAccessibleName(gettext("Use {url}", url=card.url))
             second = [self._second_button(card.url)] if is_pair else []
-            layout.addLayout(make_column(use, *second, STRETCH, spacing=6))
+            buttons.append(make_column(use, *second, STRETCH, spacing=6))
+        row = QFrame()
+        row.setProperty("role", "card")
+        make_row((make_column(*texts, spacing=4), 1), *buttons, spacing=6, margins=(12, 12), of=row)
         return row
 
     def _second_button(self, url: str) -> QPushButton:

@@ -2,9 +2,8 @@
 
 from functools import partial
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QTabBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QStackedWidget, QTabBar, QWidget
 
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import GaugeCard, GaugesState, GaugesTab
@@ -14,7 +13,7 @@ from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_column, make_frame
+from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
@@ -81,22 +80,17 @@ class GaugesScreen(QWidget):
         self._tabs.setAccessibleName(gettext("What is shown of the gauges"))
         for panel in (self._health, self._ports, self._calibrate, self._check):
             self._pages.addWidget(panel)
-        layout = QHBoxLayout(self)
-        beside = QVBoxLayout()
-        beside.setContentsMargins(0, FOCUS_RING, 0, FOCUS_RING)  # edges in line with those of the cards
-        beside.addWidget(card)
         around = 8 - FOCUS_RING
-        layout.setContentsMargins(around, around, 8, around)
-        layout.setSpacing(4)
-        layout.addWidget(self._cards)
-        layout.addLayout(beside, 1)
+        beside = make_column(card, margins=(0, FOCUS_RING))  # edges in line with those of the cards
+        row = make_row(self._cards, (beside, 1), spacing=4, of=self)
+        row.setContentsMargins(around, around, 8, around)
 
 
 FOCUS_RING = 2
 """What is left free around the cards for it (px)."""
 
 
-class CardsColumn(QScrollArea):
+class CardsColumn(QWidget):
     """Both cards under one another, and where the calibrations are kept."""
 
     def __init__(self) -> None:
@@ -105,17 +99,10 @@ class CardsColumn(QScrollArea):
         self._fault = label(wrap=True)
         self._file = label(role=TextRole.LABEL, muted=True, wrap=True)
         inside = QWidget()
-        layout = QVBoxLayout(inside)
-        layout.setContentsMargins(FOCUS_RING, FOCUS_RING, 4, FOCUS_RING)
-        layout.setSpacing(8)
-        for part in (*self._cards, self._fault, self._file):
-            layout.addWidget(part)
-        layout.addStretch(1)
-        self.setWidget(inside)
-        self.setWidgetResizable(True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName(gettext("Calibrations in use"))
+        column = make_column(*self._cards, self._fault, self._file, STRETCH, spacing=8, of=inside)
+        column.setContentsMargins(FOCUS_RING, FOCUS_RING, 4, FOCUS_RING)
+        area = make_scroll_area(inside, is_column=False, name=gettext("Calibrations in use"))
+        make_column(area, of=self)
 
     def show_state(self, state: GaugesState) -> None:
         for shown, card in zip(self._cards, state.cards, strict=True):

@@ -21,22 +21,15 @@ class ValueGrid(QWidget):
         self._grid.setVerticalSpacing(2)
 
     def show_values(self, facts: Sequence[LabelledValue]) -> None:
-        self._show(
-            {
-                (row, column): text
-                for row, fact in enumerate(facts)
-                for column, text in enumerate((fact.label, fact.value))
-            }
-        )
+        self._show([(fact.label, fact.value) for fact in facts])
 
     def show_columns(self, titles: Sequence[str], columns: Sequence[Sequence[LabelledValue]]) -> None:
-        texts = {(0, number): title for number, title in enumerate(titles, start=1)}
-        for row, facts in enumerate(zip(*columns, strict=True), start=1):
-            texts[row, 0] = facts[0].label
-            texts |= {(row, number): fact.value for number, fact in enumerate(facts, start=1)}
-        self._show(texts)
+        rows = zip(*columns, strict=True)
+        values = [(facts[0].label, *(fact.value for fact in facts)) for facts in rows]
+        self._show([("", *titles), *values])
 
-    def _show(self, texts: dict[tuple[int, int], str]) -> None:
+    def _show(self, rows: Sequence[tuple[str, ...]]) -> None:
+        texts = {(row, column): text for row, line in enumerate(rows) for column, text in enumerate(line)}
         for place, text in texts.items():
             if place not in self._labels:
                 self._labels[place] = self._add(place)
