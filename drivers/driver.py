@@ -12,7 +12,7 @@ from messages.message import Message
 if TYPE_CHECKING:
     from drivers.recognition import IdentityQuery, Recognition
     from drivers.simulated.protocol import SimulatedProtocol
-    from drivers.source import SampleSource
+    from drivers.stream import SampleSource
 
 UNVERIFIED = "not verified on hardware"
 RESERVED = "reserved, comes later"

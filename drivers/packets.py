@@ -4,7 +4,7 @@ A packet is a run of good samples (a frame or a line) and the number of samples 
 reduces its bytes to packets; how packets become rows is the same for all devices.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
@@ -13,6 +13,7 @@ import numpy as np
 from drivers.arrays import Counts, Floats, Record, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
+from drivers.source import Decoder
 
 MAX_BLOCK_ROWS = 65536
 """A long gap becomes several blocks, so that no block is large."""
@@ -67,8 +68,8 @@ class Position:
     """Nominal time between the samples of a packet."""
 
 
-class PacketDecoder(ABC):
-    """A `drivers.stream.Decoder` for devices that send by themselves; a device adds `_find_packets`.
+class PacketDecoder(Decoder):
+    """A `Decoder` for devices that send by themselves; a device adds `_find_packets`.
 
     `state` (1,) is what compiled loops keep between calls, with the fields `LOSS_FIELDS`, `restarting` and
     `row_time_s`; `rate_hz` the nominal rate, > 0; `max_gap_s` the longest gap that rows stand for.
@@ -89,7 +90,6 @@ class PacketDecoder(ABC):
 
     @property
     def losses(self) -> Losses:
-        """Counts until now."""
         state = self._state[0]
         return Losses(**{name: int(state[name]) for name, _ in LOSS_FIELDS})
 

@@ -1,21 +1,23 @@
-"""What sources share: settings, the conversation with a device, and decoding once the rate is known."""
+"""Sources of samples: the conversation with a device, its settings, and the thread that reads its port."""
 
+import contextlib
 import logging
 import threading
 import time
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import msgspec
 
+from drivers.clock import Skew
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFullError, SettingsError
 from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
-from drivers.source import Link, SampleSource
+from drivers.source import Decoder, Link
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
 _log = logging.getLogger(__name__)
@@ -34,23 +36,24 @@ _DRAIN_S = 0.3
 """Stopped devices still send what is in their buffers."""
 
 
-class Decoder(Protocol):
-    """Bytes in, sample blocks out."""
+class SampleSource(ABC):
+    """One device: its conversation and its decoder.
 
-    @property
-    def losses(self) -> Losses:
-        """Counts until now."""
+    `start` and `stop` talk to the device. `decode` uses no port, clock or thread, so that recorded bytes are
+    decoded by the code that decoded them live. The caller runs the loop: `data = source.start(link)`, then
+    `source.decode(data, arrival_ns)` for that and for all that `source.read(link)` returns, then
+    `source.stop(link)`. Where the connection broke, the caller passes `source.decode(b"", arrival_ns)`, in a
+    replay too, and decodes next what `source.resume(link)` returns.
 
-    def expect_restart(self) -> None:
-        """The connection broke: what comes next may be a new start of the device."""
+    `baud` is the usual one; the nominal rate is None until settings, `start` or device times show it.
+    """
 
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes."""
-
-
-class StreamSource(SampleSource):
-    """A `SampleSource` around a decoder that needs to know the rate, which is None until it is known."""
-
+    batch_delay_s = 0.0
+    """How long `read` may let bytes collect (s); set by the caller. Polled devices ignore it."""
+    stop_command = b""
+    """What asks the device to stop sending."""
+    is_polled = False
+    """Whether the device is polled on a grid of the host's clock, see `set_poll_rate`."""
     timeout_s = 3.0
     """How long `start` waits for the first good data."""
     answer_timeout_s = 0.4
@@ -64,11 +67,18 @@ class StreamSource(SampleSource):
         self._reader = BatchedReader()
 
     @property
+    def channels(self) -> int:
+        """Gauges that the device reads, 1 or 2; the column of a missing one is 0."""
+        return 2
+
+    @property
     def identity(self) -> DeviceIdentity:
+        """Known after `start`; before it, the protocol alone."""
         return self._identity
 
     @property
     def rate_hz(self) -> float:
+        """Nominal samples a second. Raises ProtocolError before it is known."""
         if self._rate_hz is None:
             raise ProtocolError(
                 "{protocol}: the rate is not known before the first samples", protocol=self._identity.protocol
@@ -79,15 +89,67 @@ class StreamSource(SampleSource):
     def losses(self) -> Losses:
         return self._decoder.losses if self._decoder else Losses()
 
+    @property
+    def run_note(self) -> Message:
+        """Remark to store with every run of this device, known after `start`; empty for most."""
+        return EMPTY
+
+    def take_warnings(self) -> list[Message]:
+        """Warnings about the stream since the last call; to be called after each `decode`."""
+        return self._decoder.take_warnings() if self._decoder else []
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """Skew of samples first_index <= index < end_index; None where one converter reads both gauges."""
+        return self._decoder.skew(first_index, end_index) if self._decoder else None
+
+    def set_poll_rate(self, rate_hz: float) -> None:
+        """Lower the rate of polls of a polled device, after the start and before anything is decoded."""
+        raise NotImplementedError
+
+    @abstractmethod
+    def prepare(self) -> None:
+        """Compile what decoding needs, which takes seconds on the very first use; `start` does it too."""
+
+    @abstractmethod
+    def start(self, link: Link) -> bytes:
+        """Bring the device into a known state, set it up and start the stream.
+
+        Returns what was read of the stream, to be decoded first. Raises NoDataError within about 3 s where
+        nothing intelligible comes, ProtocolError where the device does not do what is asked.
+        """
+
+    def resume(self, link: Link) -> bytes:
+        """Continue with a device that was lost and found again; else as `start`.
+
+        A device that is still sending is left alone: its sequence then proves what is missing.
+        """
+        return self.start(link)
+
     def read(self, link: Link) -> bytes:
+        """Next bytes to decode, b"" if none came within a fraction of a second.
+
+        A polled device is asked once, when its poll is due. One thread may call this while another decodes.
+        Raises DeviceLostError.
+        """
         return self._reader.read(link, self.batch_delay_s)
+
+    def stop(self, link: Link) -> None:
+        """Send the stop command, if the device has one; nothing happens where it is gone."""
+        if self.stop_command:
+            with contextlib.suppress(DeviceLostError):
+                link.write(self.stop_command)
 
     @abstractmethod
     def make_decoder(self, data: bytes) -> Decoder | None:
         """Decoder, once `data` (all bytes until now) show what it needs."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """See `SampleSource`. Raises NoDataError if a megabyte does not show what a decoder needs to know."""
+        """Samples completed by `data`; an unfinished rest of bounded size is kept. Exhaust the iterator.
+
+        b"" marks where the connection broke. Missing rows are counted from the device's sequence or time
+        where the host's clock agrees with it, else estimated from the host's clock. Raises NoDataError if a
+        megabyte does not show what a decoder needs to know.
+        """
         if not data and self._decoder is not None:
             self._decoder.expect_restart()
         data, self._pending = self._pending + data, b""

@@ -12,7 +12,8 @@ from drivers.envelope import StampedRead, Unwrapper
 from drivers.packets import MAX_BLOCK_ROWS
 from drivers.pair.merging import ChannelSamples, HostTimeFit, MergedRows, Merger
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
-from drivers.source import SampleSource
+from drivers.source import Decoder
+from drivers.stream import SampleSource
 from messages.message import Message, message
 
 _MUCH_SLOWER = 1.37
@@ -32,7 +33,7 @@ class PairedChannel:
     """Column of its readings in a block."""
 
 
-class PairDecoder:
+class PairDecoder(Decoder):
     """Decodes each device by its own source, converts its times to the host's, and makes rows of both.
 
     The clocks are compared over the last seconds only, so a replay that begins within a stream soon makes the
@@ -89,7 +90,7 @@ class PairDecoder:
             line.reset()
         self._lost_ns = [None, None]
 
-    def feed(self, data: bytes) -> Iterator[SampleBlock]:
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in envelopes
         for read in self._unwrapper.feed(data):
             if read.port < len(self._channels):
                 yield from self._decode_read(read.port, read)

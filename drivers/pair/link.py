@@ -9,7 +9,8 @@ from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, QueueFullError
 from drivers.host_time import ActiveTimer, host_ns
 from drivers.port import OpenPort, PortConfig, PortInfo
-from drivers.source import CancellableLink, SampleSource
+from drivers.source import CancellableLink
+from drivers.stream import SampleSource
 from messages.message import message_of
 
 _log = logging.getLogger(__name__)

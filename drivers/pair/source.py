@@ -1,15 +1,16 @@
 """Two devices of one gauge on two ports, as one `SampleSource`."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
-from drivers.clock import Skew
 from drivers.driver import GAUGES, DeviceDriver
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.host_time import ActiveTimer
 from drivers.pair.decoder import PairDecoder, PairedChannel, choose_base_gauge
-from drivers.samples import DeviceIdentity, Losses, SampleBlock
-from drivers.source import Link, SampleSource
+from drivers.samples import DeviceIdentity
+from drivers.source import Link
+from drivers.stream import SampleSource
+from messages.i18n import N_
 from messages.message import Message, joined
 
 _OWN_PREFIX = "relative."
@@ -31,11 +32,10 @@ class PairSource(SampleSource):
     timeout_s = 8.0
 
     def __init__(self, driver: DeviceDriver, channel_sources: tuple[PairedChannel, PairedChannel]) -> None:
+        super().__init__(DeviceIdentity(driver.name, driver.title), 0, None)
         self.channel_sources = channel_sources
         for channel in channel_sources:
             channel.source.batch_delay_s = _BATCH_DELAY_S
-        self._driver = driver
-        self._decoder: PairDecoder | None = None
 
     @property
     def identity(self) -> DeviceIdentity:
@@ -47,7 +47,7 @@ class PairSource(SampleSource):
             if rate_hz is not None:
                 settings[_RATE_KEY.format(gauge)] = repr(rate_hz)
         return DeviceIdentity(
-            self._driver.name,
+            self._identity.protocol,
             f"{_distinct(one.name for one in both)}, one for each gauge",
             _distinct(one.firmware for one in both),
             _distinct(one.serial_number for one in both),
@@ -61,22 +61,15 @@ class PairSource(SampleSource):
         return (first, second)[choose_base_gauge((first, second))]
 
     @property
-    def losses(self) -> Losses:
-        return self._decoder.losses if self._decoder else Losses()
-
-    @property
     def run_note(self) -> Message:
         """Notes of both devices, equal ones once."""
         notes = [channel.source.run_note for channel in self.channel_sources]
         return joined(list({str(note): note for note in notes if note}.values()), "; ")
 
-    def skew(self, first_index: int, end_index: int) -> Skew | None:
-        return self._decoder.skew(first_index, end_index) if self._decoder else None
-
     def take_warnings(self) -> list[Message]:
         """Warnings of both devices, and losses and returns of one of them."""
         own = [warning for channel in self.channel_sources for warning in channel.source.take_warnings()]
-        return own + (self._decoder.take_warnings() if self._decoder else [])
+        return own + super().take_warnings()
 
     def prepare(self) -> None:
         for channel in self.channel_sources:
@@ -101,20 +94,15 @@ class PairSource(SampleSource):
             self._synchronise_polling()
         return received
 
-    def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in envelopes
-        """Rows completed by `data`, b"" where both connections broke. Raises ProtocolError without rates."""
-        if self._decoder is None:
-            rates_hz = self._rates_hz
-            if rates_hz is None:
-                raise ProtocolError(
-                    "{protocol}: the rates of two devices are not known: start them",
-                    protocol=self._driver.name,
-                )
-            self._decoder = PairDecoder(self.channel_sources, rates_hz)
-        if data:
-            yield from self._decoder.feed(data)
-        else:
-            self._decoder.expect_restart()
+    def read(self, link: Link) -> bytes:
+        return link.read()
+
+    def make_decoder(self, data: bytes) -> PairDecoder:  # noqa: ARG002 - the rates are enough
+        rates_hz = self._rates_hz
+        if rates_hz is None:
+            template = N_("{protocol}: the rates of two devices are not known: start them")
+            raise ProtocolError(template, protocol=self._identity.protocol)
+        return PairDecoder(self.channel_sources, rates_hz)
 
     def _synchronise_polling(self) -> None:
         """Poll both devices at the same times, so that their readings belong together."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from drivers.errors import NoDataError
 from drivers.recognition import describe_unreadable
 from drivers.samples import SampleBlock
-from drivers.source import SampleSource
+from drivers.stream import SampleSource
 
 _SHOWN_BYTES = 4096
 

@@ -44,7 +44,9 @@ def single_bytes(data: bytes) -> Iterator[bytes]:
 
 
 def cuts(data: bytes) -> st.SearchStrategy[list[int]]:
-    return st.lists(st.integers(0, len(data)), max_size=12)
+    return st.lists(
+        st.integers(1, max(len(data) - 1, 1)), max_size=12, unique=True
+    )  # b"" marks a broken connection
 
 
 def join(blocks: Iterable[SampleBlock]) -> SampleBlock:

@@ -14,7 +14,7 @@ from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.clock import Skew
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
-from drivers.source import SampleSource
+from drivers.stream import SampleSource
 from messages.i18n import N_
 
 _READS_MAX = 4096

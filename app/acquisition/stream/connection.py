@@ -14,8 +14,8 @@ from drivers.pair.link import open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import OpenPort, PortConfig, PortInfo
 from drivers.registry import find_driver
-from drivers.source import CancellableLink, SampleSource
-from drivers.stream import PortReader, ReaderEnd, read_for
+from drivers.source import CancellableLink
+from drivers.stream import PortReader, ReaderEnd, SampleSource, read_for
 
 _log = logging.getLogger(__name__)
 

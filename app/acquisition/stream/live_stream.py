@@ -27,8 +27,7 @@ from drivers.host_time import HostMonitor
 from drivers.packets import MAX_BLOCK_ROWS
 from drivers.port import OpenPort
 from drivers.samples import DeviceIdentity, Losses
-from drivers.source import SampleSource
-from drivers.stream import ReaderEndReason
+from drivers.stream import ReaderEndReason, SampleSource
 from messages.message import EMPTY, Message, as_message, message, message_of
 
 _log = logging.getLogger(__name__)

@@ -5,7 +5,7 @@ import math
 from drivers.clock import ClockEstimate, ClockFit, TimeBase
 from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
-from drivers.source import SampleSource
+from drivers.stream import SampleSource
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 

@@ -14,7 +14,7 @@ from drivers.errors import NoDataError, SettingsError
 from drivers.recognition import Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
-from drivers.stream import StreamSource, parse_settings
+from drivers.stream import SampleSource, parse_settings
 from messages.message import EMPTY, Message
 
 _DOUBTED_BYTES = 1 << 14
@@ -64,7 +64,7 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         )
 
 
-class CsvLinesSource(StreamSource):
+class CsvLinesSource(SampleSource):
     """The device sends by itself and takes no commands.
 
     `layout` is None for a device whose lines show it (`find_layout`). `rate_hz` is needed where no column

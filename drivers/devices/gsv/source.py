@@ -12,7 +12,7 @@ from drivers.errors import NoDataError, ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import StreamSource, check_gauge_channels, parse_settings
+from drivers.stream import SampleSource, check_gauge_channels, parse_settings
 from messages.message import EMPTY, Message, message, option
 
 _TRIES = 2
@@ -39,7 +39,7 @@ class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         check_gauge_channels(self.table, self.relative, range(1, codec.MAX_CHANNELS + 1))
 
 
-class GsvSource(StreamSource):
+class GsvSource(SampleSource):
     """Conversation: stop, identify, set format, input and rate (None: that of the device), start."""
 
     stop_command = commands.encode_request(Code.STOP)

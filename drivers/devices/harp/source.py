@@ -11,7 +11,7 @@ from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import StreamSource, check_gauge_channels, parse_settings
+from drivers.stream import SampleSource, check_gauge_channels, parse_settings
 from messages.message import EMPTY, Message, message, option
 
 RATE_HZ = 1000.0
@@ -33,7 +33,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise SettingsError("overload_count {count:g} must be positive", count=self.overload_count)
 
 
-class HarpSource(StreamSource):
+class HarpSource(SampleSource):
     """Conversation: stop, identify, enable events, start. The device's times show its fixed rate."""
 
     stop_command = codec.encode_stop()

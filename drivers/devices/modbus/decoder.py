@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from drivers.clock import Skew, SkewStatistics
-from drivers.devices.modbus.frames import ExceptionResponse, RegisterResponse, parse_response
 from drivers.devices.modbus.registers import ChannelValue, Poll
 from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.packets import MAX_GAP_S, PACKET, Position, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
+from drivers.source import Decoder
 
 LATE = 0x80
 """Bit of an envelope's port: the time of the measurement is not known."""
@@ -27,7 +27,7 @@ def wrap_response(request: int, measured_ns: int, data: bytes, *, is_late: bool 
     return wrap(request | (LATE if is_late else 0), measured_ns, data)
 
 
-class ResponseDecoder:
+class ResponseDecoder(Decoder):
     """Bytes to sample blocks; the time of each response gives its row.
 
     The host's time is divided into cells of one sample period, and each poll is made at the beginning of a
@@ -42,8 +42,7 @@ class ResponseDecoder:
     def __init__(
         self, poll: Poll, columns: tuple[int, ...], rate_hz: float, max_gap_s: float = MAX_GAP_S
     ) -> None:
-        self.losses = Losses()
-        """Counts until now."""
+        self._losses = Losses()
         self._poll = poll
         self._columns = columns
         self._period_ns = sample_period_ns(rate_hz)
@@ -52,15 +51,17 @@ class ResponseDecoder:
         self._responses: list[bytes] | None = None
         self._measured_ns = 0
         self._request_times_ns: list[int] = []
-        self._gauge_requests = (poll.values[0].request, poll.values[-1].request)
-        self._skew_statistics = (
-            SkewStatistics(rate_hz) if self._gauge_requests[0] != self._gauge_requests[1] else None
-        )
+        first, last = self._gauge_requests = poll.gauge_requests
+        self._skew_statistics = SkewStatistics(rate_hz) if first != last else None
         self._last_ns: int | None = None
         self._broken = 0
         self._row_time_s = 0.0
         self._rows: list[tuple[int, int, float, int, int]] = []
-        self._counts: list[tuple[float, float]] = []
+        self._counts: list[list[float]] = []
+
+    @property
+    def losses(self) -> Losses:
+        return self._losses
 
     @property
     def unfinished_bytes(self) -> int:
@@ -74,36 +75,35 @@ class ResponseDecoder:
         self._responses = None
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in the envelopes
-        first_index, last_time_s = self.losses.samples, self._row_time_s
+        first_index, last_time_s = self._losses.samples, self._row_time_s
         discarded = self._unwrapper.discarded_bytes
         for read in self._unwrapper.feed(data):
             self._add_response(read)
-        self.losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
+        self._losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
         if self._rows:
             rows, counts = np.array(self._rows, dtype=PACKET), np.array(self._counts)
             self._rows, self._counts = [], []
             position = Position(first_index, last_time_s, self._period_ns / _NS)
-            yield from sample_blocks(
-                rows, counts, self.losses.samples - first_index, position, self._last_ns or 0
-            )
+            size = self._losses.samples - first_index
+            yield from sample_blocks(rows, counts, size, position, self._last_ns or 0)
 
     def _add_response(self, read: StampedRead) -> None:
         number = read.port & ~LATE
         if number == 0:
             self._responses, self._request_times_ns, self._measured_ns = [], [], read.arrival_ns
         if self._responses is None or number != len(self._responses):
-            self.losses.discarded_bytes += len(read.data)
+            self._losses.discarded_bytes += len(read.data)
             return
         self._request_times_ns.append(read.arrival_ns)
-        response = parse_response(self._poll.requests[number], read.data)
-        if isinstance(response, RegisterResponse) and not read.port & LATE:
-            self._responses.append(response.data)
-        else:
+        response = self._poll.requests[number].parse_response(read.data)
+        if response.fault or read.port & LATE:
             self._responses = None
-            if not isinstance(response, ExceptionResponse):
+            if not response.is_exception:
                 self._broken += 1
-                self.losses.discarded_bytes += len(read.data)
-        if self._responses is not None and len(self._responses) == len(self._poll.requests):
+                self._losses.discarded_bytes += len(read.data)
+            return
+        self._responses.append(response.data)
+        if len(self._responses) == len(self._poll.requests):
             self._add_sample(self._poll.channel_values(self._responses))
 
     def _add_sample(self, values: list[ChannelValue]) -> None:
@@ -113,13 +113,19 @@ class ResponseDecoder:
             return
         gap = self._gap()
         if gap is None:
-            self.losses.repeated += 1
+            self._losses.repeated += 1
             return
         status, counts = 0, [0.0, 0.0]
         for column, value in zip(self._columns, values, strict=True):
             counts[column] = value.counts
             status |= _OVERLOADS[column] if value.is_overloaded else 0
-        self._append_row(gap, status, (counts[0], counts[1]))
+        if self._skew_statistics is not None:
+            first, last = (self._request_times_ns[request] for request in self._gauge_requests)
+            self._skew_statistics.add(self._losses.samples + gap, np.array([(last - first) / _NS]), 0.0)
+        damaged, self._broken = min(gap, self._broken), 0
+        self._rows.append((damaged, gap - damaged, self._row_time_s, 1, status))
+        self._counts.append(counts)
+        self._losses += Losses(gap + 1, gap - damaged, damaged=damaged, overloaded=bool(status))
 
     def _gap(self) -> int | None:
         """Rows between the last one and this; None where both are in one cell. Updates the row time."""
@@ -130,21 +136,8 @@ class ResponseDecoder:
         if step == 0:
             return None
         if not 0 < step <= self._max_gap + 1:
-            self.losses.restarts += 1
+            self._losses.restarts += 1
             self._row_time_s += self._period_ns / _NS
             return 0
         self._row_time_s += (self._measured_ns - last_ns) / _NS
         return step - 1
-
-    def _append_row(self, gap: int, status: int, counts: tuple[float, float]) -> None:
-        damaged = min(gap, self._broken)
-        if self._skew_statistics is not None:
-            first, last = (self._request_times_ns[request] for request in self._gauge_requests)
-            self._skew_statistics.add(self.losses.samples + gap, np.array([(last - first) / _NS]), 0.0)
-        self._rows.append((damaged, gap - damaged, self._row_time_s, 1, status))
-        self._counts.append(counts)
-        self.losses.samples += gap + 1
-        self.losses.damaged += damaged
-        self.losses.missing += gap - damaged
-        self.losses.overloaded += bool(status)
-        self._broken = 0

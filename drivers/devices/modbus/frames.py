@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from messages.i18n import N_
-from messages.message import Message, message
+from messages.message import EMPTY, Message, message
 
 MAX_REGISTERS = 125
 """Registers that one request may read."""
@@ -62,7 +62,10 @@ class Request:
     """Values to write; none where registers are read."""
 
     def encode(self) -> bytes:
-        return with_crc(struct.pack(">BB", self.unit, self.function) + self._body())
+        frame = struct.pack(">BBHH", self.unit, self.function, self.register, self._second)
+        if self.function is Function.WRITE_MULTIPLE:
+            frame += struct.pack(f">B{self.count}H", 2 * self.count, *self.values)
+        return with_crc(frame)
 
     @property
     def response_bytes(self) -> int:
@@ -72,107 +75,74 @@ class Request:
     @property
     def description(self) -> Message:
         """Function and registers, for messages."""
-        first, last = self.register, self.register + self.count - 1
-        if first == last:
-            return message(
-                "function {function:02d} for register {register}", function=self.function, register=first
-            )
-        return message(
-            "function {function:02d} for registers {register} to {last}",
-            function=self.function,
-            register=first,
-            last=last,
-        )
-
-    def _body(self) -> bytes:
-        match self.function:
-            case Function.WRITE_SINGLE:
-                return struct.pack(">HH", self.register, self.values[0])
-            case Function.WRITE_MULTIPLE:
-                head = struct.pack(">HHB", self.register, self.count, 2 * self.count)
-                return head + struct.pack(f">{self.count}H", *self.values)
-        return struct.pack(">HH", self.register, self.count)
-
-
-@dataclass(frozen=True, slots=True)
-class RegisterResponse:
-    """Response with the requested registers as bytes, two each; none after a write."""
-
-    data: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class ExceptionResponse:
-    """A Modbus exception: the device understood the request and refuses it."""
-
-    code: int
+        last = self.register + self.count - 1
+        template = N_("function {function:02d} for registers {register} to {last}")
+        if last == self.register:
+            template = N_("function {function:02d} for register {register}")
+        return message(template, function=self.function, register=self.register, last=last)
 
     @property
-    def fault(self) -> Message:
-        """Its name in the specification, and its number."""
-        name = message(_EXCEPTIONS.get(self.code, N_("unknown reason")))
-        return message("{name} (exception {code})", name=name, code=self.code)
+    def _second(self) -> int:
+        return self.values[0] if self.function is Function.WRITE_SINGLE else self.count
+
+    def is_complete(self, received: bytes) -> bool:
+        """Whether as many bytes came as the response, or an exception, has; they may still be wrong."""
+        if len(received) >= EXCEPTION_BYTES and received[1] == self.function | _REFUSED:
+            return True
+        return len(received) >= self.response_bytes
+
+    def parse_response(self, received: bytes) -> "Response":
+        """Decode the bytes that came after the request."""
+        if len(received) < EXCEPTION_BYTES:
+            return Response(fault=message("only {count} bytes came", count=len(received)))
+        if with_crc(received[:-_CHECK]) != received:
+            template = N_("{count} bytes came, {expected} with a right CRC are expected")
+            return Response(fault=message(template, count=len(received), expected=self.response_bytes))
+        if received[0] != self.unit:
+            template = N_("unit {answered} answered where unit {unit} was asked")
+            return Response(fault=message(template, answered=received[0], unit=self.unit))
+        if received[1] == self.function | _REFUSED:
+            return exception_response(received[2])
+        is_read = self.function in READ_FUNCTIONS
+        is_wanted = received[1] == self.function and len(received) == self.response_bytes
+        if is_read and is_wanted and received[2] == 2 * self.count:
+            return Response(received[_HEAD:-_CHECK])
+        echo = struct.pack(">HH", self.register, self._second)
+        if not is_read and is_wanted and received[2:6] == echo:
+            return Response()
+        return Response(fault=message("it is the answer to another request"))
 
 
 @dataclass(frozen=True, slots=True)
-class InvalidResponse:
-    """Bytes that are no response to the request, and why."""
+class Response:
+    """What came after a request: its registers, or why there are none."""
 
-    fault: Message
+    data: bytes = b""
+    """The requested registers, two bytes each; none after a write."""
+    fault: Message = EMPTY
+    """Why this is no response, or why the device refuses; empty where it did what was asked."""
+    is_exception: bool = False
+    """Whether the device understood the request and refuses it."""
 
-
-def is_complete(request: Request, received: bytes) -> bool:
-    """Whether as many bytes came as the response, or an exception, has; they may still be wrong."""
-    if len(received) >= EXCEPTION_BYTES and received[1] == request.function | _REFUSED:
-        return True
-    return len(received) >= request.response_bytes
-
-
-def parse_response(
-    request: Request, received: bytes
-) -> RegisterResponse | ExceptionResponse | InvalidResponse:
-    """Decode the bytes that came after `request`."""
-    if len(received) < EXCEPTION_BYTES:
-        return InvalidResponse(message("only {count} bytes came", count=len(received)))
-    if with_crc(received[:-_CHECK]) != received:
-        return InvalidResponse(
-            message(
-                "{count} bytes came, {expected} with a right CRC are expected",
-                count=len(received),
-                expected=request.response_bytes,
-            )
-        )
-    if received[0] != request.unit:
-        return InvalidResponse(
-            message(
-                "unit {answered} answered where unit {unit} was asked",
-                answered=received[0],
-                unit=request.unit,
-            )
-        )
-    if received[1] == request.function | _REFUSED:
-        return ExceptionResponse(received[2])
-    if not _matches_request(request, received):
-        return InvalidResponse(message("it is the answer to another request"))
-    return RegisterResponse(received[_HEAD:-_CHECK] if request.function in READ_FUNCTIONS else b"")
+    @property
+    def is_invalid(self) -> bool:
+        """Whether these bytes are no response to the request."""
+        return bool(self.fault) and not self.is_exception
 
 
-def find_exception(received: bytes) -> ExceptionResponse | None:
+def exception_response(code: int) -> Response:
+    """Refusal of a device; its fault is the name in the specification, and the number."""
+    name = message(_EXCEPTIONS.get(code, N_("unknown reason")))
+    return Response(fault=message("{name} (exception {code})", name=name, code=code), is_exception=True)
+
+
+def find_exception(received: bytes) -> Response | None:
     """The first exception in `received`, of any unit; None where there is none."""
     for at in range(len(received) - EXCEPTION_BYTES + 1):
         frame = received[at : at + EXCEPTION_BYTES]
         if frame[1] & _REFUSED and frame[2] in _EXCEPTIONS and with_crc(frame[:-_CHECK]) == frame:
-            return ExceptionResponse(frame[2])
+            return exception_response(frame[2])
     return None
-
-
-def _matches_request(request: Request, received: bytes) -> bool:
-    if received[1] != request.function or len(received) != request.response_bytes:
-        return False
-    if request.function in READ_FUNCTIONS:
-        return received[2] == 2 * request.count
-    second = request.values[0] if request.function is Function.WRITE_SINGLE else request.count
-    return struct.unpack_from(">HH", received, 2) == (request.register, second)
 
 
 def encode_read_response(unit: int, function: int, data: bytes) -> bytes:

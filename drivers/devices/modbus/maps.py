@@ -3,7 +3,7 @@
 import contextlib
 import math
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -15,10 +15,11 @@ from drivers.devices.modbus.frames import MAX_UNIT, READ_FUNCTIONS, WRITE_FUNCTI
 from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, ValueType
 from drivers.driver import GAUGES
 from drivers.errors import SettingsError
+from messages.i18n import N_
 from messages.message import Message, message
 
 _TEXTS = ("title", "source", "caution")
-_PACKAGE = "drivers.devices.modbus"
+_SHIPPED = files("drivers.devices.modbus").joinpath("maps")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +37,8 @@ class RegisterMap:
 
 def shipped_maps() -> list[str]:
     """Names of the maps in the driver's folder."""
-    folder = files(_PACKAGE).joinpath("maps")
-    return sorted(entry.name[: -len(".toml")] for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
-def map_keys() -> list[str]:
-    """Keys of a map that `--set` may give for both gauges, or with `table_` or `relative_` for one."""
-    return list(_ALLOWED)
+    names = [entry.name for entry in _SHIPPED.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def is_map_key(key: str) -> bool:
@@ -57,115 +53,70 @@ def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUG
     for both gauges, `table_register` for one. Raises SettingsError, which names file, key, value and remedy.
     """
     where, content = _content(name)
-    _check_keys(where, content)
-    texts = {key: _text(where, key, content.get(key, "")) for key in _TEXTS}
+    _check_keys(where, content, [*_TEXTS, *GAUGES, *_ALLOWED])
     channels = {gauge: _channel(gauge, _given(where, content, given, gauge), where) for gauge in gauges}
-    return RegisterMap(name, texts["title"] or name, texts["caution"], channels)
+    return RegisterMap(name, content.get("title") or name, content.get("caution", ""), channels)
 
 
 def _content(name: str) -> tuple[str, dict[str, Any]]:
     path: Any = Path(name).expanduser()
     if path.suffix != ".toml":
         if name not in shipped_maps():
-            raise SettingsError(
-                "map {name!r} is not known: give one of {shipped}, or a file of your own that ends in .toml",
-                name=name,
-                shipped=shipped_maps(),
+            template = N_(
+                "map {name!r} is not known: give one of {shipped}, or a file of your own that ends in .toml"
             )
-        path = files(_PACKAGE).joinpath("maps", f"{name}.toml")
+            raise SettingsError(template, name=name, shipped=shipped_maps())
+        path = _SHIPPED.joinpath(f"{name}.toml")
     where = f"map {name}"
     try:
         return where, tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
-        raise SettingsError(
-            "{where} cannot be read ({fault}): check its path", where=where, fault=error.strerror
-        ) from None
+        template = N_("{where} cannot be read ({fault}): check its path")
+        raise SettingsError(template, where=where, fault=error.strerror) from None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(
-            "{where} is no TOML ({fault}): see docs/how-to/map-modbus-registers.md", where=where, fault=error
-        ) from None
+        template = N_("{where} is no TOML ({fault}): see docs/how-to/map-modbus-registers.md")
+        raise SettingsError(template, where=where, fault=error) from None
 
 
-def _check_keys(where: str, content: dict[str, Any]) -> None:
+def _check_keys(where: str, content: dict[str, Any], allowed: list[str], prefix: str = "") -> None:
     for key, value in content.items():
+        shown = repr(value)
+        if key not in allowed:
+            template = N_("{where}: {key} = {value} is not known: allowed are {allowed}")
+            raise SettingsError(template, where=where, key=prefix + key, value=shown, allowed=allowed)
+        if key in _TEXTS and (not isinstance(value, str) or "\n" in value):
+            template = N_("{where}: {key} = {value} is no line of text: put it into quotes, on one line")
+            raise SettingsError(template, where=where, key=key, value=shown)
         if key in GAUGES:
-            _check_gauge(where, key, value)
-        elif key not in _TEXTS and key not in _ALLOWED:
-            raise _unknown(where, key, value, [*_TEXTS, *GAUGES, *_ALLOWED])
-
-
-def _check_gauge(where: str, gauge: str, content: Any) -> None:
-    if not isinstance(content, dict):
-        raise SettingsError(
-            "{where}: {gauge} = {content} is no table: write [{gauge}] and its keys below",
-            where=where,
-            gauge=gauge,
-            content=repr(content),
-        )
-    for key, value in content.items():
-        if key not in _ALLOWED:
-            raise _unknown(where, f"{gauge}.{key}", value, list(_ALLOWED))
-
-
-def _unknown(where: str, key: str, value: Any, allowed: list[str]) -> SettingsError:
-    return SettingsError(
-        "{where}: {key} = {value} is not known: allowed are {allowed}",
-        where=where,
-        key=key,
-        value=repr(value),
-        allowed=allowed,
-    )
-
-
-def _text(where: str, key: str, value: Any) -> str:
-    if not isinstance(value, str) or "\n" in value:
-        raise SettingsError(
-            "{where}: {key} = {value} is no line of text: put it into quotes, on one line",
-            where=where,
-            key=key,
-            value=repr(value),
-        )
-    return value
+            if not isinstance(value, dict):
+                template = N_("{where}: {gauge} = {content} is no table: write [{gauge}] and its keys below")
+                raise SettingsError(template, where=where, gauge=key, content=shown)
+            _check_keys(where, value, list(_ALLOWED), f"{key}.")
 
 
 def _given(
     where: str, content: dict[str, Any], given: Mapping[str, str], gauge: str
-) -> Iterator[tuple[str, Any, str]]:
-    """Key, value and place of what applies to a gauge, later ones before earlier ones.
-
-    Values of the map for both gauges come first, then its own, then those of `--set`.
-    """
-    for key, value in content.items():
-        if key in _ALLOWED:
-            yield key, value, f"{where}: {key}"
-    for key, value in content.get(gauge, {}).items():
-        yield key, value, f"{where}: {gauge}.{key}"
-    for key, value in given.items():
-        if key in _ALLOWED:
-            yield key, value, f"--set {key}"
-    for key, value in given.items():
-        if key.startswith(f"{gauge}_"):
-            yield key.removeprefix(f"{gauge}_"), value, f"--set {key}"
+) -> dict[str, tuple[Any, str]]:
+    """Value of each key of a gauge, and its place: in the map for both gauges or for one, or in `--set`."""
+    in_map = {key: (value, f"{where}: {key}") for key, value in content.items() if key in _ALLOWED}
+    in_map |= {key: (value, f"{where}: {gauge}.{key}") for key, value in content.get(gauge, {}).items()}
+    in_map |= {key: (value, f"--set {key}") for key, value in given.items() if key in _ALLOWED}
+    own = {key: value for key, value in given.items() if key.startswith(f"{gauge}_")}
+    return in_map | {key.removeprefix(f"{gauge}_"): (value, f"--set {key}") for key, value in own.items()}
 
 
-def _channel(gauge: str, given: Iterable[tuple[str, Any, str]], where: str) -> Channel:
-    latest = {key: (value, place) for key, value, place in given}
+def _channel(gauge: str, given: dict[str, tuple[Any, str]], where: str) -> Channel:
     read: dict[str, Any] = {"function": Function.READ_HOLDING}
-    read |= {key: _parse(key, value, place) for key, (value, place) in latest.items()}
+    read |= {key: _parse(key, value, place) for key, (value, place) in given.items()}
     for key in ("unit", "register"):
         if key not in read:
-            raise SettingsError(
-                "{where}: {gauge}.{key} is missing: give it in the map, or --set {gauge}_{key}=NUMBER",
-                where=where,
-                gauge=gauge,
-                key=key,
+            template = N_(
+                "{where}: {gauge}.{key} is missing: give it in the map, or --set {gauge}_{key}=NUMBER"
             )
+            raise SettingsError(template, where=where, gauge=gauge, key=key)
     if "zero_register" in read and "zero_value" not in read:
-        raise SettingsError(
-            "{where}: {gauge}.zero_value is missing: give what zero_register takes as the command",
-            where=where,
-            gauge=gauge,
-        )
+        template = N_("{where}: {gauge}.zero_value is missing: give what zero_register takes as the command")
+        raise SettingsError(template, where=where, gauge=gauge)
     if "status_register" not in read:
         read = {key: value for key, value in read.items() if not key.endswith(("_bits", "_bit"))}
     return msgspec.convert(read, Channel)
@@ -181,19 +132,15 @@ def _parse(key: str, value: Any, place: str) -> Any:
             parsed = int(value, 0)
     try:
         parsed = msgspec.convert(parsed, _TYPES[key], strict=False)
-        is_possible = (
-            parsed in _FUNCTIONS.get(key, (parsed,)) if key != "scale" else 0 < abs(parsed) < math.inf
-        )
+        is_possible = parsed in _FUNCTIONS.get(key, (parsed,))
+        if key == "scale":
+            is_possible = 0 < abs(parsed) < math.inf
     except msgspec.ValidationError:
         is_possible = False
-    if not is_possible:
-        raise SettingsError(
-            "{where} = {value} cannot be: give {allowed}",
-            where=place,
-            value=repr(value),
-            allowed=_ALLOWED[key],
-        )
-    return parsed
+    if is_possible:
+        return parsed
+    template = N_("{where} = {value} cannot be: give {allowed}")
+    raise SettingsError(template, where=place, value=repr(value), allowed=_ALLOWED[key])
 
 
 def _whole(low: int, high: int) -> Message:
@@ -203,19 +150,22 @@ def _whole(low: int, high: int) -> Message:
 _TYPES = {one.encode_name: one.type for one in msgspec.structs.fields(Channel)}
 _FUNCTIONS = {"function": READ_FUNCTIONS, "zero_function": WRITE_FUNCTIONS}
 _BITS = message("bits from 0 to {last}, such as [2, 3] (--set: 2,3)", last=WORD_BITS - 1)
+_WORD = _whole(0, 0xFFFF)
 _ALLOWED = {
     "unit": _whole(1, MAX_UNIT),
     "function": message("{first} or {second}", first=3, second=4),
-    "register": _whole(0, 0xFFFF),
+    "register": _WORD,
     "type": message("one of {names}", names=list(ValueType)),
     "order": message("one of {names}", names=list(ByteOrder)),
     "scale": message("a number that is not 0"),
-    "status_register": _whole(0, 0xFFFF),
+    "status_register": _WORD,
     "overload_bits": _BITS,
     "fault_bits": _BITS,
     "sign_bit": _whole(0, WORD_BITS - 1),
-    "zero_register": _whole(0, 0xFFFF),
-    "zero_value": _whole(0, 0xFFFF),
+    "zero_register": _WORD,
+    "zero_value": _WORD,
     "zero_function": message("{first} or {second}", first=6, second=16),
 }
 """Allowed values in messages, by the keys of a map."""
+MAP_KEYS = tuple(_ALLOWED)
+"""Keys of a map that `--set` may give for both gauges, or with `table_` or `relative_` for one."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.devices.modbus.decoder import sample_period_ns
-from drivers.devices.modbus.frames import LONGEST, Request, is_complete
+from drivers.devices.modbus.frames import LONGEST, Request
 from drivers.host_time import host_ns
 from drivers.source import Link
 
@@ -59,17 +59,16 @@ class Transaction:
 
 
 def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
-    """Send a request and read its response.
+    """Send a request and read its response; may raise DeviceLostError.
 
     Reading ends when the response is complete, after `timeout_s`, or in an incomplete response after one read
     without bytes (50 ms on a port).
-    Raises DeviceLostError.
     """
     received = b""
     sent_ns = host_ns()
     deadline_s = time.monotonic() + timeout_s
     link.write(request.encode())
-    while not is_complete(request, received) and time.monotonic() < deadline_s:
+    while not request.is_complete(received) and time.monotonic() < deadline_s:
         data = link.read()
         if received and not data:
             break
@@ -98,7 +97,6 @@ class PollSchedule:
         self._period_ns = sample_period_ns(rate_hz)
         self._cell = host_ns() // self._period_ns + 1
         self.tolerance_ns = max(round(_TOLERANCE * self._period_ns), _TOLERANCE_NS)
-        """How far measurements may be from their places in the grid."""
         self._window_ns = self.due_ns
         self._wakeups = self._late_wakeups = 0
         self.is_computer_busy = False
@@ -118,19 +116,16 @@ class PollSchedule:
         time.sleep(max(0, min(wait_ns, _MAX_WAIT_NS)) / _NS)
         late_ns = host_ns() - self.due_ns
         if late_ns >= 0:
-            self._update_load(late_ns > self.tolerance_ns)
+            self._wakeups += 1
+            self._late_wakeups += late_ns > self.tolerance_ns
+        if late_ns >= 0 and self.due_ns - self._window_ns > _WINDOW_NS:
+            self.is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
+            self._window_ns, self._wakeups, self._late_wakeups = self.due_ns, 0, 0
         return 0 <= late_ns <= self.tolerance_ns
 
     def mark_used(self, measured_ns: int) -> None:
         """Go on to the cell after the due one and after that of the measurement."""
         self._cell = max(self._cell, measured_ns // self._period_ns) + 1
-
-    def _update_load(self, is_late: bool) -> None:
-        self._wakeups += 1
-        self._late_wakeups += is_late
-        if self.due_ns - self._window_ns > _WINDOW_NS:
-            self.is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
-            self._window_ns, self._wakeups, self._late_wakeups = self.due_ns, 0, 0
 
 
 class ResponseTiming:
@@ -149,8 +144,10 @@ class ResponseTiming:
 
     @property
     def max_rate_hz(self) -> float:
-        """Highest rate at which the device answers nearly all polls."""
-        return round_down(1 / (_RATE_MARGIN * self._slow_s))
+        """Highest rate, of two digits or a multiple of five, at which the device answers nearly all polls."""
+        rate_hz = 1 / (_RATE_MARGIN * self._slow_s)
+        step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
+        return float(f"{math.floor(rate_hz / step) * step:.6g}")
 
     def skew_s(self, first: int, last: int) -> float:
         """Time from the measurement of one request to that of another (s)."""
@@ -161,11 +158,7 @@ class ResponseTiming:
         return self._shortest_s > _WIRE_S and transaction.duration_s < _STALE_SHARE * self._shortest_s
 
     def is_on_schedule(self, request: int, transaction: Transaction, schedule: PollSchedule) -> bool:
-        """Whether a measurement is at its place in the grid.
-
-        A row has the time of its cell, so a measurement that is much earlier or later in its cell than the
-        others would be wrong.
-        """
+        """Whether a measurement is at its place in the grid: a row has the time of its cell."""
         return abs(self._deviation_ns(request, transaction, schedule)) <= schedule.tolerance_ns
 
     def update(self, request: int, transaction: Transaction, schedule: PollSchedule) -> None:
@@ -176,9 +169,3 @@ class ResponseTiming:
 
     def _deviation_ns(self, request: int, transaction: Transaction, schedule: PollSchedule) -> int:
         return transaction.measured_ns - schedule.due_ns - self._phases_ns[request]
-
-
-def round_down(rate_hz: float) -> float:
-    """A rate of two digits, or a multiple of five."""
-    step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
-    return float(f"{math.floor(rate_hz / step) * step:.6g}")

@@ -39,7 +39,6 @@ _CODES = {
     ValueType.FLOAT32: ">f",
 }
 
-
 _Register = Annotated[int, Meta(ge=0, le=0xFFFF)]
 _Bit = Annotated[int, Meta(ge=0, le=WORD_BITS - 1)]
 
@@ -90,24 +89,21 @@ def decode_channel(channel: Channel, value: bytes, status_word: int) -> ChannelV
         raw = -abs(raw)
     return ChannelValue(
         counts=raw * channel.scale,
-        is_overloaded=_any(status_word, channel.overload_bits) or raw in _limits(channel.kind),
-        is_faulty=_any(status_word, channel.fault_bits) or raw - raw != 0,  # neither nan nor infinite
+        is_overloaded=bool(status_word & _mask(channel.overload_bits)) or raw in _limits(channel.kind),
+        is_faulty=bool(status_word & _mask(channel.fault_bits)) or raw - raw != 0,  # neither nan nor infinite
     )
 
 
 def encode_channel(channel: Channel, reading: ChannelValue) -> tuple[bytes, int]:
     """Bytes of the registers and status register for a value, limited to their range."""
-    raw = reading.counts / channel.scale
-    word = 0
+    raw, word = reading.counts / channel.scale, 0
     if channel.sign_bit is not None and raw < 0:
         raw, word = -raw, 1 << channel.sign_bit
     if channel.kind is not ValueType.FLOAT32:
         low, high = _limits(channel.kind)
         raw = min(max(round(raw), low), high)
-    if reading.is_overloaded:
-        word |= _mask(channel.overload_bits)
-    if reading.is_faulty:
-        word |= _mask(channel.fault_bits)
+    word |= _mask(channel.overload_bits) if reading.is_overloaded else 0
+    word |= _mask(channel.fault_bits) if reading.is_faulty else 0
     return reorder_bytes(struct.pack(_CODES[channel.kind], raw), channel.order), word
 
 
@@ -122,33 +118,15 @@ def reorder_bytes(data: bytes, order: ByteOrder) -> bytes:
 
 def _limits(kind: ValueType) -> tuple[int, ...]:
     """Least and largest whole number of a type; a value there is clipped."""
+    if kind is ValueType.FLOAT32:
+        return ()
     bits = 8 * struct.calcsize(_CODES[kind])
-    match kind:
-        case ValueType.FLOAT32:
-            return ()
-        case ValueType.INT16 | ValueType.INT32:
-            return -(1 << bits - 1), (1 << bits - 1) - 1
-    return 0, (1 << bits) - 1
+    low = -(1 << bits - 1) if kind in (ValueType.INT16, ValueType.INT32) else 0
+    return low, low + (1 << bits) - 1
 
 
 def _mask(bits: tuple[int, ...]) -> int:
     return sum(1 << bit for bit in bits)
-
-
-def _any(word: int, bits: tuple[int, ...]) -> bool:
-    return bool(word & _mask(bits))
-
-
-@dataclass(frozen=True, slots=True)
-class RegisterLocation:
-    """Position of registers: number of the request, and byte in its response."""
-
-    request: int
-    start: int
-
-    def bytes_of(self, answers: list[bytes], registers: int) -> bytes:
-        """So many registers from here, of the responses to all requests."""
-        return answers[self.request][self.start : self.start + 2 * registers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,48 +137,51 @@ class Poll:
     """In the order in which they are sent; one where all registers are adjacent in one unit. The time of the
     first is that of the sample."""
     channels: tuple[Channel, ...]
-    values: tuple[RegisterLocation, ...]
-    states: tuple[RegisterLocation | None, ...]
+
+    @property
+    def gauge_requests(self) -> tuple[int, int]:
+        """Numbers of the requests that read the first and the last channel."""
+        return self._request_of(self.channels[0]), self._request_of(self.channels[-1])
 
     def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
-        """Values of all channels, from the responses to all requests."""
-        return [
-            decode_channel(
-                channel,
-                value.bytes_of(answers, channel.registers),
-                0 if state is None else int.from_bytes(state.bytes_of(answers, 1), "big"),
-            )
-            for channel, value, state in zip(self.channels, self.values, self.states, strict=True)
-        ]
+        """Values of all channels, from the registers that all requests brought."""
+        values = []
+        for channel in self.channels:
+            state = channel.status_register
+            word = 0 if state is None else int.from_bytes(self._find(answers, channel, state, 1), "big")
+            value = self._find(answers, channel, channel.register, channel.registers)
+            values.append(decode_channel(channel, value, word))
+        return values
+
+    def _request_of(self, channel: Channel, register: int | None = None) -> int:
+        wanted = channel.register if register is None else register
+        return next(
+            number
+            for number, request in enumerate(self.requests)
+            if (request.unit, request.function) == (channel.unit, channel.function)
+            and request.register <= wanted < request.register + request.count
+        )
+
+    def _find(self, answers: list[bytes], channel: Channel, register: int, registers: int) -> bytes:
+        number = self._request_of(channel, register)
+        start = 2 * (register - self.requests[number].register)
+        return answers[number][start : start + 2 * registers]
 
 
 def plan_poll(channels: tuple[Channel, ...]) -> Poll:
     """The fewest requests that read only the needed registers."""
     spans: dict[tuple[int, Function], list[tuple[int, int]]] = {}
     for channel in channels:
-        spans.setdefault((channel.unit, channel.function), []).extend(_spans(channel))
+        needed = spans.setdefault((channel.unit, channel.function), [])
+        needed.append((channel.register, channel.register + channel.registers))
+        if channel.status_register is not None:
+            needed.append((channel.status_register, channel.status_register + 1))
     requests = tuple(
         Request(unit, function, first, end - first)
         for (unit, function), parts in spans.items()
         for first, end in _merge_spans(parts)
     )
-    return Poll(
-        requests=requests,
-        channels=channels,
-        values=tuple(_find(requests, channel, channel.register) for channel in channels),
-        states=tuple(
-            None if channel.status_register is None else _find(requests, channel, channel.status_register)
-            for channel in channels
-        ),
-    )
-
-
-def _spans(channel: Channel) -> list[tuple[int, int]]:
-    """Registers of a channel, as (first, end)."""
-    spans = [(channel.register, channel.register + channel.registers)]
-    if channel.status_register is not None:
-        spans.append((channel.status_register, channel.status_register + 1))
-    return spans
+    return Poll(requests, channels)
 
 
 def _merge_spans(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -212,11 +193,3 @@ def _merge_spans(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
         else:
             joined.append((first, end))
     return joined
-
-
-def _find(requests: tuple[Request, ...], channel: Channel, register: int) -> RegisterLocation:
-    for i, request in enumerate(requests):
-        holds = request.register <= register < request.register + request.count
-        if holds and (request.unit, request.function) == (channel.unit, channel.function):
-            return RegisterLocation(i, 2 * (register - request.register))
-    raise LookupError(f"register {register} is in no request")

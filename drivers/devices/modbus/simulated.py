@@ -8,7 +8,7 @@ from drivers.arrays import Int32s
 from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.frames import Function
 from drivers.devices.modbus.maps import RegisterMap
-from drivers.devices.modbus.registers import Channel, ChannelValue, encode_channel
+from drivers.devices.modbus.registers import ChannelValue, encode_channel
 from drivers.devices.modbus.source import read_modbus_settings
 from drivers.driver import GAUGES
 from drivers.samples import SampleStatus
@@ -27,7 +27,10 @@ _OVERLOADS = {"table": SampleStatus.OVERLOAD_TABLE, "relative": SampleStatus.OVE
 def find_commands(data: bytes) -> tuple[list[Command], int]:
     """Requests in `data`: `code` is the unit, `parameters` are all from the function on."""
     commands, at = [], 0
-    while (size := _request_bytes(data, at)) and at + size <= len(data):
+    while at + _READ_BYTES <= len(data):
+        size = 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES
+        if at + size > len(data):
+            break
         frame = data[at : at + size]
         if frames.with_crc(frame[:-2]) == frame:
             commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
@@ -35,13 +38,6 @@ def find_commands(data: bytes) -> tuple[list[Command], int]:
         else:
             at += 1
     return commands, at
-
-
-def _request_bytes(data: bytes, at: int) -> int:
-    """Length of the request at `at`; 0 while it is not known."""
-    if len(data) < at + _READ_BYTES:
-        return 0
-    return 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES
 
 
 class SimulatedModbus(PolledProtocol):
@@ -67,7 +63,12 @@ class SimulatedModbus(PolledProtocol):
         states: dict[tuple[int, int, int], int] = {}
         for gauge, channel in self._channels.items():
             reading = ChannelValue(self._latest[gauge] - self._zero[gauge], bool(status & _OVERLOADS[gauge]))
-            self._put(channel, reading, states)
+            value, word = encode_channel(channel, reading)
+            held = self._registers.setdefault((channel.unit, channel.function), {})
+            held.update(enumerate(struct.unpack(f">{channel.registers}H", value), channel.register))
+            if channel.status_register is not None:
+                place = (channel.unit, channel.function, channel.status_register)
+                states[place] = states.get(place, 0) | word  # two channels may share it
         for (unit, function, register), word in states.items():
             self._registers[unit, function][register] = word
 
@@ -81,14 +82,6 @@ class SimulatedModbus(PolledProtocol):
         if function in frames.WRITE_FUNCTIONS:
             return self._write(unit, function, command.parameters)
         return frames.encode_exception(unit, function, _ILLEGAL_FUNCTION)
-
-    def _put(self, channel: Channel, reading: ChannelValue, states: dict[tuple[int, int, int], int]) -> None:
-        held = self._registers.setdefault((channel.unit, channel.function), {})
-        value, status = encode_channel(channel, reading)
-        held.update(enumerate(struct.unpack(f">{channel.registers}H", value), channel.register))
-        if channel.status_register is not None:
-            place = (channel.unit, channel.function, channel.status_register)
-            states[place] = states.get(place, 0) | status  # two channels may share it
 
     def _read(self, unit: int, function: int, asked: bytes) -> bytes:
         first, count = struct.unpack_from(">HH", asked, 1)

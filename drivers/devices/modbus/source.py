@@ -7,25 +7,19 @@ from typing import Literal
 
 import msgspec
 
-from drivers.clock import Skew
 from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.devices.modbus.frames import (
-    ExceptionResponse,
-    Function,
-    InvalidResponse,
-    RegisterResponse,
-    Request,
-)
-from drivers.devices.modbus.maps import RegisterMap, is_map_key, map_keys, read_map
+from drivers.devices.modbus.frames import Function, Request, Response
+from drivers.devices.modbus.maps import MAP_KEYS, RegisterMap, is_map_key, read_map
 from drivers.devices.modbus.polling import PollSchedule, ResponseTiming, Transaction, drain, transact
-from drivers.devices.modbus.registers import Poll, plan_poll
+from drivers.devices.modbus.registers import plan_poll
 from drivers.driver import GAUGES
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, describe_unreadable
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import StreamSource, parse_settings
+from drivers.stream import SampleSource, parse_settings
+from messages.i18n import N_
 from messages.message import Message, joined, message, option
 
 MAX_RATE_HZ = 1000.0
@@ -33,6 +27,10 @@ QUASI_STATIC_HZ = 500.0
 """Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
 _TRIALS = 24
 """Trial polls before the stream; the slowest two in ten of them set the rate."""
+_TOO_BUSY = N_(
+    "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
+    " out: close other programs, or ask for a lower rate"
+)
 _QUERY = Request(1, Function.READ_HOLDING, 0)
 
 
@@ -58,7 +56,7 @@ class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return GAUGES if self.channel == "both" else (self.channel,)
 
 
-class ModbusSource(StreamSource):
+class ModbusSource(SampleSource):
     """Conversation: ask until there is a response, measure the response time, then poll at the rate.
 
     Rows lie on a grid of the host's clock (`drivers.devices.modbus.decoder`). A poll is made at the beginning
@@ -74,7 +72,7 @@ class ModbusSource(StreamSource):
         super().__init__(identity, DRIVER.default_baud, rate_hz)
         self._settings = settings
         self._map = register_map
-        self._poll: Poll = plan_poll(tuple(register_map.channels[gauge] for gauge in settings.gauges))
+        self._poll = plan_poll(tuple(register_map.channels[gauge] for gauge in settings.gauges))
         self._schedule: PollSchedule | None = None
         self._timing: ResponseTiming | None = None
         self._response_overdue = False
@@ -87,8 +85,7 @@ class ModbusSource(StreamSource):
     @property
     def skew_s(self) -> float:
         """How much later gauge 2 is measured than gauge 1 in one poll (s); 0 before the start."""
-        first, last = self._poll.values[0].request, self._poll.values[-1].request
-        return self._timing.skew_s(first, last) if self._timing else 0.0
+        return self._timing.skew_s(*self._poll.gauge_requests) if self._timing else 0.0
 
     @property
     def channels(self) -> int:
@@ -99,26 +96,14 @@ class ModbusSource(StreamSource):
         """Quasi-static rate, caution of the map, and skew of two requests."""
         parts: list[Message] = []
         if self.rate_hz < QUASI_STATIC_HZ:
-            parts.append(
-                message(
-                    "polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely",
-                    rate_hz=self.rate_hz,
-                )
-            )
+            template = N_("polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely")
+            parts.append(message(template, rate_hz=self.rate_hz))
         if self._map.caution:
             parts.append(message("{caution}", caution=self._map.caution))
         if self.skew_s:
-            parts.append(
-                message(
-                    "gauge 2 is asked {skew_ms:.2g} ms after gauge 1, one request after the other",
-                    skew_ms=1e3 * self.skew_s,
-                )
-            )
+            template = N_("gauge 2 is asked {skew_ms:.2g} ms after gauge 1, one request after the other")
+            parts.append(message(template, skew_ms=1e3 * self.skew_s))
         return joined(parts, "; ")
-
-    def skew(self, first_index: int, end_index: int) -> Skew | None:
-        decoder = self._decoder
-        return decoder.skew(first_index, end_index) if isinstance(decoder, ResponseDecoder) else None
 
     def prepare(self) -> None:
         decoder = self._decoder_at(1.0)
@@ -151,7 +136,9 @@ class ModbusSource(StreamSource):
         if schedule is None or timing is None:
             raise ProtocolError("the device was not started: start it before it is read")
         is_due = schedule.wait()
-        self._report_load(schedule.is_computer_busy)
+        if schedule.is_computer_busy and not self._was_busy:
+            self._warnings.append(message(_TOO_BUSY, rate_hz=self.rate_hz))
+        self._was_busy = schedule.is_computer_busy
         if not is_due:
             return b""
         wrapped, measured_ns = b"", 0
@@ -162,10 +149,11 @@ class ModbusSource(StreamSource):
             is_late = is_stale or not timing.is_on_schedule(number, transaction, schedule)
             if transaction.data:
                 wrapped += wrap_response(number, transaction.measured_ns, transaction.data, is_late=is_late)
-            is_response = self._resynchronise(link, request, transaction, is_stale=is_stale)
-            if is_response and not is_stale:
+            response = request.parse_response(transaction.data)
+            self._resynchronise(link, transaction.data, response, is_stale)
+            if not response.fault and not is_stale:
                 timing.update(number, transaction, schedule)
-            if is_late or not is_response:
+            if is_late or response.fault:
                 break
         schedule.mark_used(measured_ns)
         return wrapped
@@ -181,86 +169,62 @@ class ModbusSource(StreamSource):
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
         return ResponseDecoder(self._poll, columns, rate_hz)
 
-    def _report_load(self, is_busy: bool) -> None:
-        if is_busy and not self._was_busy:
-            self._warnings.append(
-                message(
-                    "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
-                    " out: close other programs, or ask for a lower rate",
-                    rate_hz=self.rate_hz,
-                )
-            )
-        self._was_busy = is_busy
-
-    def _resynchronise(
-        self, link: Link, request: Request, transaction: Transaction, *, is_stale: bool
-    ) -> bool:
-        """Make sure that the next bytes belong to the next request; returns whether these were a response.
+    def _resynchronise(self, link: Link, data: bytes, response: Response, is_stale: bool) -> None:
+        """Make sure that the next bytes belong to the next request.
 
         One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
         """
-        response = frames.parse_response(request, transaction.data)
-        was_invalid, self._was_invalid = self._was_invalid, isinstance(response, InvalidResponse)
-        if transaction.data and (is_stale or (was_invalid and self._was_invalid)):
+        was_invalid, self._was_invalid = self._was_invalid, response.is_invalid
+        if data and (is_stale or (was_invalid and response.is_invalid)):
             drain(link)
-        self._response_overdue = not transaction.data
-        return isinstance(response, RegisterResponse)
+        self._response_overdue = not data
 
     def _await_responses(self, link: Link) -> None:
         """Send all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
         deadline_s = time.monotonic() + self.timeout_s
         received = drain(link)
         for request in self._poll.requests:
-            last: ExceptionResponse | InvalidResponse | None = None
+            last: Response | None = None
             while True:
                 transaction = transact(link, request, self._settings.timeout_s)
-                response = frames.parse_response(request, transaction.data)
-                if isinstance(response, RegisterResponse):
+                response = request.parse_response(transaction.data)
+                if not response.fault:
                     break
                 received += transaction.data + drain(link)
                 last = response if last is None or transaction.data else last
                 if time.monotonic() > deadline_s:
                     raise self._no_response_error(request, last, received)
 
-    def _no_response_error(
-        self, request: Request, response: ExceptionResponse | InvalidResponse, received: bytes
-    ) -> Exception:
-        if isinstance(response, ExceptionResponse):
+    def _no_response_error(self, request: Request, response: Response, received: bytes) -> Exception:
+        unit, asked = request.unit, request.description
+        if response.is_exception:
             return ProtocolError(
                 "unit {unit} refuses {request}: {fault}. Hold register map {map} against the device's manual",
-                unit=request.unit,
-                request=request.description,
+                unit=unit,
+                request=asked,
                 fault=response.fault,
                 map=self._map.name,
             )
         if not received:
-            return NoDataError(
+            template = N_(
                 "unit {unit} does not answer {request}: check baud rate, parity and unit,"
-                " cable and power, and whether A and B are swapped",
-                unit=request.unit,
-                request=request.description,
+                " cable and power, and whether A and B are swapped"
             )
-        return NoDataError(
-            "no answer of unit {unit} to {request} ({reason}); {what}",
-            unit=request.unit,
-            request=request.description,
-            reason=response.fault,
-            what=describe_unreadable(received, DRIVER.name, DRIVER.default_baud),
-        )
+            return NoDataError(template, unit=unit, request=asked)
+        what = describe_unreadable(received, DRIVER.name, DRIVER.default_baud)
+        template = N_("no answer of unit {unit} to {request} ({reason}); {what}")
+        return NoDataError(template, unit=unit, request=asked, reason=response.fault, what=what)
 
     def _zero(self, link: Link) -> None:
         for gauge, channel in self._map.channels.items():
             if channel.zero_register is None or channel.zero_value is None:
                 continue
-            function, values = channel.zero_function, (channel.zero_value,)
-            request = Request(channel.unit, function, channel.zero_register, 1, values)
-            response = frames.parse_response(request, transact(link, request, self._settings.timeout_s).data)
-            if not isinstance(response, RegisterResponse):
-                raise ProtocolError(
-                    "the {gauge} gauge was not set to zero: {reason}. Try again, or without zero",
-                    gauge=gauge,
-                    reason=response.fault,
-                )
+            values = (channel.zero_value,)
+            request = Request(channel.unit, channel.zero_function, channel.zero_register, 1, values)
+            response = request.parse_response(transact(link, request, self._settings.timeout_s).data)
+            if response.fault:
+                template = N_("the {gauge} gauge was not set to zero: {reason}. Try again, or without zero")
+                raise ProtocolError(template, gauge=gauge, reason=response.fault)
 
     def _measure_timing(self, link: Link) -> None:
         """Measure the response time; choose the rate, or compare the one asked for with it."""
@@ -281,7 +245,7 @@ class ModbusSource(StreamSource):
         transactions = []
         for request in self._poll.requests:
             transactions.append(transact(link, request, self._settings.timeout_s))
-            if not isinstance(frames.parse_response(request, transactions[-1].data), RegisterResponse):
+            if request.parse_response(transactions[-1].data).fault:
                 drain(link)
         return transactions
 
@@ -307,21 +271,18 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
     """Settings of the driver, and the register map that they choose and change. Raises SettingsError."""
     own = {key: value for key, value in settings.items() if not is_map_key(key)}
     known = {field.name for field in msgspec.structs.fields(ModbusSettings)}
-    for key in own:
-        if key not in known:
-            raise SettingsError(
-                "setting {key!r} is not known to {protocol}: allowed are {allowed}, the keys of a map also"
-                " for one gauge, such as table_register",
-                key=key,
-                protocol=DRIVER.name,
-                allowed=[*sorted(known), *map_keys()],
-            )
+    unknown = next((key for key in own if key not in known), None)
+    if unknown is not None:
+        template = N_(
+            "setting {key!r} is not known to {protocol}: allowed are {allowed}, the keys of a map also"
+            " for one gauge, such as table_register"
+        )
+        allowed = [*sorted(known), *MAP_KEYS]
+        raise SettingsError(template, key=unknown, protocol=DRIVER.name, allowed=allowed)
     parsed = parse_settings(ModbusSettings, own, DRIVER.name)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(parsed.map, given, parsed.gauges)
-    if parsed.zero and not any(
-        channel.zero_register is not None for channel in register_map.channels.values()
-    ):
+    if parsed.zero and all(one.zero_register is None for one in register_map.channels.values()):
         raise SettingsError(
             "zero is asked for, but map {map} has no zero command: leave zero out, or give"
             " zero_register and zero_value from the device's manual",
@@ -339,13 +300,10 @@ def explain(received: bytes) -> Message | None:
 
 
 def _parse_response(received: bytes) -> Message | None:
-    if isinstance(frames.parse_response(_QUERY, received), InvalidResponse):
+    if _QUERY.parse_response(received).is_invalid:
         return None
-    return message(
-        "unit {unit} answers: choose its register map with {option} map=NAME",
-        unit=_QUERY.unit,
-        option=option("--set"),
-    )
+    template = N_("unit {unit} answers: choose its register map with {option} map=NAME")
+    return message(template, unit=_QUERY.unit, option=option("--set"))
 
 
 IDENTITY_QUERY = IdentityQuery(

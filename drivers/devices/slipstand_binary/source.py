@@ -11,7 +11,7 @@ from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import StreamSource, parse_settings
+from drivers.stream import SampleSource, parse_settings
 from messages.message import Message, message
 
 _TRIES = 4
@@ -26,7 +26,7 @@ class BinarySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The protocol has no settings."""
 
 
-class SlipstandBinarySource(StreamSource):
+class SlipstandBinarySource(SampleSource):
     """Conversation: stop, identify, set the rate where another is asked for, start."""
 
     answer_timeout_s = 0.5

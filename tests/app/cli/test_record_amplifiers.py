@@ -12,7 +12,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from drivers.devices.modbus.source import make_source
-from drivers.source import SampleSource
+from drivers.stream import SampleSource
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
 

@@ -5,16 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.devices.modbus.frames import (
-    ExceptionResponse,
     Function,
-    InvalidResponse,
-    RegisterResponse,
     Request,
+    Response,
     crc16_modbus,
     encode_exception,
     encode_read_response,
-    is_complete,
-    parse_response,
+    exception_response,
     with_crc,
 )
 
@@ -45,11 +42,11 @@ def test_requests_as_they_are_written(request_, wire):
 
 
 def test_answers_as_they_are_written():
-    assert parse_response(READ_ONE, ONE) == RegisterResponse(b"\x00\x01")
+    assert READ_ONE.parse_response(ONE) == Response(b"\x00\x01")
     new_address = Request(1, Function.WRITE_MULTIPLE, 0, 1, (2,))
-    assert parse_response(new_address, bytes.fromhex("01 10 00 00 00 01 01 C9")) == RegisterResponse(b"")
+    assert new_address.parse_response(bytes.fromhex("01 10 00 00 00 01 01 C9")) == Response(b"")
     write = Request(1, Function.WRITE_SINGLE, 1, 1, (3,))
-    assert parse_response(write, write.encode()) == RegisterResponse(b"")
+    assert write.parse_response(write.encode()) == Response(b"")
     assert encode_read_response(1, 3, b"\x00\x01") == ONE
 
 
@@ -58,16 +55,16 @@ def test_answers_as_they_are_written():
     [(1, "illegal function"), (2, "illegal data address"), (6, "device busy"), (99, "unknown reason")],
 )
 def test_an_exception_is_told_by_its_name(code, words):
-    answer = parse_response(READ_ONE, encode_exception(1, 3, code))
-    assert isinstance(answer, ExceptionResponse)
+    answer = READ_ONE.parse_response(encode_exception(1, 3, code))
+    assert answer.is_exception
     assert str(answer.fault) == f"{words} (exception {code})"
 
 
 def test_the_exception_of_the_specification():
     """Modbus over serial line guide: a request of function 3 that is refused for its address."""
     refused = bytes.fromhex("01 83 02 C0 F1")
-    assert is_complete(READ_ONE, refused)
-    assert parse_response(READ_ONE, refused) == ExceptionResponse(2)
+    assert READ_ONE.is_complete(refused)
+    assert READ_ONE.parse_response(refused) == exception_response(2)
 
 
 @pytest.mark.parametrize(
@@ -86,34 +83,34 @@ def test_the_exception_of_the_specification():
     ],
 )
 def test_what_is_no_answer(received, why):
-    answer = parse_response(READ_ONE, received)
-    assert isinstance(answer, InvalidResponse)
+    answer = READ_ONE.parse_response(received)
+    assert answer.is_invalid
     assert why in str(answer.fault)
 
 
 def test_the_echo_of_another_write_is_no_answer():
     write, other = (Request(1, Function.WRITE_SINGLE, 5, 1, (value,)) for value in (7, 8))
-    assert isinstance(parse_response(write, other.encode()), InvalidResponse)
+    assert write.parse_response(other.encode()).is_invalid
 
 
 def test_an_answer_is_awaited_to_its_last_byte():
-    assert [is_complete(READ_ONE, ONE[:size]) for size in range(8)] == [False] * 7 + [True]
+    assert [READ_ONE.is_complete(ONE[:size]) for size in range(8)] == [False] * 7 + [True]
     refused = encode_exception(1, 3, 2)
-    assert [is_complete(READ_ONE, refused[:size]) for size in range(6)] == [False] * 5 + [True]
+    assert [READ_ONE.is_complete(refused[:size]) for size in range(6)] == [False] * 5 + [True]
 
 
 @given(st.integers(0, len(ONE) * 8 - 1))
 def test_no_single_wrong_bit_is_believed(bit):
     damaged = bytearray(ONE)
     damaged[bit // 8] ^= 1 << bit % 8
-    assert isinstance(parse_response(READ_ONE, bytes(damaged)), InvalidResponse)
+    assert READ_ONE.parse_response(bytes(damaged)).is_invalid
 
 
 @given(st.binary(max_size=300))
 def test_rubbish_is_no_answer_and_raises_nothing(data):
     if data != ONE and not (len(data) > 2 and with_crc(data[:-2]) == data):
-        assert isinstance(parse_response(READ_ONE, data), InvalidResponse)
-    is_complete(READ_ONE, data)
+        assert READ_ONE.parse_response(data).is_invalid
+    READ_ONE.is_complete(data)
 
 
 def test_a_request_says_what_it_asks_for():

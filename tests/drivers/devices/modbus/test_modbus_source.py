@@ -3,7 +3,7 @@ import pytest
 from modbus_kit import COUNTS, Clock, Transmitter
 from wire_helpers import join
 
-from drivers.devices.modbus.frames import Function, Request, encode_exception, parse_response, with_crc
+from drivers.devices.modbus.frames import Function, Request, encode_exception, with_crc
 from drivers.devices.modbus.simulated import find_commands
 from drivers.devices.modbus.source import ModbusSource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
@@ -396,4 +396,4 @@ def test_settings_survive_a_round_trip(clock):
         Request(7, Function.READ_HOLDING, 6, 1).encode(), Request(7, Function.READ_HOLDING, 9, 2).encode()
     }  # fmt: skip
     answer = link.registers.respond(*_asked(Request(7, Function.READ_HOLDING, 9, 2)))
-    assert parse_response(Request(7, Function.READ_HOLDING, 9, 2), answer)
+    assert Request(7, Function.READ_HOLDING, 9, 2).parse_response(answer)
