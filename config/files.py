@@ -24,6 +24,7 @@ from config.schema import (
     Stand,
     WindowLayout,
 )
+from messages.i18n import N_
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -233,11 +234,8 @@ def _write(path: Path, text: str, mode: str) -> None:
 
 
 def _unwritable(path: Path, error: OSError) -> ConfigError:
-    return ConfigError(
-        "{path}: cannot be written ({fault}). Check the folder, its rights and its disk",
-        path=path,
-        fault=error.strerror or error,
-    )
+    template = N_("{path}: cannot be written ({fault}). Check the folder, its rights and its disk")
+    return ConfigError(template, path=path, fault=error.strerror or error)
 
 
 @cache
@@ -277,11 +275,8 @@ def published_row(series: str) -> PublishedRow:
     try:
         return published_table()[series]
     except KeyError:
-        raise ConfigError(
-            "series {series!r} has no row in Table 1: choose one of {series_of_table}",
-            series=series,
-            series_of_table=list(published_table()),
-        ) from None
+        template = N_("series {series!r} has no row in Table 1: choose one of {series_of_table}")
+        raise ConfigError(template, series=series, series_of_table=list(published_table())) from None
 
 
 def _load_or_default(path: Path, kind: type[T]) -> T:
@@ -292,11 +287,8 @@ def _load(path: Path, kind: type[T]) -> T:
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ConfigError(
-            "{path}: there is no such file. Give the path of a {kind} file",
-            path=path,
-            kind="stand" if kind is Stand else "calibration",
-        ) from None
+        template = N_("{path}: there is no such file. Give the path of a {kind} file")
+        raise ConfigError(template, path=path, kind="stand" if kind is Stand else "calibration") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
             "{path}: cannot be read ({fault}). Give a readable UTF-8 text file", path=path, fault=error

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from drivers.errors import SettingsError
+from messages.i18n import N_
 from messages.message import Message
 
 if TYPE_CHECKING:
@@ -101,17 +102,12 @@ class DeviceDriver:
                 GAUGES.index(gauge) if own else 0,
             )
         if self.channels > 1:
-            raise SettingsError(
-                "protocol {protocol} has both gauges on one port: leave the port of gauge 2 out",
-                protocol=self.name,
-            )
+            template = N_("protocol {protocol} has both gauges on one port: leave the port of gauge 2 out")
+            raise SettingsError(template, protocol=self.name)
         return dict(settings), 0
 
     def _source(self) -> Any:
         if not self.available:
-            raise SettingsError(
-                "protocol {name!r} ({title}) comes later: choose another one",
-                name=self.name,
-                title=self.title,
-            )
+            template = N_("protocol {name!r} ({title}) comes later: choose another one")
+            raise SettingsError(template, name=self.name, title=self.title)
         return import_module(f"{self.package}.source")

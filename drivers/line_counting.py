@@ -4,13 +4,11 @@ A reading is called a line here, whatever its bytes look like: a record with the
 time, sequence, table and relative.
 """
 
-import math
-
 import numpy as np
 
 from drivers.arrays import Floats, Record, Records
 from drivers.compiled import compiled, inlined
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, count_packet, is_plausible_gap
+from drivers.packets import LOSS_FIELDS, count_packet, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -56,19 +54,15 @@ _RELATIVE = int(SampleStatus.OVERLOAD_RELATIVE)
 def make_rules(
     place: int,
     rate_hz: float,
-    *,
-    unit_s: float = 0.0,
-    clock_step_s: float = 0.0,
-    time_wrap: float = 0.0,
-    sequence_wrap: float = 0.0,
-    overload_count: float = math.inf,
-    max_gap_s: float = MAX_GAP_S,
+    unit_s: float,
+    clock_step_s: float,
+    wraps: tuple[float, float],
+    overload_count: float,
+    max_gap_s: float,
 ) -> Records:
-    """(1,) RULES; `place` is one of BY_SEQUENCE, BY_TIME and BY_COUNT, the gap in seconds."""
-    rules = np.zeros(1, dtype=RULES)
-    max_gap = max_gap_s * rate_hz
-    rules[0] = place, 1 / rate_hz, unit_s, clock_step_s, time_wrap, sequence_wrap, max_gap, overload_count
-    return rules
+    """(1,) RULES; `place` is one of BY_SEQUENCE, BY_TIME and BY_COUNT, `wraps` those of time and sequence."""
+    values = (place, 1 / rate_hz, unit_s, clock_step_s, *wraps, max_gap_s * rate_hz, overload_count)
+    return np.array([values], dtype=RULES)
 
 
 @compiled
@@ -112,15 +106,12 @@ def _step(stream: Record, rule: Record, line: Record) -> int:
         return 1
     if rule.place == BY_COUNT:
         return _NEW_START if stream.restarting else 1 + int(stream.broken)
-    is_numbered = rule.place == BY_SEQUENCE
-    step = _sequence_step(stream, rule, line) if is_numbered else _time_step(stream, rule, line)
+    if rule.place == BY_SEQUENCE:
+        ahead = _advance(line.sequence - stream.last_sequence, rule.sequence_wrap)
+        step = int(ahead) if 0 <= ahead <= rule.max_gap + 1 else _NEW_START
+    else:
+        step = _time_step(stream, rule, line)
     return _NEW_START if stream.restarting and not is_plausible_gap(stream, step - 1) else step
-
-
-@inlined
-def _sequence_step(stream: Record, rule: Record, line: Record) -> int:
-    step = _advance(line.sequence - stream.last_sequence, rule.sequence_wrap)
-    return int(step) if 0 <= step <= rule.max_gap + 1 else _NEW_START
 
 
 @inlined

@@ -6,7 +6,7 @@ reduces its bytes to packets; how packets become rows is the same for all device
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -56,18 +56,6 @@ _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)
 
 
-@dataclass(frozen=True, slots=True)
-class Position:
-    """Where packets begin in the stream."""
-
-    first_index: int
-    """Of the first lost or good sample of the first packet."""
-    last_time_s: float
-    """Device time of the row before it."""
-    period_s: float
-    """Nominal time between the samples of a packet."""
-
-
 class PacketDecoder(Decoder):
     """A `Decoder` for devices that send by themselves; a device adds `_find_packets`.
 
@@ -80,6 +68,9 @@ class PacketDecoder(Decoder):
     _has_time = True
     """Whether the device sends its time."""
 
+    _loss_estimator: "LossEstimator | None" = None
+    """For a device whose stream proves no loss."""
+
     def __init__(self, state: Records, rate_hz: float, max_gap_s: float) -> None:
         self._state = state
         self._rate_hz = rate_hz
@@ -90,8 +81,10 @@ class PacketDecoder(Decoder):
 
     @property
     def losses(self) -> Losses:
-        state = self._state[0]
-        return Losses(**{name: int(state[name]) for name, _ in LOSS_FIELDS})
+        losses = Losses(*(int(self._state[0][name]) for name, _ in LOSS_FIELDS))
+        if self._loss_estimator is not None:
+            losses.missing_estimated += self._loss_estimator.lost
+        return losses
 
     @property
     def unfinished_bytes(self) -> int:
@@ -105,7 +98,7 @@ class PacketDecoder(Decoder):
         self._unfinished = b""
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; unfinished bytes are kept. Exhaust it."""
+        period_s = 1 / self._rate_hz
         for start in range(0, len(data), self._piece_bytes):
             piece = self._unfinished + data[start : start + self._piece_bytes]
             first_index, last_time_s = int(self._state["samples"][0]), float(self._state["row_time_s"][0])
@@ -113,9 +106,11 @@ class PacketDecoder(Decoder):
             if not len(packets):
                 continue
             self._arrival_ns = arrival_ns
-            rows = int(self._state["samples"][0]) - first_index
-            position = Position(first_index, last_time_s, 1 / self._rate_hz)
-            yield from sample_blocks(packets, counts, rows, position, arrival_ns, has_time=self._has_time)
+            rows = range(first_index, int(self._state["samples"][0]))
+            if self._loss_estimator is not None:
+                self._loss_estimator.add(rows.stop, arrival_ns)
+            blocks = sample_blocks(packets, counts, rows, last_time_s, period_s, arrival_ns)
+            yield from blocks if self._has_time else (replace(one, device_time_s=None) for one in blocks)
 
     @abstractmethod
     def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
@@ -133,30 +128,22 @@ class PacketDecoder(Decoder):
 
 
 def sample_blocks(
-    packets: Records,
-    samples: Counts,
-    rows: int,
-    position: Position,
-    arrival_ns: int,
-    *,
-    has_time: bool = True,
+    packets: Records, samples: Counts, rows: range, last_time_s: float, period_s: float, arrival_ns: int
 ) -> Iterator[SampleBlock]:
     """Rows of packets (p,) with samples (s, 2), lost rows included, in blocks of at most `MAX_BLOCK_ROWS`.
 
-    `rows` is the number of good and lost samples together.
+    `last_time_s` is the device time of the row before, `period_s` the nominal one between samples.
     """
     cursor = np.zeros(1, dtype=CURSOR)
-    cursor["time_s"] = position.last_time_s
-    done = 0
-    while done < rows:
-        size = min(rows - done, MAX_BLOCK_ROWS)
+    cursor["time_s"] = last_time_s
+    first = rows.start
+    while first < rows.stop:
+        size = min(rows.stop - first, MAX_BLOCK_ROWS)
         counts = np.empty((size, 2), dtype=samples.dtype)
-        status = np.empty(size, dtype=np.uint8)
-        times_s = np.empty(size)
-        size = fill_rows(packets, samples, position.period_s, cursor, counts, status, times_s)
-        device_s = times_s[:size] if has_time else None
-        yield SampleBlock(position.first_index + done, counts[:size], status[:size], arrival_ns, device_s)
-        done += size
+        status, times_s = np.empty(size, dtype=np.uint8), np.empty(size)
+        size = fill_rows(packets, samples, period_s, cursor, counts, status, times_s)
+        yield SampleBlock(first, counts[:size], status[:size], arrival_ns, times_s[:size])
+        first += size
 
 
 @inlined
@@ -164,12 +151,9 @@ def count_packet(state: Record, packet: Record, is_estimated: bool) -> None:
     """Add a packet and the rows before it to the counts of a decoder's state."""
     state.samples += packet.damaged + packet.missing + packet.samples
     state.damaged += packet.damaged
-    if is_estimated:
-        state.missing_estimated += packet.missing
-    else:
-        state.missing += packet.missing
-    if packet.status:
-        state.overloaded += packet.samples
+    state.missing_estimated += packet.missing if is_estimated else 0
+    state.missing += 0 if is_estimated else packet.missing
+    state.overloaded += packet.samples if packet.status else 0
 
 
 @inlined
@@ -193,8 +177,7 @@ def fill_rows(
     times_s: Floats,
 ) -> int:
     """Fill one block (counts, status, times) from `cursor` on; returns the number of rows."""
-    place = cursor[0]
-    row = 0
+    place, row = cursor[0], 0
     while place.packet < len(packets):
         packet = packets[place.packet]
         row = _fill_gap(packet, place, row, counts, status, times_s)
@@ -250,9 +233,7 @@ class LossEstimator:
         self._rate_hz = rate_hz
         self._first: tuple[int, int] | None = None
         self._window = 0
-        self._elapsed_s = 0.0
-        self._least = self._before = self._now = 0.0
-        self._worst = self._recovered = 0.0
+        self._elapsed_s = self._least = self._before = self._now = self._worst = self._recovered = 0.0
 
     @property
     def lost(self) -> int:

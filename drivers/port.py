@@ -389,12 +389,8 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
             )
         return PortUnavailableError(template, port=url, present=present)
     if isinstance(error, (ValueError, OverflowError)):
-        return SettingsError(
-            "port {port} cannot be set to {baud} baud ({fault}): give another --baud",
-            port=url,
-            baud=baud,
-            fault=error,
-        )
+        template = N_("port {port} cannot be set to {baud} baud ({fault}): give another --baud")
+        return SettingsError(template, port=url, baud=baud, fault=error)
     return PortUnavailableError(
         "{port} cannot be used as a serial port ({fault}): give the name of a port", port=url, fault=error
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from drivers.envelope import Unwrapper
 from drivers.registry import AVAILABLE, DRIVERS
 from drivers.source import LineSettings
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 MIN_PACKETS = 3
@@ -163,10 +164,8 @@ def _remedy_for_text(received: bytes, settings: dict[str, str], *, sends_text: b
 
 def _remedy_for_unrecognised(received: bytes, *, has_baud: bool) -> Message:
     if is_text(received):
-        return message(
-            ": these are lines such as {line!r}, give --protocol csv and its columns",
-            line=_second_line(received),
-        )
+        template = N_(": these are lines such as {line!r}, give --protocol csv and its columns")
+        return message(template, line=_second_line(received))
     if has_parity_errors(received):
         return message(": every other one is 0, as with a wrong parity, try --parity E or O")
     if has_baud:

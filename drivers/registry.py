@@ -6,6 +6,7 @@ from pkgutil import iter_modules
 
 from drivers.driver import DeviceDriver
 from drivers.errors import SettingsError
+from messages.i18n import N_
 
 _RESERVED = (
     DeviceDriver("dataq", "DATAQ DI-1100 to DI-4208", 40),
@@ -38,10 +39,6 @@ def find_driver(name: str) -> DeviceDriver:
     if driver is None:
         raise SettingsError("protocol {name!r} is not known: use one of {usable}", name=name, usable=usable)
     if not driver.available:
-        raise SettingsError(
-            "protocol {name!r} ({title}) comes later: use one of {usable}",
-            name=name,
-            title=driver.title,
-            usable=usable,
-        )
+        template = N_("protocol {name!r} ({title}) comes later: use one of {usable}")
+        raise SettingsError(template, name=name, title=driver.title, usable=usable)
     return driver

@@ -18,6 +18,7 @@ from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Decoder, Link
+from messages.i18n import N_
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
 _log = logging.getLogger(__name__)
@@ -163,7 +164,7 @@ class SampleSource(ABC):
             self._pending = data
 
     def await_data(
-        self, link: Link, timeout_s: float, is_good: Callable[[bytes], bool]
+        self, link: Link, timeout_s: float, is_good: Callable[[bytes], object]
     ) -> tuple[bytes, bool]:
         """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good."""
         received, now_s = b"", time.monotonic()
@@ -178,7 +179,7 @@ class SampleSource(ABC):
                 deadline_s += now_s - before_s
         return received, False
 
-    def await_stream(self, link: Link, is_good: Callable[[bytes], bool], timeout_s: float) -> bytes:
+    def await_stream(self, link: Link, is_good: Callable[[bytes], object], timeout_s: float) -> bytes:
         """Read until all that came is good. Raises NoDataError, which describes what came instead."""
         received, good = self.await_data(link, timeout_s, is_good)
         if not good:
@@ -211,6 +212,14 @@ class SampleSource(ABC):
             received += data
         return received
 
+    def no_answer_error(self, received: bytes, *, sends: bool) -> NoDataError:
+        """Error for a device that does not answer; `received` before it was asked is its stream or not."""
+        if not sends:
+            return self.no_data_error(received)
+        return NoDataError(
+            "the device sends and does not answer: check the line from this computer to the device"
+        )
+
     def no_data_error(self, received: bytes) -> NoDataError:
         """Error that describes what came instead of good data."""
         what = describe_unreadable(received, self._identity.protocol, self._baud)
@@ -223,12 +232,8 @@ def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) 
     allowed = [field.name for field in msgspec.structs.fields(kind)]
     unknown = next((key for key in given if key not in allowed), None)
     if unknown is not None and allowed:
-        raise SettingsError(
-            "setting {key!r} is not known to {protocol}: allowed are {allowed}",
-            key=unknown,
-            protocol=protocol,
-            allowed=allowed,
-        )
+        template = N_("setting {key!r} is not known to {protocol}: allowed are {allowed}")
+        raise SettingsError(template, key=unknown, protocol=protocol, allowed=allowed)
     if unknown is not None:
         raise SettingsError(
             "setting {key!r} is not known to {protocol}: it has none", key=unknown, protocol=protocol
@@ -245,13 +250,8 @@ def check_gauge_channels(table: int, relative: int, allowed: range) -> None:
     """Check the channels that two gauges are wired to. Raises SettingsError."""
     for name, channel in (("table", table), ("relative", relative)):
         if channel not in allowed:
-            raise SettingsError(
-                "{name} {channel} is no channel: give {first} to {last}",
-                name=name,
-                channel=channel,
-                first=allowed[0],
-                last=allowed[-1],
-            )
+            template = N_("{name} {channel} is no channel: give {first} to {last}")
+            raise SettingsError(template, name=name, channel=channel, first=allowed[0], last=allowed[-1])
     if table == relative:
         raise SettingsError(
             "table and relative are both channel {channel}: give each gauge its own", channel=table

@@ -11,6 +11,7 @@ from drivers.host_time import ActiveTimer, host_ns
 from drivers.port import OpenPort, PortConfig, PortInfo
 from drivers.source import CancellableLink
 from drivers.stream import SampleSource
+from messages.i18n import N_
 from messages.message import message_of
 
 _log = logging.getLogger(__name__)
@@ -205,11 +206,8 @@ class _ChannelReader:
                     raise
             except DriverError as error:
                 if host_ns() - lost_ns > RECONNECT_TIMEOUT_S * 1e9:
-                    raise DeviceLostError(
-                        "it was not back within {timeout_s:g} s ({fault})",
-                        timeout_s=RECONNECT_TIMEOUT_S,
-                        fault=error,
-                    ) from error
+                    template = N_("it was not back within {timeout_s:g} s ({fault})")
+                    raise DeviceLostError(template, timeout_s=RECONNECT_TIMEOUT_S, fault=error) from error
             else:
                 self._port = port
                 return
@@ -217,10 +215,8 @@ class _ChannelReader:
 
     def _put(self, data: bytes) -> None:
         if self._reads.qsize() >= _QUEUED_READS:
-            raise QueueFullError(
-                "this computer is too slow: {count} reads wait to be decoded. Close other programs",
-                count=_QUEUED_READS,
-            )
+            template = N_("this computer is too slow: {count} reads wait to be decoded. Close other programs")
+            raise QueueFullError(template, count=_QUEUED_READS)
         self._reads.put(wrap(self._gauge, host_ns(), data))
 
 

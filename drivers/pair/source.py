@@ -85,11 +85,8 @@ class PairSource(SampleSource):
             received += data
             silent -= {read.port for read in unwrapper.feed(data) if read.data}
         if silent:
-            raise NoDataError(
-                "gauge {gauge}: nothing came in {timeout_s:g} s, check its device and cable",
-                gauge=min(silent) + 1,
-                timeout_s=self.timeout_s,
-            )
+            template = N_("gauge {gauge}: nothing came in {timeout_s:g} s, check its device and cable")
+            raise NoDataError(template, gauge=min(silent) + 1, timeout_s=self.timeout_s)
         if self._decoder is None:
             self._synchronise_polling()
         return received

@@ -26,6 +26,7 @@ from drivers.simulated.stream_sender import (
     WireOutput,
 )
 from drivers.simulated.transport import Transport
+from messages.i18n import N_
 
 _log = logging.getLogger(__name__)
 _SEQUENCES = 1 << 32
@@ -56,11 +57,8 @@ class DeviceSetup:
 
     def __post_init__(self) -> None:
         if not 0 <= self.first_sequence < _SEQUENCES:
-            raise SettingsError(
-                "first_sequence {value} is no counter: give 0 to {most}",
-                value=self.first_sequence,
-                most=_SEQUENCES - 1,
-            )
+            template = N_("first_sequence {value} is no counter: give 0 to {most}")
+            raise SettingsError(template, value=self.first_sequence, most=_SEQUENCES - 1)
 
 
 def make_device(

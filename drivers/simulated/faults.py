@@ -11,6 +11,7 @@ import numpy as np
 
 from drivers.arrays import Floats
 from drivers.errors import SettingsError
+from messages.i18n import N_
 
 
 class FrameFault(StrEnum):
@@ -143,11 +144,8 @@ class Disturbance:
             if seconds is None or not (math.isfinite(seconds) and seconds):
                 raise SettingsError("a jump needs its seconds: give for example 'jump -5 at 3'")
         elif seconds is not None and not 0.0 < seconds < math.inf:
-            raise SettingsError(
-                "{kind} {seconds:g}: give a positive number of seconds, or none for ever",
-                kind=self.kind,
-                seconds=seconds,
-            )
+            template = N_("{kind} {seconds:g}: give a positive number of seconds, or none for ever")
+            raise SettingsError(template, kind=self.kind, seconds=seconds)
 
     @property
     def end_s(self) -> float:
@@ -164,12 +162,11 @@ def parse_disturbance(text: str) -> Disturbance:
     """Parse `KIND [SECONDS] [at SECONDS]`: `unplug 1.5`, `stall`, `jump -5 at 3`. Raises SettingsError."""
     match = _PATTERN.fullmatch(text.strip())
     if match is None:
-        raise SettingsError(
+        template = N_(
             "{text!r} is no fault that is known: give {kinds}, then how many"
-            " seconds, then 'at' and when, for example 'unplug 1.5 at 4'",
-            text=text.strip(),
-            kinds=list(DisturbanceKind),
+            " seconds, then 'at' and when, for example 'unplug 1.5 at 4'"
         )
+        raise SettingsError(template, text=text.strip(), kinds=list(DisturbanceKind))
     kind, seconds, at = match.groups()
     at_s = None if at is None else float(at)
     if at_s is not None and not 0.0 <= at_s < math.inf:

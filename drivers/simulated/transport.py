@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 
 from drivers.errors import PortUnavailableError
+from messages.i18n import N_
 
 
 class Transport(ABC):
@@ -156,11 +157,8 @@ def open_tcp_port(number: int = 0) -> Transport:
             raise PortUnavailableError(
                 "TCP port {number} is used by another program: give another one, or 0 for any", number=number
             ) from None
-        raise PortUnavailableError(
-            "TCP port {number} cannot be used ({fault}): give another one, or 0 for any",
-            number=number,
-            fault=error.strerror,
-        ) from None
+        template = N_("TCP port {number} cannot be used ({fault}): give another one, or 0 for any")
+        raise PortUnavailableError(template, number=number, fault=error.strerror) from None
 
 
 def _listener(number: int) -> socket.socket:

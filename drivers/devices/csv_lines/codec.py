@@ -13,7 +13,6 @@ from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder
-from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024
 """A longer line is garbage."""
@@ -28,15 +27,26 @@ def encode_line(layout: LineFormat, time_s: float, table: float, relative: float
     readings have no decimal point; a `value` column has that of `table`. `ignore` columns become 0, units
     "kg" where none is given.
     """
-    fields = [
-        _field(layout, column, time_s, table, relative, sequence)
-        for column in layout.columns
-        if column is not layout.checksum
-    ]
-    line = layout.separator.join(fields).encode("ascii")
-    if layout.checksum is not None:
-        line += layout.separator.encode("ascii") + _checksum(layout.checksum, line)
-    return line + b"\r\n"
+    fields = []
+    for column in layout.columns:
+        match column:
+            case Column.TIME_US | Column.TIME_MS:
+                fields.append(str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.time_wrap)))
+            case Column.TIME_S:
+                fields.append(_number(round(time_s, 6), layout.decimal))
+            case Column.TABLE | Column.VALUE:
+                fields.append(_number(table, layout.decimal))
+            case Column.RELATIVE:
+                fields.append(_number(relative, layout.decimal))
+            case Column.SEQUENCE:
+                fields.append(str(_wrapped(sequence, layout.sequence_wrap)))
+            case Column.XOR:
+                fields.append(f"{reduce(xor, layout.separator.join(fields).encode('ascii'), 0):02X}")
+            case Column.CRC:
+                fields.append(f"{crc16(layout.separator.join(fields).encode('ascii')):04X}")
+            case _:
+                fields.append({Column.UNIT: layout.unit or "kg", Column.EMPTY: ""}.get(column, "0"))
+    return layout.separator.join(fields).encode("ascii") + b"\r\n"
 
 
 def encode_lines(layout: LineFormat, times_s: Floats, counts: Counts, first_sequence: int = 0) -> list[bytes]:
@@ -47,28 +57,6 @@ def encode_lines(layout: LineFormat, times_s: Floats, counts: Counts, first_sequ
     ]
 
 
-def _field(
-    layout: LineFormat, column: Column, time_s: float, table: float, relative: float, sequence: int
-) -> str:
-    match column:
-        case Column.TIME_US | Column.TIME_MS:
-            return str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.time_wrap))
-        case Column.TIME_S:
-            return _number(round(time_s, 6), layout.decimal)
-        case Column.TABLE | Column.VALUE:
-            return _number(table, layout.decimal)
-        case Column.RELATIVE:
-            return _number(relative, layout.decimal)
-        case Column.SEQUENCE:
-            return str(_wrapped(sequence, layout.sequence_wrap))
-        case Column.UNIT:
-            return layout.unit or "kg"
-        case Column.EMPTY:
-            return ""
-        case _:
-            return "0"
-
-
 def _wrapped(value: int, wrap: int) -> int:
     return value % wrap if wrap else value
 
@@ -76,12 +64,6 @@ def _wrapped(value: int, wrap: int) -> int:
 def _number(value: float, decimal: str) -> str:
     text = str(int(value)) if value == int(value) else repr(value)
     return text.replace(".", decimal)
-
-
-def _checksum(column: Column, line: bytes) -> bytes:
-    if column is Column.CRC:
-        return b"%04X" % crc16(line)
-    return b"%02X" % reduce(xor, line, 0)
 
 
 class LineDecoder(PacketDecoder):
@@ -116,28 +98,14 @@ class LineDecoder(PacketDecoder):
         self._state["period_s"] = 1 / rate_hz
         self._parser = LineParser(layout)
         time = layout.time_column
-        place = BY_TIME if time else BY_COUNT
-        self._rules = make_rules(
-            BY_SEQUENCE if Column.SEQUENCE in layout.columns else place,
-            rate_hz,
-            unit_s=TIME_UNIT_S[time] if time else 0.0,
-            clock_step_s=clock_step_s,
-            time_wrap=layout.time_wrap,
-            sequence_wrap=layout.sequence_wrap,
-            overload_count=overload_count,
-            max_gap_s=max_gap_s,
-        )
+        place = BY_SEQUENCE if Column.SEQUENCE in layout.columns else BY_TIME if time else BY_COUNT
+        unit_s = TIME_UNIT_S[time] if time else 0.0
+        wraps = layout.time_wrap, layout.sequence_wrap
+        self._rules = make_rules(place, rate_hz, unit_s, clock_step_s, wraps, overload_count, max_gap_s)
         self._has_time = time is not None
-        self._loss_estimator = LossEstimator(rate_hz) if self._rules["place"] == BY_COUNT else None
+        self._loss_estimator = LossEstimator(rate_hz) if place == BY_COUNT else None
         self._skipping = True
         """Until the end of the line that is under way."""
-
-    @property
-    def losses(self) -> Losses:
-        losses = super().losses
-        if self._loss_estimator is not None:
-            losses.missing_estimated += self._loss_estimator.lost
-        return losses
 
     def expect_restart(self) -> None:
         self._state["broken"] += self._state["started"] * bool(self._unfinished)
@@ -170,19 +138,16 @@ class LineDecoder(PacketDecoder):
         found, done = count_lines(lines, hold_from, self._state, self._rules, packets, counts)
         if done < len(lines):
             self._unfinished = data[int(lines[done]["start"]) :] + self._unfinished
-        if found and self._loss_estimator is not None:
-            self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
         return packets[:found], counts[:found]
 
 
 def rate_from_lines(layout: LineFormat, data: bytes) -> float | None:
     """Samples a second by the device's own times; None while there are too few lines."""
     time = layout.time_column
-    lines = LineParser(layout).read(whole_lines(data))
     if time is None:
         return None
-    times = lines["time"][lines["good"] != 0]
-    steps = np.diff(times)
+    lines = LineParser(layout).read(whole_lines(data))
+    steps = np.diff(lines["time"][lines["good"] != 0])
     if layout.time_wrap:
         steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
     return rate_from_steps(steps * TIME_UNIT_S[time], clock_step_from_lines(layout, data))
@@ -219,5 +184,4 @@ def whole_lines(data: bytes) -> bytes:
 
 def has_good_line(layout: LineFormat, data: bytes) -> bool:
     """Whether one line of `data` after the first is good."""
-    lines = LineParser(layout).read(whole_lines(data))
-    return bool(lines["good"].any())
+    return bool(LineParser(layout).read(whole_lines(data))["good"].any())

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from drivers.errors import SettingsError
+from messages.i18n import N_
 
 
 class Column(StrEnum):
@@ -59,10 +60,8 @@ class LineFormat:
     def __post_init__(self) -> None:
         _check_columns(self.columns)
         if len(self.separator) != 1 or self.separator in _OF_NUMBERS + "eE\r\n":
-            raise SettingsError(
-                "separator {separator!r} cannot part numbers: give one of , ; tab space",
-                separator=self.separator,
-            )
+            template = N_("separator {separator!r} cannot part numbers: give one of , ; tab space")
+            raise SettingsError(template, separator=self.separator)
         if not self.comment.isascii() or any(mark in _OF_NUMBERS for mark in self.comment):
             raise SettingsError(
                 "comment {comment!r} cannot mark comments: give characters such as #%;", comment=self.comment
@@ -77,13 +76,8 @@ class LineFormat:
             )
         for name, bits in (("time_bits", self.time_bits), ("sequence_bits", self.sequence_bits)):
             if bits != 0 and not _MIN_BITS <= bits <= _MAX_BITS:
-                raise SettingsError(
-                    "{name} {bits} is out of range: give {least} to {most}, or 0 for no wrap",
-                    name=name,
-                    bits=bits,
-                    least=_MIN_BITS,
-                    most=_MAX_BITS,
-                )
+                template = N_("{name} {bits} is out of range: give {least} to {most}, or 0 for no wrap")
+                raise SettingsError(template, name=name, bits=bits, least=_MIN_BITS, most=_MAX_BITS)
 
     @property
     def channels(self) -> int:

@@ -28,6 +28,7 @@ _LINES_EXAMINED = 400
 _ALIKE = 0.8
 """Share of the lines that must have the same form: some may be banners or damaged."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_CHECKSUM = re.compile(r"[0-9a-fA-F]{2}([0-9a-fA-F]{2})?")
 _LEAST_VALUES = 5
 """Different values that distinguish a counter from a reading that happens to rise."""
 _STEADY = 0.5
@@ -92,9 +93,10 @@ def _split(lines: list[str]) -> tuple[_Rows, str, str]:
         for decimal, point in DECIMALS.items():
             if mark == point:
                 continue
-            rows = _alike([_fields(line, mark, point) for line in lines])
-            if len(rows) >= _ALIKE * len(lines) and _width(rows) > _width(best[0]):
-                best = (rows, separator, decimal)
+            rows = [_fields(line, mark, point) for line in lines]
+            width, number = Counter(map(len, rows)).most_common(1)[0]
+            if number >= _ALIKE * len(lines) and width > (len(best[0][0]) if best[0] else 0):
+                best = ([row for row in rows if len(row) == width], separator, decimal)
     return best
 
 
@@ -105,25 +107,12 @@ def _fields(line: str, mark: str, point: str) -> list[str]:
         return []
     fields = [field.replace(point, ".") for field in fields]
     numbers = fields if len(fields) == 1 or _is_number(fields[-1]) else fields[:-1]
-    is_row = all(map(_is_number, numbers)) and (len(numbers) == len(fields) or _is_hex(fields[-1]))
+    is_row = all(map(_is_number, numbers)) and (numbers == fields or _CHECKSUM.fullmatch(fields[-1]))
     return fields if is_row else []
-
-
-def _alike(rows: _Rows) -> _Rows:
-    width, _ = Counter(map(len, rows)).most_common(1)[0]
-    return [row for row in rows if len(row) == width] if width else []
-
-
-def _width(rows: _Rows) -> int:
-    return len(rows[0]) if rows else 0
 
 
 def _is_number(field: str) -> bool:
     return _NUMBER.fullmatch(field) is not None
-
-
-def _is_hex(field: str) -> bool:
-    return len(field) in (2, 4) and all(digit in "0123456789abcdefABCDEF" for digit in field)
 
 
 def _roles(rows: _Rows, lines: list[str], separator: str, rate_hz: float | None) -> list[Column]:
@@ -167,15 +156,12 @@ def _counter(fields: list[str], rate_hz: float | None, may_be_time: bool) -> Col
     finest = 10.0 ** -max(len(field.partition(".")[2]) for field in fields)
     low, high = np.quantile(onward, (0.1, 0.9))
     step = float(onward[onward <= 2 * high + finest].mean())
-    if float(np.mean(steps == 1)) >= _ALIKE and not (may_be_time and _is_kilohertz(rate_hz)):
+    # At about 1 kHz a time in milliseconds grows by one too.
+    is_kilohertz = rate_hz is not None and abs(math.log(rate_hz / 1000)) < math.log(_KILOHERTZ_FACTOR)
+    if float(np.mean(steps == 1)) >= _ALIKE and not (may_be_time and is_kilohertz):
         return Column.SEQUENCE
     unit = _unit(step, finest, rate_hz) if may_be_time else None
     return unit if high - low <= _STEADY * step + finest * (1 + _ROUNDING) else None
-
-
-def _is_kilohertz(rate_hz: float | None) -> bool:
-    """Whether lines come at such a rate that a time in milliseconds grows by one."""
-    return rate_hz is not None and abs(math.log(rate_hz / 1000)) < math.log(_KILOHERTZ_FACTOR)
 
 
 def _unit(step: float, finest: float, rate_hz: float | None) -> Column | None:
@@ -203,37 +189,27 @@ def find_openscale_format(data: bytes) -> LineFormat | None:
     lines = [line for line in data[: data.rfind(b"\n") + 1].splitlines() if line]
     rows = [line.decode("ascii", "replace").split(",") for line in lines]
     shapes = [_shape(row) for row in rows]
-    for end in range(_OPENSCALE_LINES, len(rows) + 1):
-        start = end - _OPENSCALE_LINES
-        if shapes[start] is not None and len(set(shapes[start:end])) == 1:
-            return _layout_of(rows[start:end])
-    return None
-
-
-def _layout_of(rows: list[list[str]]) -> LineFormat:
-    unit_at = next(at for at, field in enumerate(rows[0]) if field in OPENSCALE_UNITS)
-    columns = [Column.IGNORE if field else Column.EMPTY for field in rows[0]]
+    starts = range(len(rows) - _OPENSCALE_LINES + 1)
+    alike = (at for at in starts if shapes[at] and len(set(shapes[at : at + _OPENSCALE_LINES])) == 1)
+    start = next(alike, None)
+    if start is None:
+        return None
+    fields = rows[start]
+    unit_at = next(at for at, field in enumerate(fields) if field in OPENSCALE_UNITS)
+    columns = [Column.IGNORE if field else Column.EMPTY for field in fields]
     columns[unit_at - 1 : unit_at + 1] = Column.VALUE, Column.UNIT
-    if unit_at > 1 and _is_clock([row[0] for row in rows]):
+    times = [row[0] for row in rows[start : start + _OPENSCALE_LINES]]
+    are_whole = all(time.removeprefix("-").isdigit() for time in times)
+    if unit_at > 1 and are_whole and all(int(before) < int(after) for before, after in pairwise(times)):
         columns[0] = Column.TIME_MS
-    return LineFormat(tuple(columns), unit=rows[0][unit_at])
+    return LineFormat(tuple(columns), unit=fields[unit_at])
 
 
 def _shape(fields: list[str]) -> tuple[str, ...] | None:
     """Form of a line, field by field; None if these are not the fields of an OpenScale."""
     units = [at for at, field in enumerate(fields) if field in OPENSCALE_UNITS]
     numbers = [field for field in fields if field and field not in OPENSCALE_UNITS]
-    if len(units) != 1 or units[0] == 0 or "" in fields[:-1] or not all(map(_is_plain_number, numbers)):
+    are_numbers = all(field.removeprefix("-").replace(".", "", 1).isdigit() for field in numbers)
+    if len(units) != 1 or units[0] == 0 or "" in fields[:-1] or not are_numbers:
         return None
     return tuple(field if field in OPENSCALE_UNITS else "number" if field else "" for field in fields)
-
-
-def _is_plain_number(field: str) -> bool:
-    return field.removeprefix("-").replace(".", "", 1).isdigit()
-
-
-def _is_clock(fields: list[str]) -> bool:
-    if not all(field.removeprefix("-").isdigit() for field in fields):
-        return False
-    times = [int(field) for field in fields]
-    return all(before < after for before, after in pairwise(times))

@@ -8,14 +8,19 @@ import msgspec
 from drivers.devices.csv_lines import DRIVER, codec
 from drivers.devices.csv_lines.codec import LineDecoder
 from drivers.devices.csv_lines.columns import CHECKSUMS, DECIMALS, SEPARATORS, Column, LineFormat
-from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT, find_openscale_format, infer_columns
+from drivers.devices.csv_lines.inference import (
+    OPENSCALE_FORMAT,
+    InferredColumns,
+    find_openscale_format,
+    infer_columns,
+)
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.errors import NoDataError, SettingsError
 from drivers.recognition import Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
 from drivers.stream import SampleSource, parse_settings
-from messages.message import EMPTY, Message
+from messages.i18n import N_
 
 _DOUBTED_BYTES = 1 << 14
 """Some hundred lines, few of which are damaged: if their rate is wrong, the settings are."""
@@ -40,27 +45,29 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         if not self.overload_count > 0:
             raise SettingsError("overload_count {count:g} must be positive", count=self.overload_count)
-        if self.format != "openscale":
-            return
-        for field in msgspec.structs.fields(type(self)):
+        for field in msgspec.structs.fields(type(self)) if self.format == "openscale" else ():
             given = getattr(self, field.name)
             if field.name not in ("format", "overload_count") and given != field.default:
-                raise SettingsError(
-                    "format openscale finds {name} by itself: leave {name} out", name=field.name
-                )
+                template = N_("format openscale finds {name} by itself: leave {name} out")
+                raise SettingsError(template, name=field.name)
 
     def layout(self) -> LineFormat:
         """Columns as the decoder takes them; those of a new OpenScale for one. Raises SettingsError."""
         if self.format == "openscale":
             return OPENSCALE_FORMAT
+        columns = [name.strip() for name in self.columns.split(",")]
+        unknown = next((name for name in columns if name not in list(Column)), None)
+        if unknown is not None:
+            template = N_("column {name!r} is not known: allowed are {allowed}")
+            raise SettingsError(template, name=unknown, allowed=list(Column))
         return LineFormat(
-            columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
-            separator=SEPARATORS.get(self.separator, self.separator),
-            decimal=DECIMALS.get(self.decimal, self.decimal),
-            comment=self.comment,
-            time_bits=self.time_bits,
-            sequence_bits=self.sequence_bits,
-            unit=self.unit,
+            tuple(map(Column, columns)),
+            SEPARATORS.get(self.separator, self.separator),
+            DECIMALS.get(self.decimal, self.decimal),
+            self.comment,
+            self.time_bits,
+            self.sequence_bits,
+            self.unit,
         )
 
 
@@ -105,12 +112,13 @@ class CsvLinesSource(SampleSource):
         self._check_rate(self._layout)
         if self._layout.time_column is None:
             return first
-        more, good = self.await_data(link, self.timeout_s, lambda data: self._shows_rate(first + data))
+        layout = self._layout
+        more, good = self.await_data(
+            link, self.timeout_s, lambda data: codec.rate_from_lines(layout, first + data)
+        )
         if not good:
-            raise NoDataError(
-                "the lines of {timeout_s:g} s do not tell a rate: the device is too slow",
-                timeout_s=self.timeout_s,
-            )
+            template = N_("the lines of {timeout_s:g} s do not tell a rate: the device is too slow")
+            raise NoDataError(template, timeout_s=self.timeout_s)
         self._decoder = self._decoder or self.make_decoder(first + more)
         if self._decoder is None:
             raise self._rate_error(codec.rate_from_lines(self._layout, first + more) or 0.0)
@@ -143,19 +151,15 @@ class CsvLinesSource(SampleSource):
         return self._layout
 
     def _rate_error(self, measured_hz: float) -> SettingsError:
-        return SettingsError(
+        template = N_(
             "rate {rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
-            "leave --rate out, or check the unit of the time column",
-            rate_hz=self._rate_hz,
-            measured_hz=measured_hz,
+            "leave --rate out, or check the unit of the time column"
         )
+        return SettingsError(template, rate_hz=self._rate_hz, measured_hz=measured_hz)
 
     def _has_good_line(self, data: bytes) -> bool:
         self._layout = self._layout or self.find_layout(data)
         return self._layout is not None and codec.has_good_line(self._layout, data)
-
-    def _shows_rate(self, data: bytes) -> bool:
-        return self._layout is not None and codec.rate_from_lines(self._layout, data) is not None
 
     def _check_rate(self, layout: LineFormat) -> None:
         if self._rate_hz is None and layout.time_column is None:
@@ -169,9 +173,6 @@ class OpenScaleSource(CsvLinesSource):
     timeout_s = 8.0
     """It is reset by opening its port, and averages readings before the first line."""
 
-    def __init__(self, rate_hz: float | None, overload_count: float = math.inf) -> None:
-        super().__init__(None, rate_hz, overload_count)
-
     def find_layout(self, data: bytes) -> LineFormat | None:
         return find_openscale_format(data)
 
@@ -179,12 +180,11 @@ class OpenScaleSource(CsvLinesSource):
 def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     if rate_hz is not None and not 0 < rate_hz < math.inf:
-        raise SettingsError(
-            "rate {rate_hz:g} Hz cannot be: give samples a second, for example 80", rate_hz=rate_hz
-        )
+        template = N_("rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
+        raise SettingsError(template, rate_hz=rate_hz)
     parsed = parse_settings(CsvSettings, settings, DRIVER.name)
     if parsed.format == "openscale":
-        return OpenScaleSource(rate_hz, parsed.overload_count)
+        return OpenScaleSource(None, rate_hz, parsed.overload_count)
     return CsvLinesSource(parsed.layout(), rate_hz, parsed.overload_count)
 
 
@@ -194,34 +194,22 @@ def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str
         return settings  # the device shows its columns itself
     columns = settings.get("columns", "time_us,value")
     if "value" not in (name.strip() for name in columns.split(",")):
-        raise SettingsError(
-            "columns {columns} have no value: a device with one gauge sends one, as time_us,value",
-            columns=columns,
-        )
+        template = N_("columns {columns} have no value: a device with one gauge sends one, as time_us,value")
+        raise SettingsError(template, columns=columns)
     return settings | {"columns": columns}
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`. An OpenScale is preferred to other lines."""
-    openscale = find_openscale_format(data)
-    found = None
-    if openscale is not None:
-        found = _recognise_lines(openscale, data, duration_s, {"format": "openscale"})
-    inferred = infer_columns(data, duration_s)
-    if inferred is not None:
-        lines = _recognise_lines(inferred.layout, data, duration_s, inferred.settings, inferred.remark)
-        if found is None or (lines is not None and lines.share > found.share):
-            return lines
-    return found
+    openscale, inferred = find_openscale_format(data), infer_columns(data, duration_s)
+    candidates = [InferredColumns(openscale, {"format": "openscale"})] if openscale else []
+    candidates += [inferred] if inferred else []
+    found = [_recognise_lines(candidate, data, duration_s) for candidate in candidates]
+    return max(filter(None, found), key=lambda one: one.share, default=None)
 
 
-def _recognise_lines(
-    layout: LineFormat,
-    data: bytes,
-    duration_s: float | None,
-    settings: dict[str, str],
-    remark: Message = EMPTY,
-) -> Recognition | None:
+def _recognise_lines(inferred: InferredColumns, data: bytes, duration_s: float | None) -> Recognition | None:
+    layout = inferred.layout
     whole = codec.whole_lines(data)
     lines = LineParser(layout).read(whole)
     good = lines[lines["good"] != 0]
@@ -229,22 +217,9 @@ def _recognise_lines(
     if not is_recognised(len(good), share, has_checksum=layout.checksum in CHECKSUMS):
         return None
     samples = len(good) + 1  # the first line was left out
+    rate_hz = codec.rate_from_lines(layout, data) or rate_from_count(samples, duration_s)
+    needs_rate = layout.time_column is None
+    share, packets = min(share, 1.0), len(good)
     return Recognition(
-        DRIVER.name,
-        min(share, 1.0),
-        len(good),
-        layout.channels,
-        settings,
-        codec.rate_from_lines(layout, data) or rate_from_count(samples, duration_s),
-        layout.time_column is None,
-        remark,
+        DRIVER.name, share, packets, layout.channels, inferred.settings, rate_hz, needs_rate, inferred.remark
     )
-
-
-def _column(name: str) -> Column:
-    try:
-        return Column(name)
-    except ValueError as error:
-        raise SettingsError(
-            "column {name!r} is not known: allowed are {allowed}", name=name, allowed=list(Column)
-        ) from error

@@ -10,7 +10,8 @@ from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
 from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet
-from drivers.samples import Losses, SampleStatus
+from drivers.samples import SampleStatus
+from messages.i18n import N_
 
 HEADER_BYTES = 3
 MAX_CHANNELS = 16
@@ -55,13 +56,11 @@ class FrameLayout:
     def __post_init__(self) -> None:
         for name, channel in (("table", self.table), ("relative", self.relative)):
             if not 1 <= channel <= self.channels:
-                raise ProtocolError(
+                template = N_(
                     "the device sends {channels} channels and the {name} gauge is to be {channel}: "
-                    "set {name} to its channel, or let the device send that channel too",
-                    channels=self.channels,
-                    name=name,
-                    channel=channel,
+                    "set {name} to its channel, or let the device send that channel too"
                 )
+                raise ProtocolError(template, channels=self.channels, name=name, channel=channel)
 
     @property
     def length(self) -> int:
@@ -69,7 +68,6 @@ class FrameLayout:
 
     @property
     def header(self) -> int:
-        """Second byte of a frame."""
         return MEASUREMENT | (self.channels - 1)
 
     def offset(self, channel: int) -> int:
@@ -116,17 +114,15 @@ def encode_frames(layout: FrameLayout, counts: Counts, flags: int | UInt8s = 0) 
     values = np.zeros((len(counts), layout.channels))
     values[:, layout.table - 1] = counts[:, 0]
     values[:, layout.relative - 1] = counts[:, 1]
-    wire[:, HEADER_BYTES:-1] = _encode_values(layout.kind, values)
+    if layout.kind is ValueKind.FLOAT32:
+        encoded = values.astype(">f4").view(np.uint8)
+    else:
+        zero = _ZERO[layout.kind]
+        whole = (np.clip(np.rint(values), -zero, zero - 1) + zero).astype(">u4")
+        encoded = whole.view(np.uint8).reshape(*values.shape, 4)[:, :, 4 - layout.kind.size :]
+    wire[:, HEADER_BYTES:-1] = encoded.reshape(len(counts), -1)
     wire[:, -1] = END
     return wire
-
-
-def _encode_values(kind: ValueKind, values: Floats) -> UInt8s:
-    if kind is ValueKind.FLOAT32:
-        return values.astype(">f4").view(np.uint8)
-    zero = _ZERO[kind]
-    whole = (np.clip(np.rint(values), -zero, zero - 1) + zero).astype(">u4")
-    return whole.view(np.uint8).reshape(*values.shape, 4)[:, :, 4 - kind.size :].reshape(len(values), -1)
 
 
 class FrameDecoder(PacketDecoder):
@@ -147,12 +143,6 @@ class FrameDecoder(PacketDecoder):
 
     _has_time = False
 
-    @property
-    def losses(self) -> Losses:
-        losses = super().losses
-        losses.missing_estimated += self._loss_estimator.lost
-        return losses
-
     def expect_restart(self) -> None:
         self._state["garbage"] += len(self._unfinished)
         super().expect_restart()
@@ -162,25 +152,20 @@ class FrameDecoder(PacketDecoder):
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
         found, used = find_frames(buffer, self._pattern, self._state, offsets, broken)
-        self._unfinished = data[used:]
-        packets = self._make_packets(buffer, offsets[:found], broken[:found], arrival_ns)
-        if found:
-            count_packets(packets, self._state)
-            self._loss_estimator.add(int(self._state["samples"][0]), arrival_ns)
-        return packets, self._values(buffer, offsets[:found])
-
-    def _make_packets(self, buffer: UInt8s, offsets: Ints, broken: Ints, arrival_ns: int) -> Records:
-        packets = np.zeros(len(offsets), dtype=PACKET)
+        offsets, self._unfinished = offsets[:found], data[used:]
+        packets = np.zeros(found, dtype=PACKET)
         packets["samples"] = 1
         packets["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
-        packets["damaged"] = broken
+        packets["damaged"] = broken[:found]
         if self._arrival_ns is None:
             packets["damaged"][:1] = 0
-        if len(packets) and self._state[0]["restarting"]:
-            gap = self._rows_since(arrival_ns, len(offsets))
+        if found and self._state[0]["restarting"]:
+            gap = self._rows_since(arrival_ns, found)
             packets["damaged"][0] = min(gap, broken[0])
             packets["missing"][0] = gap - packets["damaged"][0]
-        return packets
+        if found:
+            count_packets(packets, self._state)
+        return packets, self._values(buffer, offsets)
 
     def _values(self, buffer: UInt8s, offsets: Ints) -> Floats:
         kind, size = self._layout.kind, self._layout.kind.size
@@ -244,10 +229,10 @@ def find_frames(
     that were used: the rest, at most a frame and the byte after, may become one. `states` (1,) is updated.
     """
     pattern, state = patterns[0], states[0]
-    at = 0
-    found = 0
+    at = found = 0
     while at + pattern.length < len(buffer):
-        if _is_header(buffer, at, pattern):
+        is_begun = buffer[at] == SYNC and buffer[at + 1] == pattern.header
+        if is_begun and buffer[at + 2] & _KIND_BITS == pattern.kind:
             if _is_whole(buffer, at, pattern):
                 offsets[found] = at
                 by_bytes = (2 * state.garbage + pattern.length) // (2 * pattern.length)
@@ -273,12 +258,6 @@ def count_packets(packets: Records, states: Records) -> None:
         count_packet(state, packet, True)
     state.restarts += state.restarting
     state.restarting = 0
-
-
-@inlined
-def _is_header(buffer: UInt8s, at: int, pattern: Record) -> bool:
-    is_begun = buffer[at] == SYNC and buffer[at + 1] == pattern.header
-    return bool(is_begun and buffer[at + 2] & _KIND_BITS == pattern.kind)
 
 
 @inlined

@@ -14,9 +14,7 @@ from messages.message import Message, message
 
 SYNC = 0xAA
 END = 0x85
-OK = 0x00
-OK_CHANGED = 0x01
-"""Done, with the nearest value that the device can do."""
+OK, OK_CHANGED = 0x00, 0x01
 UNKNOWN_COMMAND = 0x40
 WRONG_VALUE = 0x52
 REQUEST = 0x90
@@ -78,10 +76,7 @@ class Response:
 
     @property
     def fault(self) -> Message:
-        """Why the device did not do it."""
-        if self.error in _ERRORS:
-            return message(_ERRORS[self.error])
-        return message("error {number:02X}", number=self.error)
+        return message(_ERRORS.get(self.error, N_("error {number:02X}")), number=self.error)
 
 
 def encode_request(code: Code, parameters: bytes = b"") -> bytes:

@@ -18,7 +18,12 @@ FIRMWARE = bytes([0, 1, 0, 45])
 MAX_RATE_HZ = 48_000.0
 _MIN_REQUEST_BYTES = 4
 _FLOAT = commands.set_float()[3:-1]
-_KINDS = {Code.START: CommandKind.START, Code.STOP: CommandKind.STOP, Code.WRITE_RATE: CommandKind.RATE}
+_VALUES = {Code.SERIAL_NUMBER: SERIAL_NUMBER, Code.FIRMWARE: FIRMWARE}
+_KINDS: dict[int, CommandKind] = {
+    Code.START: CommandKind.START,
+    Code.STOP: CommandKind.STOP,
+    Code.WRITE_RATE: CommandKind.RATE,
+}
 
 
 def find_commands(data: bytes) -> tuple[list[Command], int]:
@@ -42,8 +47,7 @@ def find_commands(data: bytes) -> tuple[list[Command], int]:
 def _command(code: int, parameters: bytes) -> Command:
     is_rate = code == Code.WRITE_RATE and len(parameters) == struct.calcsize(">f")
     rate_hz = float(struct.unpack(">f", parameters)[0]) if is_rate else 0.0
-    kind = next((kind for known, kind in _KINDS.items() if known == code), CommandKind.OTHER)
-    return Command(kind, rate_hz, code, parameters)
+    return Command(_KINDS.get(code, CommandKind.OTHER), rate_hz, code, parameters)
 
 
 class SimulatedGsv(SimulatedProtocol):
@@ -69,20 +73,16 @@ class SimulatedGsv(SimulatedProtocol):
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
         """Response to a request; for `GET_VALUE` a frame of the last reading."""
-        match command.code:
-            case Code.START | Code.STOP | Code.WRITE_RATE:
-                return commands.encode_response(commands.OK if is_done else commands.WRONG_VALUE)
-            case Code.READ_RATE:
-                return commands.encode_response(commands.OK, struct.pack(">f", rate_hz))
-            case Code.SERIAL_NUMBER:
-                return commands.encode_response(commands.OK, SERIAL_NUMBER)
-            case Code.FIRMWARE:
-                return commands.encode_response(commands.OK, FIRMWARE)
-            case Code.GET_VALUE:
-                return codec.encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
-            case Code.SET_FORMAT | Code.SET_ZERO | Code.SET_INPUT:
-                return commands.encode_response(commands.OK if self._set(command) else commands.WRONG_VALUE)
-        return commands.encode_response(commands.UNKNOWN_COMMAND)
+        values = {Code.READ_RATE: struct.pack(">f", rate_hz)} | _VALUES
+        if command.code in values:
+            return commands.encode_response(commands.OK, values[Code(command.code)])
+        if command.code == Code.GET_VALUE:
+            return codec.encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
+        if command.code in (Code.SET_FORMAT, Code.SET_ZERO, Code.SET_INPUT):
+            is_done = self._set(command)
+        elif command.code not in _KINDS:
+            return commands.encode_response(commands.UNKNOWN_COMMAND)
+        return commands.encode_response(commands.OK if is_done else commands.WRONG_VALUE)
 
     @property
     def _layout(self) -> FrameLayout:

@@ -8,11 +8,12 @@ import numpy as np
 from drivers.devices.gsv import DRIVER, codec, commands
 from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.devices.gsv.commands import Code, InputType, Response
-from drivers.errors import NoDataError, ProtocolError
+from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
 _TRIES = 2
@@ -56,10 +57,12 @@ class GsvSource(SampleSource):
     def start(self, link: Link) -> bytes:
         """Stop the device, which sends from power-on, set it up, and wait for the first frames."""
         self.prepare()
-        self._stop(link)
+        received = self.silence(link)
+        if self.request(link, self.stop_command, commands.find_response, _TRIES) is None:
+            raise self.no_answer_error(received, sends=codec.find_layout(received) is not None)
         self._set_up(link)
         link.write(commands.encode_request(Code.START))
-        received = self.await_stream(link, lambda data: codec.find_layout(data) is not None, self.timeout_s)
+        received = self.await_stream(link, codec.find_layout, self.timeout_s)
         received = received.removeprefix(commands.encode_response(commands.OK))
         self._set_layout(received)
         return received
@@ -71,17 +74,6 @@ class GsvSource(SampleSource):
         if self._layout is None:
             self._set_layout(data)
         return FrameDecoder(self._layout, self._rate_hz) if self._layout else None
-
-    def _stop(self, link: Link) -> None:
-        """Stop the device and see that it answers."""
-        received = self.silence(link)
-        if self.request(link, self.stop_command, commands.find_response, _TRIES) is not None:
-            return
-        if codec.find_layout(received) is None:
-            raise self.no_data_error(received)
-        raise NoDataError(
-            "the device sends and does not answer: check the line from this computer to the device"
-        )
 
     def _ask(self, link: Link, command: bytes) -> Response | None:
         return self.request(link, command, commands.find_response)
@@ -98,38 +90,32 @@ class GsvSource(SampleSource):
     def _set_up(self, link: Link) -> None:
         serial_number = self._ask(link, commands.encode_request(Code.SERIAL_NUMBER))
         firmware = self._ask(link, commands.encode_request(Code.FIRMWARE))
-        self._identity = DeviceIdentity(
-            DRIVER.name,
-            self._identity.name,
-            firmware=commands.text_from_response(firmware) if firmware else "",
-            serial_number=commands.text_from_response(serial_number) if serial_number else "",
-        )
+        version = commands.text_from_response(firmware) if firmware else ""
+        serial = commands.text_from_response(serial_number) if serial_number else ""
+        self._identity = DeviceIdentity(DRIVER.name, self._identity.name, version, serial)
         if self._settings.format == "float32":
             self._require(link, commands.set_float(), message("the format float32"))
         if self._settings.input in _INPUTS:
             for channel in (self._settings.table, self._settings.relative):
-                what = message(
-                    "input {input} on channel {channel}", input=self._settings.input, channel=channel
-                )
+                template = N_("input {input} on channel {channel}")
+                what = message(template, input=self._settings.input, channel=channel)
                 self._require(link, commands.set_input(channel, _INPUTS[self._settings.input]), what)
         self._set_rate(link)
 
     def _set_rate(self, link: Link) -> None:
         if self._rate_hz is not None:
-            self._require(
-                link, commands.write_rate(self._rate_hz), message("{rate_hz:g} Hz", rate_hz=self._rate_hz)
-            )
+            what = message("{rate_hz:g} Hz", rate_hz=self._rate_hz)
+            self._require(link, commands.write_rate(self._rate_hz), what)
         response = self._ask(link, commands.encode_request(Code.READ_RATE))
         actual_hz = commands.rate_from_response(response) if response else None
         if actual_hz is None:
             raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
         if not self.is_same_rate(actual_hz):
-            raise ProtocolError(
+            template = N_(
                 "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
-                "ask for --rate {actual_hz:g} or one that it can do",
-                rate_hz=self._rate_hz,
-                actual_hz=actual_hz,
+                "ask for --rate {actual_hz:g} or one that it can do"
             )
+            raise ProtocolError(template, rate_hz=self._rate_hz, actual_hz=actual_hz)
         self._rate_hz = actual_hz
 
     def _set_layout(self, data: bytes) -> None:
@@ -138,10 +124,8 @@ class GsvSource(SampleSource):
             return
         channels, kind = found
         if self._settings.format == "float32" and kind is not ValueKind.FLOAT32:
-            raise ProtocolError(
-                "the device sends {kind} where float32 was asked for: set format to device",
-                kind=kind.name.lower(),
-            )
+            template = N_("the device sends {kind} where float32 was asked for: set format to device")
+            raise ProtocolError(template, kind=kind.name.lower())
         self._layout = FrameLayout(channels, kind, self._settings.table, self._settings.relative)
 
 
@@ -164,11 +148,8 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     share = frames * layout.length / max(len(data), 1)
     if not is_recognised(frames, share, has_checksum=False):
         return None
-    remark = message(
-        "of its {channels} channels say which the gauges are: {option} table=N {option} relative=N",
-        option=option("--set"),
-        channels=channels,
-    )
+    template = N_("of its {channels} channels say which the gauges are: {option} table=N {option} relative=N")
+    remark = message(template, option=option("--set"), channels=channels)
     return Recognition(
         DRIVER.name,
         share,

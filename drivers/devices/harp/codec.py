@@ -93,14 +93,7 @@ def encode_write(register: Register, value: int) -> bytes:
     return encode(HarpMessage(WRITE, register, payload), PAYLOAD_TYPES[register])
 
 
-def encode_start() -> bytes:
-    """Request that starts the samples."""
-    return encode_write(Register.ACQUISITION, 1)
-
-
-def encode_stop() -> bytes:
-    """Request that stops the samples."""
-    return encode_write(Register.ACQUISITION, 0)
+START, STOP = encode_write(Register.ACQUISITION, 1), encode_write(Register.ACQUISITION, 0)
 
 
 def with_active_mode(operation: int) -> int:
@@ -175,12 +168,12 @@ def find_events(buffer: UInt8s, channels: Ints, garbage: int, lines: Records) ->
     skipped; after garbage only an event is believed, because a checksum of eight bits passes too much.
     Returns the number of lines, the numbers of bytes used and discarded, and the garbage until then.
     """
-    at = 0
-    found = 0
-    discarded = 0
+    at = found = discarded = 0
     while at + MIN_MESSAGE_BYTES <= len(buffer):
         size = 0
-        if _may_begin(buffer, at, garbage):
+        kind = buffer[at] & _ERROR_MASK
+        may_begin = 1 <= kind <= EVENT and buffer[at + 1] >= MIN_MESSAGE_BYTES - 2
+        if _is_event(buffer, at) if garbage else may_begin:
             size = 2 + int(buffer[at + 1])
             if at + size > len(buffer):
                 break
@@ -201,14 +194,6 @@ def find_events(buffer: UInt8s, channels: Ints, garbage: int, lines: Records) ->
         garbage = 0
         at += size
     return found, at, discarded, garbage
-
-
-@inlined
-def _may_begin(buffer: UInt8s, at: int, garbage: int) -> bool:
-    if garbage:
-        return _is_event(buffer, at)
-    kind = buffer[at] & _ERROR_MASK
-    return bool(1 <= kind <= EVENT and buffer[at + 1] >= MIN_MESSAGE_BYTES - 2)
 
 
 @inlined
@@ -294,15 +279,8 @@ class EventDecoder(PacketDecoder):
         super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
         self._state["period_s"] = 1 / rate_hz
         self._channels = np.array([table, relative])
-        self._rules = make_rules(
-            BY_TIME,
-            rate_hz,
-            unit_s=1 / TICKS_PER_S,
-            clock_step_s=1 / TICKS_PER_S,
-            time_wrap=float((1 << 32) * TICKS_PER_S),
-            overload_count=overload_count,
-            max_gap_s=max_gap_s,
-        )
+        tick_s, wraps = 1 / TICKS_PER_S, (float((1 << 32) * TICKS_PER_S), 0.0)
+        self._rules = make_rules(BY_TIME, rate_hz, tick_s, tick_s, wraps, overload_count, max_gap_s)
         self._garbage = 0
 
     def expect_restart(self) -> None:
@@ -311,15 +289,13 @@ class EventDecoder(PacketDecoder):
         super().expect_restart()
 
     def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
-        lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
-        buffer = np.frombuffer(data, dtype=np.uint8)
-        found, used, discarded, self._garbage = find_events(buffer, self._channels, self._garbage, lines)
-        self._unfinished = data[used:]
+        lines, used, discarded, self._garbage = _scan(data, self._channels, self._garbage)
+        found, self._unfinished = len(lines), data[used:]
         packets = np.empty(found, dtype=PACKET)
         counts = np.empty((found, 2))
         self._state["restart_rows"] = self._rows_since(arrival_ns, found)
         hold_from = len(data) - _MAX_HELD_BYTES
-        good, done = count_lines(lines[:found], hold_from, self._state, self._rules, packets, counts)
+        good, done = count_lines(lines, hold_from, self._state, self._rules, packets, counts)
         if done < found:
             self._unfinished = data[int(lines[done]["start"]) :]
             discarded = int(lines[done]["discarded"])
@@ -328,12 +304,17 @@ class EventDecoder(PacketDecoder):
         return packets[:good], counts[:good]
 
 
-def event_times(data: bytes) -> Floats:
-    """Times (in 32 us) of the good events in `data`."""
+def _scan(data: bytes, channels: Ints, garbage: int) -> tuple[Records, int, int, int]:
     lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
     buffer = np.frombuffer(data, dtype=np.uint8)
-    found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
-    times: Floats = lines["time"][:found][lines["good"][:found] != 0]
+    found, used, discarded, garbage = find_events(buffer, channels, garbage, lines)
+    return lines[:found], used, discarded, garbage
+
+
+def event_times(data: bytes) -> Floats:
+    """Times (in 32 us) of the good events in `data`."""
+    lines, *_ = _scan(data, np.zeros(2, dtype=np.int64), 0)
+    times: Floats = lines["time"][lines["good"] != 0]
     return times
 
 

@@ -6,12 +6,13 @@ import msgspec
 import numpy as np
 
 from drivers.devices.harp import DRIVER, codec
-from drivers.devices.harp.codec import EventDecoder, HarpMessage, Register
-from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.devices.harp.codec import EventDecoder, Register
+from drivers.errors import ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
 RATE_HZ = 1000.0
@@ -36,7 +37,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class HarpSource(SampleSource):
     """Conversation: stop, identify, enable events, start. The device's times show its fixed rate."""
 
-    stop_command = codec.encode_stop()
+    stop_command = codec.STOP
 
     def __init__(self, settings: HarpSettings, rate_hz: float = RATE_HZ) -> None:
         super().__init__(DeviceIdentity(DRIVER.name, "Harp LoadCells"), DRIVER.default_baud, rate_hz)
@@ -51,10 +52,8 @@ class HarpSource(SampleSource):
         self._identify(link)
         self._write(link, Register.OPERATION, codec.with_active_mode)
         self._write(link, Register.EVENTS, codec.with_load_cells)
-        link.write(codec.encode_start())
-        received, good = self.await_data(
-            link, self.timeout_s, lambda data: codec.rate_from_events(data) is not None
-        )
+        link.write(codec.START)
+        received, good = self.await_data(link, self.timeout_s, codec.rate_from_events)
         reply = codec.find_reply(received, Register.ACQUISITION)
         if reply is not None and reply.kind & codec.ERROR:
             raise ProtocolError("the device refuses to start: switch it off and on, and try again")
@@ -62,12 +61,11 @@ class HarpSource(SampleSource):
             raise self.no_data_error(received)
         measured_hz = codec.rate_from_events(received)
         if not self.is_same_rate(measured_hz):
-            raise ProtocolError(
+            template = N_(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is expected: "
-                "ask for --rate {actual_hz:.4g}",
-                actual_hz=measured_hz,
-                rate_hz=self.rate_hz,
+                "ask for --rate {actual_hz:.4g}"
             )
+            raise ProtocolError(template, actual_hz=measured_hz, rate_hz=self.rate_hz)
         return received
 
     def make_decoder(self, data: bytes) -> EventDecoder:  # noqa: ARG002 - all is known
@@ -77,18 +75,11 @@ class HarpSource(SampleSource):
     def _identify(self, link: Link) -> None:
         received = self.silence(link)
         who = self._read(link, Register.WHO_AM_I)
-        if who is None and not codec.find_messages(received)[0]:
-            raise self.no_data_error(received)
         if who is None:
-            raise NoDataError(
-                "the device sends and does not answer: check the line from this computer to the device"
-            )
+            raise self.no_answer_error(received, sends=bool(codec.find_messages(received)[0]))
         if who != codec.WHO_AM_I:
-            raise ProtocolError(
-                "the device is Harp {number}, and LoadCells is {expected}: choose its port",
-                number=who,
-                expected=codec.WHO_AM_I,
-            )
+            template = N_("the device is Harp {number}, and LoadCells is {expected}: choose its port")
+            raise ProtocolError(template, number=who, expected=codec.WHO_AM_I)
         high, low = (self._read(link, r) for r in (Register.FIRMWARE_HIGH, Register.FIRMWARE_LOW))
         serial_number = self._read(link, Register.SERIAL_NUMBER)
         self._identity = DeviceIdentity(
@@ -100,11 +91,8 @@ class HarpSource(SampleSource):
 
     def _read(self, link: Link, register: Register) -> int | None:
         """Value of a register; None where the device refuses or does not answer."""
-
-        def find(received: bytes) -> HarpMessage | None:
-            return codec.find_reply(received, register)
-
-        reply = self.request(link, codec.encode_read(register), find, _TRIES)
+        command = codec.encode_read(register)
+        reply = self.request(link, command, lambda data: codec.find_reply(data, register), _TRIES)
         return None if reply is None or reply.kind & codec.ERROR else reply.number
 
     def _write(self, link: Link, register: Register, wanted: Callable[[int], int]) -> None:
@@ -114,22 +102,16 @@ class HarpSource(SampleSource):
             return
         link.write(codec.encode_write(register, wanted(present)))
         if self._read(link, register) != wanted(present):
-            raise ProtocolError(
-                "the device does not take {value} in register {register}: switch it off and on",
-                value=wanted(present),
-                register=register,
-            )
+            template = N_("the device does not take {value} in register {register}: switch it off and on")
+            raise ProtocolError(template, value=wanted(present), register=register)
 
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     parsed = parse_settings(HarpSettings, settings, DRIVER.name)
     if rate_hz is not None and not 0 < rate_hz <= codec.TICKS_PER_S:
-        raise SettingsError(
-            "rate {rate_hz:g} Hz cannot be: LoadCells sends {usual_hz:g} Hz, leave --rate out",
-            rate_hz=rate_hz,
-            usual_hz=RATE_HZ,
-        )
+        template = N_("rate {rate_hz:g} Hz cannot be: LoadCells sends {usual_hz:g} Hz, leave --rate out")
+        raise SettingsError(template, rate_hz=rate_hz, usual_hz=RATE_HZ)
     return HarpSource(parsed, rate_hz or RATE_HZ)
 
 
@@ -140,21 +122,17 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     if not is_recognised(events, share, has_checksum=True):
         return None
     rate_hz = codec.rate_from_events(data) or rate_from_count(events, duration_s)
-    remark = message(
-        "say which channels the gauges are: {option} table=N {option} relative=N", option=option("--set")
-    )
+    template = N_("say which channels the gauges are: {option} table=N {option} relative=N")
+    remark = message(template, option=option("--set"))
     return Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
 
 
 def _parse_who_am_i(received: bytes) -> Message | None:
     reply = codec.find_reply(received, Register.WHO_AM_I)
-    if reply is None:
-        return None
-    if reply.number == codec.WHO_AM_I:
-        return EMPTY
-    return message(
-        "it is Harp {number}, and LoadCells is {expected}", number=reply.number, expected=codec.WHO_AM_I
-    )
+    if reply is None or reply.number == codec.WHO_AM_I:
+        return None if reply is None else EMPTY
+    template = N_("it is Harp {number}, and LoadCells is {expected}")
+    return message(template, number=reply.number, expected=codec.WHO_AM_I)
 
 
 IDENTITY_QUERY = IdentityQuery(

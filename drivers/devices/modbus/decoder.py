@@ -7,7 +7,7 @@ import numpy as np
 from drivers.clock import Skew, SkewStatistics
 from drivers.devices.modbus.registers import ChannelValue, Poll
 from drivers.envelope import StampedRead, Unwrapper, wrap
-from drivers.packets import MAX_GAP_S, PACKET, Position, sample_blocks
+from drivers.packets import MAX_GAP_S, PACKET, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 
@@ -74,7 +74,7 @@ class ResponseDecoder(Decoder):
         """The connection broke: an unfinished poll is discarded. The grid goes on with the host's clock."""
         self._responses = None
 
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:  # noqa: ARG002 - in the envelopes
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         first_index, last_time_s = self._losses.samples, self._row_time_s
         discarded = self._unwrapper.discarded_bytes
         for read in self._unwrapper.feed(data):
@@ -83,9 +83,9 @@ class ResponseDecoder(Decoder):
         if self._rows:
             rows, counts = np.array(self._rows, dtype=PACKET), np.array(self._counts)
             self._rows, self._counts = [], []
-            position = Position(first_index, last_time_s, self._period_ns / _NS)
-            size = self._losses.samples - first_index
-            yield from sample_blocks(rows, counts, size, position, self._last_ns or 0)
+            indices = range(first_index, self._losses.samples)
+            arrival_ns = self._last_ns or 0
+            yield from sample_blocks(rows, counts, indices, last_time_s, self._period_ns / _NS, arrival_ns)
 
     def _add_response(self, read: StampedRead) -> None:
         number = read.port & ~LATE

@@ -198,13 +198,10 @@ class ModbusSource(SampleSource):
     def _no_response_error(self, request: Request, response: Response, received: bytes) -> Exception:
         unit, asked = request.unit, request.description
         if response.is_exception:
-            return ProtocolError(
-                "unit {unit} refuses {request}: {fault}. Hold register map {map} against the device's manual",
-                unit=unit,
-                request=asked,
-                fault=response.fault,
-                map=self._map.name,
+            template = N_(
+                "unit {unit} refuses {request}: {fault}. Hold register map {map} against the device's manual"
             )
+            return ProtocolError(template, unit=unit, request=asked, fault=response.fault, map=self._map.name)
         if not received:
             template = N_(
                 "unit {unit} does not answer {request}: check baud rate, parity and unit,"
@@ -253,11 +250,8 @@ class ModbusSource(SampleSource):
 def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSource:
     """Source of the device. Raises SettingsError for a setting, map or rate that cannot be."""
     if rate_hz is not None and not 0 < rate_hz <= MAX_RATE_HZ:
-        raise SettingsError(
-            "rate {rate_hz:g} Hz cannot be polled: give one up to {most:g}, or leave it out",
-            rate_hz=rate_hz,
-            most=MAX_RATE_HZ,
-        )
+        template = N_("rate {rate_hz:g} Hz cannot be polled: give one up to {most:g}, or leave it out")
+        raise SettingsError(template, rate_hz=rate_hz, most=MAX_RATE_HZ)
     parsed, register_map = read_modbus_settings(settings)
     return ModbusSource(parsed, register_map, rate_hz)
 

@@ -16,6 +16,7 @@ from drivers.compiled import compiled, inlined
 from drivers.crc import crc16, crc16_slice
 from drivers.errors import ProtocolError, SettingsError
 from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, PacketDecoder, count_packet, is_plausible_gap
+from messages.i18n import N_
 
 START = b"S"
 STOP = b"P"
@@ -66,11 +67,8 @@ def encode_rate(rate_hz: float) -> bytes:
     Raises SettingsError if `rate_hz` is no whole number from 1 to 1,000,000.
     """
     if not (1 <= rate_hz <= _MAX_RATE_HZ and rate_hz == int(rate_hz)):
-        raise SettingsError(
-            "rate {rate_hz:g} Hz cannot be set: give whole hertz from 1 to {most}",
-            rate_hz=rate_hz,
-            most=_MAX_RATE_HZ,
-        )
+        template = N_("rate {rate_hz:g} Hz cannot be set: give whole hertz from 1 to {most}")
+        raise SettingsError(template, rate_hz=rate_hz, most=_MAX_RATE_HZ)
     return b"R%d\n" % int(rate_hz)
 
 
@@ -124,7 +122,8 @@ def encode_frames(first_index: int, times_us: Ints, counts: Int32s, flags: int |
         raise ValueError(
             f"{len(counts)} samples do not fill {frames} frames evenly with 1 to {MAX_SAMPLES} each"
         )
-    table = np.zeros(frames, dtype=_frame_dtype(n))
+    head = [("sync", "<u2"), ("version", "u1"), ("flags", "u1"), ("seq", "<u4"), ("t_us", "<u4")]
+    table = np.zeros(frames, dtype=[*head, ("n", "u1"), ("counts", "<i4", (n, 2)), ("crc", "<u2")])
     table["sync"] = np.frombuffer(SYNC, dtype="<u2")
     table["version"] = VERSION
     table["flags"] = flags
@@ -135,21 +134,6 @@ def encode_frames(first_index: int, times_us: Ints, counts: Int32s, flags: int |
     wire = table.view(np.uint8).reshape(frames, frame_length(n))
     table["crc"] = [crc16(row[2:-2].tobytes()) for row in wire]
     return wire
-
-
-def _frame_dtype(n: int) -> np.dtype[np.void]:
-    return np.dtype(
-        [
-            ("sync", "<u2"),
-            ("version", "u1"),
-            ("flags", "u1"),
-            ("seq", "<u4"),
-            ("t_us", "<u4"),
-            ("n", "u1"),
-            ("counts", "<i4", (n, 2)),
-            ("crc", "<u2"),
-        ]
-    )
 
 
 class FrameDecoder(PacketDecoder):
@@ -190,6 +174,11 @@ def find_frames(data: bytes) -> Records:
     frames = np.empty(len(data) // MIN_FRAME_BYTES, dtype=FRAME)
     found, _, _ = scan_frames(np.frombuffer(data, dtype=np.uint8), frames)
     return frames[:found]
+
+
+def has_frame(data: bytes) -> bool:
+    """Whether there is a good frame in `data`."""
+    return len(find_frames(data)) > 0
 
 
 def rate_from_frames(data: bytes) -> float | None:
@@ -235,12 +224,10 @@ STATE = np.dtype(
 def scan_frames(buffer: UInt8s, frames: Records) -> tuple[int, int, int]:
     """Fill `frames` with the good ones in `buffer`; a bad candidate costs one byte.
 
-    Returns the number of frames, the number of their samples, and the number of bytes that were used: the
-    rest (at most 270) may become a frame.
+    Returns the numbers of frames, of their samples, and of bytes that were used: the rest (at most 270) may
+    become a frame.
     """
-    at = 0
-    found = 0
-    samples = 0
+    at = found = samples = 0
     while at + MIN_FRAME_BYTES <= len(buffer):
         if buffer[at] == _SYNC_0 and buffer[at + 1] == _SYNC_1 and buffer[at + 2] == VERSION:
             n = int(buffer[at + 12])
@@ -274,9 +261,7 @@ def count_frames(
     `used` bytes of the buffer will not be passed again; `states` (1,) is updated.
     """
     state = states[0]
-    found = 0
-    sample = 0
-    end = 0
+    found = sample = end = 0
     for frame in frames:
         _discard(state, frame.start - end)
         end = frame.end
@@ -294,7 +279,12 @@ def count_frames(
         packet.status = (frame.flags & _OVERLOADS) << _OVERLOAD_SHIFT
         count_packet(state, packet, is_restart)
         state.restarts += is_restart
-        _update(state, frame, packet)
+        state.started = 1
+        state.restarting = state.garbage = 0
+        state.last_seq = frame.seq
+        state.last_t_us = frame.t_us
+        state.next_seq = (frame.seq + frame.n) & _U32
+        state.row_time_s = packet.time_s + (frame.n - 1) * state.period_s
         for at in range(frame.start + HEADER_BYTES, end - 2, SAMPLE_BYTES):
             counts[sample, 0] = np.int32(_u32(buffer, at))
             counts[sample, 1] = np.int32(_u32(buffer, at + 4))
@@ -336,17 +326,6 @@ def _time_s(state: Record, frame: Record, gap: int, is_restart: bool) -> float:
         step = (frame.t_us - state.last_t_us) & _U32
         state.packet_us += step if step < _U32 // 2 else step - _U32 - 1
     return float(state.packet_us * 1e-6)
-
-
-@inlined
-def _update(state: Record, frame: Record, packet: Record) -> None:
-    state.started = 1
-    state.restarting = 0
-    state.garbage = 0
-    state.last_seq = frame.seq
-    state.last_t_us = frame.t_us
-    state.next_seq = (frame.seq + frame.n) & _U32
-    state.row_time_s = packet.time_s + (frame.n - 1) * state.period_s
 
 
 @inlined

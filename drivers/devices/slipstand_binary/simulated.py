@@ -17,10 +17,6 @@ _COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
 _KINDS = {b"S": CommandKind.START, b"P": CommandKind.STOP, b"I": CommandKind.IDENTIFY}
 
 
-def _command(match: re.Match[bytes]) -> Command:
-    return Command(CommandKind.RATE, float(match[1])) if match[1] else Command(_KINDS[match[0]])
-
-
 class SimulatedBinary(SimulatedProtocol):
     """Sends frames with index, device time and CRC once it is started; obeys commands."""
 
@@ -35,13 +31,11 @@ class SimulatedBinary(SimulatedProtocol):
         return commands, unfinished if unfinished >= 0 else len(data)
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
-        """Answer `IDENTIFY`; other commands have no answer."""
         if command.kind is CommandKind.IDENTIFY:
             return codec.encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
         return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:
-        """As the reference firmware: at most 5 ms and at most 32 samples."""
         return codec.samples_per_frame(rate_hz)
 
     def encode(self, first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:

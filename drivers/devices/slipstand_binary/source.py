@@ -12,6 +12,7 @@ from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, parse_settings
+from messages.i18n import N_
 from messages.message import Message, message
 
 _TRIES = 4
@@ -47,7 +48,7 @@ class SlipstandBinarySource(SampleSource):
         self.prepare()
         deadline_s = time.monotonic() + self.timeout_s
         self.silence(link)
-        device = self._identify(link)
+        device = self.request(link, codec.IDENTIFY, codec.find_identity, _TRIES)
         if device is not None:
             device = self._with_rate(link, device)
             self._rate_hz = device.rate_hz
@@ -56,9 +57,9 @@ class SlipstandBinarySource(SampleSource):
         return self._await_frames(link, deadline_s - time.monotonic(), measure=device is None)
 
     def resume(self, link: Link) -> bytes:
-        received, sends = self.await_data(link, _LISTEN_S, _has_frame)
+        received, sends = self.await_data(link, _LISTEN_S, codec.has_frame)
         if sends:
-            more, _ = self.await_data(link, _RATE_S, lambda data: _has_rate(received + data))
+            more, _ = self.await_data(link, _RATE_S, lambda data: codec.rate_from_frames(received + data))
             received += more
         rate_hz = codec.rate_from_frames(received)
         if self._rate_hz and rate_hz and self.is_same_rate(rate_hz):
@@ -71,44 +72,31 @@ class SlipstandBinarySource(SampleSource):
             self._rate_hz = codec.rate_from_frames(data)
         return FrameDecoder(self._rate_hz) if self._rate_hz else None
 
-    def _identify(self, link: Link) -> FirmwareIdentity | None:
-        return self.request(link, codec.IDENTIFY, codec.find_identity, _TRIES)
-
     def _with_rate(self, link: Link, device: FirmwareIdentity) -> FirmwareIdentity:
         """Set the rate where another is asked for, and let the device confirm it."""
         if self._rate_hz is None or device.rate_hz == self._rate_hz:
             return device
         link.write(codec.encode_rate(self._rate_hz))
-        confirmed = self._identify(link)
+        confirmed = self.request(link, codec.IDENTIFY, codec.find_identity, _TRIES)
         if confirmed is None or confirmed.rate_hz != self._rate_hz:
-            raise ProtocolError(
+            template = N_(
                 "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
-                "ask for --rate {actual_hz:g} or one that it can do",
-                rate_hz=self._rate_hz,
-                actual_hz=device.rate_hz,
+                "ask for --rate {actual_hz:g} or one that it can do"
             )
+            raise ProtocolError(template, rate_hz=self._rate_hz, actual_hz=device.rate_hz)
         return confirmed
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
-        received = self.await_stream(link, _has_rate if measure else _has_frame, timeout_s)
+        received = self.await_stream(link, codec.rate_from_frames if measure else codec.has_frame, timeout_s)
         rate_hz = codec.rate_from_frames(received) if measure else None
         if not self.is_same_rate(rate_hz):
-            raise ProtocolError(
+            template = N_(
                 "the device sends {actual_hz:.5g} Hz where {rate_hz:g} Hz is asked for, and cannot be "
-                "set: leave --rate out",
-                actual_hz=rate_hz,
-                rate_hz=self._rate_hz,
+                "set: leave --rate out"
             )
+            raise ProtocolError(template, actual_hz=rate_hz, rate_hz=self._rate_hz)
         self._rate_hz = self._rate_hz or rate_hz
         return received
-
-
-def _has_frame(received: bytes) -> bool:
-    return len(codec.find_frames(received)) > 0
-
-
-def _has_rate(received: bytes) -> bool:
-    return codec.rate_from_frames(received) is not None
 
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBinarySource:
@@ -134,9 +122,8 @@ def _parse_identity(received: bytes) -> Message | None:
         device = codec.find_identity(received)
     except ProtocolError as error:
         return error.message
-    if device is None:
-        return None
-    return message("firmware {version}, {rate_hz:g} Hz", version=device.version, rate_hz=device.rate_hz)
+    template = N_("firmware {version}, {rate_hz:g} Hz")
+    return message(template, version=device.version, rate_hz=device.rate_hz) if device else None
 
 
 IDENTITY_QUERY = IdentityQuery(

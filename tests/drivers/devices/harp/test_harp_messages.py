@@ -5,6 +5,8 @@ from drivers.devices.harp.codec import (
     EVENT,
     READ,
     S16,
+    START,
+    STOP,
     U8,
     U16,
     WRITE,
@@ -12,8 +14,6 @@ from drivers.devices.harp.codec import (
     Register,
     encode,
     encode_read,
-    encode_start,
-    encode_stop,
     encode_write,
     find_messages,
     find_reply,
@@ -25,8 +25,8 @@ from drivers.devices.harp.codec import (
 @pytest.mark.parametrize(
     ("sent", "expected"),
     [
-        (encode_start(), "02 05 20 ff 01 01 28"),
-        (encode_stop(), "02 05 20 ff 01 00 27"),
+        (START, "02 05 20 ff 01 01 28"),
+        (STOP, "02 05 20 ff 01 00 27"),
         (encode_read(Register.WHO_AM_I), "01 04 00 ff 02 06"),
         (encode_write(Register.OPERATION, 0xE1), "02 05 0a ff 01 e1 f2"),
         (encode(HarpMessage(READ, 0, b"\xd0\x04"), U16, 31_251), "01 0c 00 ff 12 01 00 00 00 01 00 d0 04 f4"),
@@ -55,7 +55,7 @@ def test_messages_are_found_in_rubbish_with_and_without_their_time():
 
 
 def test_a_wrong_checksum_makes_it_rubbish():
-    assert find_messages(encode_start()[:-1] + b"\x00")[0] == []
+    assert find_messages(START[:-1] + b"\x00")[0] == []
     assert find_messages(b"")[0] == []
 
 

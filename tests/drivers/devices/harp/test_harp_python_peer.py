@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.devices.harp.codec import EventDecoder, encode_events, encode_start, encode_stop, encode_write
+from drivers.devices.harp.codec import START, STOP, EventDecoder, encode_events, encode_write
 from drivers.devices.harp.codec import Register as OurRegister
 from drivers.devices.harp.simulated import SimulatedHarp, find_commands
 from drivers.devices.harp.source import HarpSettings
@@ -37,8 +37,8 @@ def test_we_decode_what_the_peer_writes():
 @pytest.mark.parametrize(
     ("request_bytes", "kind"),
     [
-        (encode_start(), "WRITE"),
-        (encode_stop(), "WRITE"),
+        (START, "WRITE"),
+        (STOP, "WRITE"),
         (encode_write(OurRegister.OPERATION, 0xE1), "WRITE"),
     ],
     ids=["start", "stop", "write of a register"],

@@ -4,14 +4,14 @@ from wire_helpers import ScriptedLink, join
 
 from drivers.devices.harp.codec import (
     ERROR,
+    START,
+    STOP,
     U16,
     HarpMessage,
     Register,
     encode,
     encode_events,
     encode_read,
-    encode_start,
-    encode_stop,
     encode_write,
 )
 from drivers.devices.harp.simulated import SimulatedHarp, find_commands
@@ -55,7 +55,7 @@ def test_the_conversation_of_a_start():
     source = make_source({}, None)
     first = source.start(link)
     assert link.sent == [
-        encode_stop(),
+        STOP,
         encode_read(Register.WHO_AM_I),
         encode_read(Register.FIRMWARE_HIGH),
         encode_read(Register.FIRMWARE_LOW),
@@ -64,14 +64,14 @@ def test_the_conversation_of_a_start():
         encode_write(Register.OPERATION, 0xE1),
         encode_read(Register.OPERATION),
         encode_read(Register.EVENTS),
-        encode_start(),
+        START,
     ]
     assert source.identity == DeviceIdentity("harp", "Harp LoadCells", "1.1", "7")
     assert source.rate_hz == 1000.0
     block = join(block for data in (first, *iter(link.read, b"")) for block in source.decode(data, 0))
     np.testing.assert_array_equal(block.counts, np.arange(2 * EVENTS).reshape(EVENTS, 2))
     source.stop(link)
-    assert link.sent[-1] == encode_stop()
+    assert link.sent[-1] == STOP
 
 
 def test_another_rate_than_expected_is_said():
@@ -92,7 +92,7 @@ def test_a_device_that_refuses_to_start():
     class Refusing(Firmware):
         def __call__(self, sent: bytes) -> bytes:
             refused = encode(HarpMessage(2 | ERROR, Register.ACQUISITION, b"\x00"), 1, 7)
-            return refused if sent == encode_start() else super().__call__(sent)
+            return refused if sent == START else super().__call__(sent)
 
     with pytest.raises(ProtocolError, match="refuses to start"):
         make_source({}, None).start(ScriptedLink(Refusing()))

@@ -6,12 +6,12 @@ from device_kit import Wire, ramp_at, run_for
 
 from drivers.devices.harp.codec import (
     ERROR,
+    START,
+    STOP,
     EventDecoder,
     HarpMessage,
     Register,
     encode_read,
-    encode_start,
-    encode_stop,
     encode_write,
     find_messages,
 )
@@ -44,18 +44,16 @@ def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> l
 def test_is_silent_until_it_is_active_and_started(device, wire):
     run_for(device, 0.05)
     assert wire.sent == b""
-    ask(device, wire, encode_start())
+    ask(device, wire, START)
     run_for(device, 0.05)
     assert all(message.address != Register.LOAD_CELLS for message in find_messages(bytes(wire.sent))[0])
-    ask(device, wire, encode_stop(), encode_write(Register.OPERATION, 0xE1), encode_start())
+    ask(device, wire, STOP, encode_write(Register.OPERATION, 0xE1), START)
     wire.sent.clear()
     end_ns = run_for(device, 0.05)
     (block,) = EventDecoder(1000.0).feed(bytes(wire.sent), 0)
     np.testing.assert_array_equal(np.diff(block.counts[:, 0]), 1)
     assert len(block) >= 49
-    assert ask(device, wire, encode_stop(), now_ns=end_ns)[-1] == HarpMessage(
-        2, Register.ACQUISITION, b"\x00"
-    )
+    assert ask(device, wire, STOP, now_ns=end_ns)[-1] == HarpMessage(2, Register.ACQUISITION, b"\x00")
     sent = len(wire.sent)
     run_for(device, 0.05, end_ns)
     assert len(wire.sent) == sent
