@@ -4,12 +4,12 @@ import contextlib
 import errno
 import logging
 import os
+import re
 import select
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 import serial
@@ -76,12 +76,10 @@ class OpenPort(Link, Protocol):
     """An open port: a `Port`, or the two ports of a `drivers.pair.link.PairLink`."""
 
     @property
-    def info(self) -> PortInfo:
-        """What is known of it, to find the device again and to name it in a run."""
+    def info(self) -> PortInfo: ...
 
     @property
-    def url(self) -> str:
-        """As it was opened."""
+    def url(self) -> str: ...
 
     def close(self) -> None:
         """Close it; may be called twice, and when the device is gone."""
@@ -114,11 +112,10 @@ def list_ports() -> list[PortInfo]:
         ports = list(serial_list_ports.comports())
     except PLATFORM_ERRORS:  # Windows raises while a device is being unplugged
         return []
-    found = [
+    return [
         PortInfo(p.device, p.description or "", p.vid, p.pid, p.serial_number or "", p.location or "")
-        for p in ports
+        for p in sorted(ports, key=lambda port: port.device)
     ]
-    return sorted(found, key=lambda port: port.device)
 
 
 def port_info(url: str) -> PortInfo:
@@ -155,31 +152,23 @@ def open_port(url: str, baud: int, parity: str = "N") -> "Port":
     opened, SettingsError if it cannot be set so.
     """
     if parity not in PARITIES:
-        raise SettingsError(
-            "parity {parity!r} is not known: give one of {allowed}", parity=parity, allowed=PARITIES
-        )
+        template = N_("parity {parity!r} is not known: give one of {allowed}")
+        raise SettingsError(template, parity=parity, allowed=PARITIES)
     if baud <= 0:
-        raise SettingsError(
-            "baud {baud} is not possible: give the device's baud rate, for example 115200", baud=baud
-        )
+        template = N_("baud {baud} is not possible: give the device's baud rate, for example 115200")
+        raise SettingsError(template, baud=baud)
     users = other_port_users(url)
     if users:  # many programs take no lock, and two readers get half of the bytes each
         raise port_busy_error(url, users)
+    timeouts = {"timeout": _READ_TIMEOUT_S, "write_timeout": _WRITE_TIMEOUT_S}
     try:
-        wire = serial.serial_for_url(
-            url,
-            baudrate=baud,
-            parity=parity,
-            timeout=_READ_TIMEOUT_S,
-            write_timeout=_WRITE_TIMEOUT_S,
-            exclusive=True,
-        )
+        wire = serial.serial_for_url(url, baudrate=baud, parity=parity, exclusive=True, **timeouts)
     except PLATFORM_ERRORS as error:
         raise port_unavailable_error(url, baud, error, [port.device for port in list_ports()]) from error
-    # Low latency and a large buffer where the platform has them.
-    with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
+    absent = (AttributeError, NotImplementedError, *PLATFORM_ERRORS)  # only some platforms have these
+    with contextlib.suppress(*absent):
         wire.set_low_latency_mode(True)
-    with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
+    with contextlib.suppress(*absent):
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
     _log.info("opened %s at %d baud, parity %s", url, baud, parity)
     return Port(wire, url)
@@ -203,9 +192,7 @@ class Port:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def read(self) -> bytes:
@@ -233,13 +220,9 @@ class Port:
         try:
             self._wire.baudrate, self._wire.parity = line_settings.baud, line_settings.parity
         except PLATFORM_ERRORS as error:
-            raise SettingsError(
-                "port {port} cannot be set to {baud} baud, parity {parity} ({fault}): give others",
-                port=self.url,
-                baud=line_settings.baud,
-                parity=line_settings.parity,
-                fault=error,
-            ) from error
+            template = N_("port {port} cannot be set to {baud} baud, parity {parity} ({fault}): give others")
+            baud, parity = line_settings.baud, line_settings.parity
+            raise SettingsError(template, port=self.url, baud=baud, parity=parity, fault=error) from error
         try:
             self._wire.reset_input_buffer()
         except PLATFORM_ERRORS as error:
@@ -369,13 +352,14 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
     """Error to raise for `error` of opening `url`, while the ports `present` exist."""
     number, fault = getattr(error, "errno", None), str(error)
     if "://" in url:
-        return PortUnavailableError(_unreachable_template(fault), port=url)
+        templates = (text for words, text in _UNREACHABLE.items() if re.search(words, fault, re.IGNORECASE))
+        return PortUnavailableError(next(templates), port=url)
     if number in _DENIED:
-        return PortUnavailableError(
+        template = N_(
             "port {port} may not be opened by this user: add the user to the group that owns it "
-            "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again",
-            port=url,
+            "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again"
         )
+        return PortUnavailableError(template, port=url)
     # Windows reports "permission" for a port in use, of which pyserial keeps only the text.
     if number in _BUSY or "PermissionError" in fault:
         return port_busy_error(url, port_users(url))
@@ -391,28 +375,28 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
     if isinstance(error, (ValueError, OverflowError)):
         template = N_("port {port} cannot be set to {baud} baud ({fault}): give another --baud")
         return SettingsError(template, port=url, baud=baud, fault=error)
-    return PortUnavailableError(
-        "{port} cannot be used as a serial port ({fault}): give the name of a port", port=url, fault=error
-    )
+    template = N_("{port} cannot be used as a serial port ({fault}): give the name of a port")
+    return PortUnavailableError(template, port=url, fault=error)
 
 
 def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
     """Error to raise for a port that other programs have open."""
+    template = N_("port {port} is busy: close the program that has it open")
     if users:
-        return PortUnavailableError(
-            "port {port} is busy, held by {users}: close the program that has it open", port=url, users=users
-        )
-    return PortUnavailableError("port {port} is busy: close the program that has it open", port=url)
+        template = N_("port {port} is busy, held by {users}: close the program that has it open")
+    return PortUnavailableError(template, port=url, users=users)
 
 
-def _unreachable_template(fault: str) -> str:
-    if "not known" in fault:
-        return N_(
-            "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
-        )
-    fault = fault.lower()
-    if "refused" in fault:
-        return N_("{port} refuses: nothing listens there, start the device's server or check the port number")
-    if "name or service" in fault or "getaddrinfo" in fault or "nodename" in fault:
-        return N_("{port} is not known in this network: check how the address is written")
-    return N_("{port} does not answer: check address, port number, network and power of the device")
+_UNREACHABLE = {
+    "not known": N_(
+        "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
+    ),
+    "refused": N_(
+        "{port} refuses: nothing listens there, start the device's server or check the port number"
+    ),
+    "name or service|getaddrinfo|nodename": N_(
+        "{port} is not known in this network: check how the address is written"
+    ),
+    "": N_("{port} does not answer: check address, port number, network and power of the device"),
+}
+"""By what pyserial and the systems write."""

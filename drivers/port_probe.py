@@ -77,7 +77,6 @@ class ListenResult:
     """What was received, and at which line settings."""
 
     recognition: Recognition | None
-    """What the bytes are, if a device folder knows them."""
     line_settings: LineSettings | None
     received: bytes = b""
     """What came at the settings that were recognised, else at those that looked most like text."""
@@ -113,17 +112,15 @@ def _probe_link(
         what = describe_unrecognised(found.received, has_baud=link.has_baud)
         return ProbeOutcome.UNREADABLE, what, found
     if not write:
-        what = message(
-            "nothing sends by itself: try {option}, which asks the device who it is", option=option("--write")
-        )
-        return ProbeOutcome.SILENT, what, found
+        template = N_("nothing sends by itself: try {option}, which asks the device who it is")
+        return ProbeOutcome.SILENT, message(template, option=option("--write")), found
     answered = query_identity(link, on_progress)
     if answered is not None:
         return ProbeOutcome.RECOGNISED, EMPTY, answered
-    what = message(
+    template = N_(
         "nothing is sent and nothing answers: check cable and power, and that the device is switched on"
     )
-    return ProbeOutcome.SILENT, what, found
+    return ProbeOutcome.SILENT, message(template), found
 
 
 def listen(
@@ -166,9 +163,8 @@ def query_identity(
     """Ask one question after the other, by default of all devices. Raises DeviceLostError."""
     for protocol, query in queries or identity_queries():
         for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
-            template = N_("asking for {protocol}")
-            if link.has_baud:
-                template = N_("asking for {protocol} at {line_settings}")
+            with_baud = N_("asking for {protocol} at {line_settings}")
+            template = with_baud if link.has_baud else N_("asking for {protocol}")
             on_progress(message(template, protocol=protocol, line_settings=settings))
             remark = _query_once(link, query, settings, clock)
             if remark is not None:
@@ -195,18 +191,14 @@ def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple
         data = link.read()
         now_s = clock()
         received, last_s = received + data, now_s if data else last_s
-        if not _is_enough(received, now_s - first_s):
+        window_s = _WINDOW_S if len(received) >= _ENOUGH_BYTES else _SLOW_WINDOW_S
+        if now_s - first_s < window_s and len(received) < _MAX_BYTES:
             continue
         recognition = recognise(received, last_s - first_s)
         may_tell_more = is_text(received) and len(received) < _MAX_BYTES
         if not may_tell_more or now_s - first_s > _TEXT_WINDOW_S:
             break
     return received, recognition
-
-
-def _is_enough(received: bytes, duration_s: float) -> bool:
-    window_s = _WINDOW_S if len(received) >= _ENOUGH_BYTES else _SLOW_WINDOW_S
-    return duration_s >= window_s or len(received) >= _MAX_BYTES
 
 
 def _informativeness(result: ListenResult) -> tuple[float, bool, float]:

@@ -89,23 +89,25 @@ def describe_unreadable(received: bytes, protocol: str, baud: int | None = None)
     received = b"".join(read.data for read in Unwrapper().feed(received)) or received
     if not received:
         return message("nothing came, check cable and power, and that the device is sending")
-    return message(
-        "received {count} bytes, first {first}, nothing that {protocol} knows: {remedy}",
-        count=len(received),
-        first=received[:_SHOWN_BYTES].hex(" "),
-        protocol=protocol,
-        remedy=_remedy(received[:_EXAMINED_BYTES], protocol, baud),
-    )
+    remedy, first = _remedy(received[:_EXAMINED_BYTES], protocol, baud), received[:_SHOWN_BYTES].hex(" ")
+    template = N_("received {count} bytes, first {first}, nothing that {protocol} knows: {remedy}")
+    return message(template, count=len(received), first=first, protocol=protocol, remedy=remedy)
 
 
 def describe_unrecognised(received: bytes, *, has_baud: bool) -> Message:
     """Describe unknown bytes (at all baud rates, if the port has any), and what to do."""
-    return message(
-        "{count} bytes came, first {first}, which no built protocol knows{remedy}",
-        count=len(received),
-        first=received[:_SHOWN_BYTES].hex(" "),
-        remedy=_remedy_for_unrecognised(received, has_baud=has_baud),
-    )
+    first = received[:_SHOWN_BYTES].hex(" ")
+    if is_text(received):
+        template = N_(": these are lines such as {line!r}, give --protocol csv and its columns")
+        remedy = message(template, line=_second_line(received))
+    elif has_parity_errors(received):
+        remedy = message(": every other one is 0, as with a wrong parity, try --parity E or O")
+    elif has_baud:
+        remedy = message(" at any usual baud rate: look up rate and protocol in the device's manual")
+    else:
+        remedy = message(": set the baud rate where this address gets its bytes from")
+    template = N_("{count} bytes came, first {first}, which no built protocol knows{remedy}")
+    return message(template, count=len(received), first=first, remedy=remedy)
 
 
 def printable_share(data: bytes) -> float:
@@ -160,17 +162,6 @@ def _remedy_for_text(received: bytes, settings: dict[str, str], *, sends_text: b
         given = " ".join(f"--set {key}={value}" for key, value in settings.items())
         return message("these are lines such as {line!r}, try {settings}", line=line, settings=given)
     return message("these are lines such as {line!r}, set columns, separator and decimal to match", line=line)
-
-
-def _remedy_for_unrecognised(received: bytes, *, has_baud: bool) -> Message:
-    if is_text(received):
-        template = N_(": these are lines such as {line!r}, give --protocol csv and its columns")
-        return message(template, line=_second_line(received))
-    if has_parity_errors(received):
-        return message(": every other one is 0, as with a wrong parity, try --parity E or O")
-    if has_baud:
-        return message(" at any usual baud rate: look up rate and protocol in the device's manual")
-    return message(": set the baud rate where this address gets its bytes from")
 
 
 def _second_line(received: bytes) -> str:

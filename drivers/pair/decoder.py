@@ -10,10 +10,11 @@ from drivers.arrays import Floats
 from drivers.clock import Skew, SkewStatistics
 from drivers.envelope import StampedRead, Unwrapper
 from drivers.packets import MAX_BLOCK_ROWS
-from drivers.pair.merging import ChannelSamples, HostTimeFit, MergedRows, Merger
+from drivers.pair.merging import ChannelSamples, HostTimeFit, Merger
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 from drivers.stream import SampleSource
+from messages.i18n import N_
 from messages.message import Message, message
 
 _MUCH_SLOWER = 1.37
@@ -22,6 +23,10 @@ choice does not depend on their tolerance."""
 _TABLE, _RELATIVE = np.uint8(SampleStatus.OVERLOAD_TABLE), np.uint8(SampleStatus.OVERLOAD_RELATIVE)
 _ABSENT = np.uint8(ABSENT)
 _NS = 1e-9
+_LOST = N_("the device of gauge {gauge} is lost and is looked for: the other gauge goes on")
+_RECONNECTED = N_(
+    "the device of gauge {gauge} was away and is back: {away_s:.2f} s of its readings are missing and marked"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,21 +71,19 @@ class PairDecoder(Decoder):
     @property
     def losses(self) -> Losses:
         """Counts until now. Missing readings are known from the host's time alone, so they are estimates."""
-        both = [channel.source.losses for channel in self._channels]
-        discarded = self._unwrapper.discarded_bytes + self._foreign_bytes
+        both = self._channels[0].source.losses + self._channels[1].source.losses
         return replace(
             self._rows,
-            discarded_bytes=discarded + sum(one.discarded_bytes for one in both),
-            restarts=sum(one.restarts for one in both),
-            repeated=sum(one.repeated for one in both),
-            unexplained_drops=sum(one.unexplained_drops for one in both),
+            discarded_bytes=both.discarded_bytes + self._unwrapper.discarded_bytes + self._foreign_bytes,
+            restarts=both.restarts,
+            repeated=both.repeated,
+            unexplained_drops=both.unexplained_drops,
         )
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         return self._skew_statistics.skew(first_index, end_index)
 
     def take_warnings(self) -> list[Message]:
-        """Losses and returns of one device since the last call."""
         warnings, self._warnings = self._warnings, []
         return warnings
 
@@ -108,28 +111,28 @@ class PairDecoder(Decoder):
         if not read.data or source.losses.restarts != self._restarts[gauge]:
             self._restarts[gauge] = source.losses.restarts
             self._time_fits[gauge].reset()
-        if not read.data:
-            self._report_lost(gauge, read.arrival_ns)
+        if not read.data and self._lost_ns[gauge] is None:
+            self._lost_ns[gauge] = self._last_ns[gauge] or read.arrival_ns
+            self._warnings.append(message(_LOST, gauge=gauge + 1))
         if blocks:
-            self._report_reconnected(gauge)
-            self._last_ns[gauge] = read.arrival_ns
-            self._time_fits[gauge].add(
-                float(self._device_time_s(gauge, blocks[-1])[-1]), blocks[-1].arrival_ns
-            )
+            lost_ns, self._lost_ns[gauge], self._last_ns[gauge] = self._lost_ns[gauge], None, read.arrival_ns
+            if lost_ns is not None:
+                away_s = (self._now_ns - lost_ns) * _NS
+                self._warnings.append(message(_RECONNECTED, gauge=gauge + 1, away_s=away_s))
+            own_s = float(self._device_time_s(gauge, blocks[-1])[-1])
+            self._time_fits[gauge].add(own_s, blocks[-1].arrival_ns)
+        column = self._channels[gauge].column
         for block in blocks:
-            self._merger.add(gauge, self._channel_samples(gauge, block, read.arrival_ns))
+            status = block.status
+            if column:  # flags as of gauge 1
+                is_clipped = (status & _RELATIVE) != 0
+                status = (status & _ABSENT) | np.where(is_clipped, _TABLE, np.uint8(0))
+            host_ns = self._time_fits[gauge].host_ns(self._device_time_s(gauge, block))
+            # After a forward leap of the device's clock, rows would else wait until the host's clock follows.
+            host_ns = np.minimum(host_ns, read.arrival_ns)
+            self._merger.add(gauge, ChannelSamples(host_ns, block.counts[:, column], status))
             if self._merger.buffered > MAX_BLOCK_ROWS:
                 yield from self._ready_blocks()
-
-    def _channel_samples(self, gauge: int, block: SampleBlock, arrival_ns: int) -> ChannelSamples:
-        column = self._channels[gauge].column
-        status = block.status
-        if column:  # flags as of gauge 1
-            is_clipped = (status & _RELATIVE) != 0
-            status = (status & _ABSENT) | np.where(is_clipped, _TABLE, np.uint8(0))
-        host_ns = self._time_fits[gauge].host_ns(self._device_time_s(gauge, block))
-        # After a forward leap of the device's clock, rows would else wait until the host's clock follows.
-        return ChannelSamples(np.minimum(host_ns, arrival_ns), block.counts[:, column], status)
 
     def _device_time_s(self, gauge: int, block: SampleBlock) -> Floats:
         """The device's own time of each row (s): its clock, or index over rate."""
@@ -141,41 +144,14 @@ class PairDecoder(Decoder):
         while (merged := self._merger.take(self._now_ns)) is not None:
             first_index = self._rows.samples
             lag_s = np.where(merged.is_paired, merged.lag_ns * _NS, np.nan)
-            self._skew_statistics.add(
-                first_index, lag_s, math.hypot(*(line.scatter_s for line in self._time_fits))
+            scatter_s = math.hypot(*(line.scatter_s for line in self._time_fits))
+            self._skew_statistics.add(first_index, lag_s, scatter_s)
+            missing, damaged, overloaded = (
+                int(np.count_nonzero(merged.status & int(flags)))
+                for flags in (INCOMPLETE, SampleStatus.DAMAGED, _TABLE | _RELATIVE)
             )
-            self._count(merged)
+            self._rows += Losses(len(merged), 0, missing, damaged, overloaded)
             yield SampleBlock(first_index, merged.counts, merged.status, self._now_ns)
-
-    def _count(self, merged: MergedRows) -> None:
-        status = merged.status
-        self._rows.samples += len(merged)
-        self._rows.missing_estimated += int(np.count_nonzero(status & int(INCOMPLETE)))
-        self._rows.damaged += int(np.count_nonzero(status & int(SampleStatus.DAMAGED)))
-        self._rows.overloaded += int(np.count_nonzero(status & (_TABLE | _RELATIVE)))
-
-    def _report_lost(self, gauge: int, now_ns: int) -> None:
-        if self._lost_ns[gauge] is None:
-            self._lost_ns[gauge] = self._last_ns[gauge] or now_ns
-            self._warnings.append(
-                message(
-                    "the device of gauge {gauge} is lost and is looked for: the other gauge goes on",
-                    gauge=gauge + 1,
-                )
-            )
-
-    def _report_reconnected(self, gauge: int) -> None:
-        lost_ns, self._lost_ns[gauge] = self._lost_ns[gauge], None
-        if lost_ns is not None:
-            away_s = (self._now_ns - lost_ns) * _NS
-            self._warnings.append(
-                message(
-                    "the device of gauge {gauge} was away and is back: {away_s:.2f} s of its readings are"
-                    " missing and marked",
-                    gauge=gauge + 1,
-                    away_s=away_s,
-                )
-            )
 
 
 def _without_zero_counts(block: SampleBlock) -> SampleBlock:

@@ -52,7 +52,7 @@ class PairLink:
         ]
         self._is_ending = False
         for reader in self._readers:
-            reader.start()
+            reader.thread.start()
 
     @property
     def infos(self) -> tuple[PortInfo, PortInfo]:
@@ -82,14 +82,13 @@ class PairLink:
 
     def write(self, data: bytes) -> None:
         """Not supported: each device has its own link. Raises DriverError."""
-        raise DriverError(
-            "{count} bytes cannot be sent to two devices at once: use their own links", count=len(data)
-        )
+        template = N_("{count} bytes cannot be sent to two devices at once: use their own links")
+        raise DriverError(template, count=len(data))
 
     def close(self) -> None:
         """Stop both devices and close both ports; may be called twice."""
         for reader in self._readers:
-            reader.ask_to_stop()
+            reader.stopping.set()
         for reader in self._readers:
             reader.join()
 
@@ -102,11 +101,13 @@ def open_pair(
     """Open both ports, as they were before the link was `lost`, and start both. Raises DriverError."""
     ports: list[OpenPort] = []
     try:
-        for gauge, config in enumerate(configs):
-            ports.append(_opened(gauge, config, lost[gauge] if lost else None))
-    except BaseException:
+        for config in configs:
+            ports.append(config.reopen(lost[len(ports)]) if lost else config.open())
+    except BaseException as error:
         for port in ports:
             port.close()
+        if isinstance(error, DriverError):
+            raise _with_gauge(len(ports), error) from error
         raise
     return PairLink((ports[0], ports[1]), configs, sources, is_resumed=lost is not None)
 
@@ -132,17 +133,11 @@ class _ChannelReader:
         self._source = source
         self._reads = reads
         self._is_resumed = is_resumed
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"port of gauge {gauge + 1}", daemon=True)
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def ask_to_stop(self) -> None:
-        self._stopping.set()
+        self.stopping = threading.Event()
+        self.thread = threading.Thread(target=self._run, name=f"port of gauge {gauge + 1}", daemon=True)
 
     def join(self) -> None:
-        self._thread.join()
+        self.thread.join()
         if self._port is not None:
             self._source.stop(self._port)
             self._port.close()
@@ -152,35 +147,28 @@ class _ChannelReader:
         try:
             if self._port is not None:
                 self._start_device(self._port, is_resumed=self._is_resumed)
-            while not self._stopping.is_set():
+            while not self.stopping.is_set():
                 self._read_until_lost()
                 self._reconnect()
         except DriverError as error:
             self.failure = _with_gauge(self._gauge, error)
         except Exception as error:  # a dead thread would look like a silent device
             _log.exception("reader of gauge %d failed", self._gauge + 1)
-            self.failure = DriverError(
-                "gauge {gauge}: reading {kind}: {fault}",
-                gauge=self._gauge + 1,
-                kind=type(error).__name__,
-                fault=message_of(error),
-            )
+            template, kind = N_("gauge {gauge}: reading {kind}: {fault}"), type(error).__name__
+            self.failure = DriverError(template, gauge=self._gauge + 1, kind=kind, fault=message_of(error))
 
     def _start_device(self, port: OpenPort, *, is_resumed: bool) -> None:
-        link = CancellableLink(port, self._stopping)
+        link = CancellableLink(port, self.stopping)
         first = self._source.resume(link) if is_resumed else self._source.start(link)
         if first:
             self._put(first)
 
     def _read_until_lost(self) -> None:
-        port = self._port
-        if port is None:
-            return
         silent = ActiveTimer(_STALL_S)
         limit_s = max(_SILENT_S, _SILENT_SAMPLES / self._source.rate_hz)
         with contextlib.suppress(DeviceLostError):
-            while not self._stopping.is_set():
-                data = self._source.read(port)
+            while self._port is not None and not self.stopping.is_set():
+                data = self._source.read(self._port)
                 if data:
                     self._put(data)
                     silent.restart()
@@ -189,14 +177,14 @@ class _ChannelReader:
 
     def _reconnect(self) -> None:
         """Look for the device until it is back. Raises DeviceLostError after 10 s."""
-        if self._stopping.is_set() or self._port is None:
+        if self.stopping.is_set() or self._port is None:
             return
         _log.warning("device of gauge %d lost, looking for it", self._gauge + 1)
         self._put(b"")
         self._port.close()
         self._port = None
         lost_ns = host_ns()
-        while not self._stopping.is_set():
+        while not self.stopping.is_set():
             try:
                 port = self._config.reopen(self.info)
                 try:
@@ -211,20 +199,13 @@ class _ChannelReader:
             else:
                 self._port = port
                 return
-            self._stopping.wait(_RETRY_S)
+            self.stopping.wait(_RETRY_S)
 
     def _put(self, data: bytes) -> None:
         if self._reads.qsize() >= _QUEUED_READS:
             template = N_("this computer is too slow: {count} reads wait to be decoded. Close other programs")
             raise QueueFullError(template, count=_QUEUED_READS)
         self._reads.put(wrap(self._gauge, host_ns(), data))
-
-
-def _opened(gauge: int, config: PortConfig, lost: PortInfo | None) -> OpenPort:
-    try:
-        return config.open() if lost is None else config.reopen(lost)
-    except DriverError as error:
-        raise _with_gauge(gauge, error) from error
 
 
 def _with_gauge(gauge: int, error: DriverError) -> DriverError:

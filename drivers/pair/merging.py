@@ -126,7 +126,11 @@ class Merger:
         return merged
 
     def _merged(self, rows: ChannelSamples, other: ChannelSamples) -> MergedRows:
-        chosen = other.take(_nearest(rows.host_ns, other.host_ns)) if len(other) else self._nothing(rows)
+        if len(other):
+            chosen = other.take(_nearest(rows.host_ns, other.host_ns))
+        else:  # readings too far from `rows` to be paired with them
+            host_ns = rows.host_ns - 2 * self._reach_ns
+            chosen = ChannelSamples(host_ns, rows.counts, np.zeros_like(rows.status))
         both = (chosen, rows) if self._base else (rows, chosen)
         lag_ns = both[1].host_ns - both[0].host_ns
         lacks = [(half.status & int(ABSENT)) != 0 for half in both]
@@ -136,16 +140,9 @@ class Merger:
             is_clipped = (half.status & _OVERLOAD) != 0
             status |= np.where(lacks[gauge] & ~lacks[1 - gauge], int(_ALONE[gauge]), 0)
             status |= np.where(is_clipped & ~lacks[gauge], int(_OVERLOADS[gauge]), 0)
-        return MergedRows(
-            np.column_stack([np.where(lack, 0, half.counts) for lack, half in zip(lacks, both, strict=True)]),
-            status.astype(np.uint8),
-            lag_ns,
-            ~(lacks[0] | lacks[1]),
-        )
-
-    def _nothing(self, rows: ChannelSamples) -> ChannelSamples:
-        """Readings too far from `rows` to be paired with them."""
-        return ChannelSamples(rows.host_ns - 2 * self._reach_ns, rows.counts, np.zeros_like(rows.status))
+        counts = [np.where(lack, 0, half.counts) for lack, half in zip(lacks, both, strict=True)]
+        is_paired = ~(lacks[0] | lacks[1])
+        return MergedRows(np.column_stack(counts), status.astype(np.uint8), lag_ns, is_paired)
 
 
 def _nearest(wanted: Ints, offered: Ints) -> Ints:
@@ -195,8 +192,10 @@ class HostTimeFit:
     def add(self, device_s: float, arrival_ns: int) -> None:
         """Add the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
         point = (device_s, arrival_ns)
-        if self._leaps(point):
-            self.reset()
+        if self._best is not None:  # of a clock that leapt ahead, a reading would be taken after it came
+            early_ns = int(self.host_ns(np.array([device_s]))[0]) - arrival_ns
+            if early_ns > _LEAP_NS + _LEAP * (arrival_ns - self._best[1]):
+                self.reset()
         if self._best is None or _window(point) > _window(self._best):
             self._close_window(arrival_ns)
             self._best = point
@@ -208,23 +207,13 @@ class HostTimeFit:
 
         It includes the shortest delay of delivery, which cannot be measured here.
         """
-        own_origin_s, origin_ns = self._nearest() if self._line is None else self._origin
+        own_origin_s, origin_ns = self._origin
+        if self._line is None:  # too few windows for a line: the last complete one
+            own_origin_s, origin_ns = self._points[-1] if self._points else self._best or (0.0, 0)
         since_s = device_s - own_origin_s
         if self._line is not None:
             since_s = since_s + self._line.at(since_s)
         return origin_ns + np.rint(since_s * 1e9).astype(np.int64)
-
-    def _leaps(self, point: _Point) -> bool:
-        """Whether the device's clock leapt ahead: a reading would have been taken after it came."""
-        if self._best is None:
-            return False
-        own_s, arrival_ns = point
-        early_ns = int(self.host_ns(np.array([own_s]))[0]) - arrival_ns
-        return early_ns > _LEAP_NS + _LEAP * (arrival_ns - self._best[1])
-
-    def _nearest(self) -> _Point:
-        """Reference while there are too few windows for a line: that of the last complete window."""
-        return self._points[-1] if self._points else self._best or (0.0, 0)
 
     def _close_window(self, now_ns: int) -> None:
         if self._best is not None:

@@ -87,8 +87,12 @@ class PairSource(SampleSource):
         if silent:
             template = N_("gauge {gauge}: nothing came in {timeout_s:g} s, check its device and cable")
             raise NoDataError(template, gauge=min(silent) + 1, timeout_s=self.timeout_s)
-        if self._decoder is None:
-            self._synchronise_polling()
+        sources = [channel.source for channel in self.channel_sources]
+        if self._decoder is None and all(source.is_polled for source in sources):
+            # Both are polled at the same times, so that their readings belong together.
+            rate_hz = min(source.rate_hz for source in sources)
+            for source in sources:
+                source.set_poll_rate(rate_hz)
         return received
 
     def read(self, link: Link) -> bytes:
@@ -100,14 +104,6 @@ class PairSource(SampleSource):
             template = N_("{protocol}: the rates of two devices are not known: start them")
             raise ProtocolError(template, protocol=self._identity.protocol)
         return PairDecoder(self.channel_sources, rates_hz)
-
-    def _synchronise_polling(self) -> None:
-        """Poll both devices at the same times, so that their readings belong together."""
-        sources = [channel.source for channel in self.channel_sources]
-        if all(source.is_polled for source in sources):
-            rate_hz = min(source.rate_hz for source in sources)
-            for source in sources:
-                source.set_poll_rate(rate_hz)
 
     @property
     def _rates_hz(self) -> tuple[float, float] | None:
@@ -132,10 +128,8 @@ def make_pair(
     cannot be.
     """
     recorded = recorded_settings or {}
-    own = {
-        key.removeprefix(_OWN_PREFIX): value for key, value in settings.items() if key.startswith(_OWN_PREFIX)
-    }
     common = {key: value for key, value in settings.items() if not key.startswith(_OWN_PREFIX)}
+    own = {key.removeprefix(_OWN_PREFIX): settings[key] for key in settings.keys() - common.keys()}
     rate_key = _OWN_RATE.removeprefix(_OWN_PREFIX)
     own_rate_hz = _parse_rate(own.pop(rate_key)) if rate_key in own else rate_hz
     channels = []
@@ -151,9 +145,8 @@ def _parse_rate(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise SettingsError(
-            "{key} {text!r} is no number: give samples a second", key=_OWN_RATE, text=text
-        ) from None
+        template = N_("{key} {text!r} is no number: give samples a second")
+        raise SettingsError(template, key=_OWN_RATE, text=text) from None
 
 
 def _distinct(words: Iterable[str]) -> str:
