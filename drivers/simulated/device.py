@@ -10,21 +10,10 @@ from typing import TypeAlias
 import numpy as np
 
 from drivers.errors import SettingsError
-from drivers.simulated.faults import (
-    Disturbance,
-    DisturbanceKind,
-    DisturbanceSchedule,
-    FaultRates,
-    FrameDamager,
-)
+from drivers.simulated import faults, stream_sender
+from drivers.simulated.faults import Disturbance, DisturbanceKind, FaultRates
 from drivers.simulated.protocol import Command, CommandKind, CommandParser, PolledProtocol, SimulatedProtocol
-from drivers.simulated.stream_sender import (
-    DeviceClock,
-    Signal,
-    StreamSender,
-    TransmissionLog,
-    WireOutput,
-)
+from drivers.simulated.stream_sender import Signal, StreamSender, TransmissionLog
 from drivers.simulated.transport import Transport
 from messages.i18n import N_
 
@@ -92,9 +81,9 @@ class SimulatedDevice:
         self._signal_at = signal_at
         self._setup = setup
         self._rate_hz = setup.rate_hz
-        self._schedule = DisturbanceSchedule(setup.disturbances)
-        damager = FrameDamager(setup.faults, protocol.line_end, setup.seed)
-        self._output = WireOutput(transport, protocol, damager, self._schedule)
+        self._schedule = faults.DisturbanceSchedule(setup.disturbances)
+        damager = faults.FrameDamager(setup.faults, protocol.line_end, setup.seed)
+        self._output = stream_sender.WireOutput(transport, protocol, damager, self._schedule)
         self._parser = CommandParser(protocol.find_commands)
         self._has_reader = False
         self._cable_fault: DisturbanceKind | None = None
@@ -130,10 +119,13 @@ class SimulatedDevice:
         """Do what is due at `now_ns` of the host's monotonic clock; returns seconds to wait at most."""
         self._follow_cable(now_ns)
         received = self._transport.receive()
-        if received is None:
-            self._lose_reader()
-        else:
+        if received is not None:
             self._receive(received, now_ns)
+        elif self._has_reader:
+            self._has_reader = False
+            if self._transport.resets_device:
+                self._stream = None
+            self._was_interrupted = self.is_streaming
         return self._stream.send_due(now_ns, self._has_reader) if self._stream else self._NO_STREAM_S
 
     def _time_s(self, now_ns: int) -> float:
@@ -156,14 +148,6 @@ class SimulatedDevice:
         if fault is None:
             self._transport.plug_in()
         self._cable_fault = fault
-
-    def _lose_reader(self) -> None:
-        if not self._has_reader:
-            return
-        self._has_reader = False
-        if self._transport.resets_device:
-            self._stream = None
-        self._was_interrupted = self.is_streaming
 
     def _receive(self, received: bytes, now_ns: int) -> None:
         if not self._has_reader:
@@ -211,17 +195,10 @@ class SimulatedDevice:
         self._stream = self._make_stream(signal, device_rate_hz, now_ns)
 
     def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> "_Stream":
-        clock = DeviceClock(device_rate_hz, self._setup.first_sequence, self._setup.first_time_s)
+        clock = stream_sender.DeviceClock(
+            device_rate_hz, self._setup.first_sequence, self._setup.first_time_s
+        )
         return StreamSender(self._output, signal, clock, self.log, now_ns)
-
-
-@dataclass(frozen=True, slots=True)
-class _PendingRequest:
-    """A request that is complete at `due_ns`."""
-
-    due_ns: int
-    command: Command
-    is_done: bool
 
 
 class PolledDevice(SimulatedDevice):
@@ -236,7 +213,8 @@ class PolledDevice(SimulatedDevice):
     ) -> None:
         super().__init__(transport, protocol, signal_at, setup)
         self._registers = protocol
-        self._requests: deque[_PendingRequest] = deque()
+        self._requests: deque[tuple[int, Command, bool]] = deque()
+        """When each is complete (ns), and whether the device could do it."""
         self._answers: deque[tuple[int, bytes]] = deque()
 
     def step(self, now_ns: int) -> float:
@@ -244,27 +222,27 @@ class PolledDevice(SimulatedDevice):
         if not self._has_reader:
             self._requests.clear()
             self._answers.clear()
-        while self._requests and self._requests[0].due_ns <= now_ns:
-            self._answer(self._requests.popleft())
+        while self._requests and self._requests[0][0] <= now_ns:
+            self._answer(*self._requests.popleft())
         while self._answers and self._answers[0][0] <= now_ns:
             self._transport.send(self._answers.popleft()[1])
-        due_ns = [request.due_ns for request in self._requests] + [due for due, _ in self._answers]
+        due_ns = [due for due, *_ in self._requests] + [due for due, _ in self._answers]
         return max(0.0, min([wait_s, *((due - now_ns) * 1e-9 for due in due_ns)]))
 
     def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
         on_wire_s = self._registers.request_bytes(command) * self._registers.byte_s
-        self._requests.append(_PendingRequest(now_ns + round(on_wire_s * 1e9), command, is_done))
+        self._requests.append((now_ns + round(on_wire_s * 1e9), command, is_done))
 
-    def _answer(self, request: _PendingRequest) -> None:
-        answer = self._protocol.respond(request.command, request.is_done, self._rate_hz)
+    def _answer(self, due_ns: int, command: Command, is_done: bool) -> None:
+        answer = self._protocol.respond(command, is_done, self._rate_hz)
         if not answer:
             return
-        sent, fault = self._output.distort(answer, self._time_s(request.due_ns))
+        sent, fault = self._output.distort(answer, self._time_s(due_ns))
         self.log.add(0, fault)
         self.log.bytes_sent += len(sent)
         if sent:
             takes_s = self._registers.turnaround_s + len(sent) * self._registers.byte_s
-            self._answers.append((request.due_ns + round(takes_s * 1e9), sent))
+            self._answers.append((due_ns + round(takes_s * 1e9), sent))
 
     def _make_stream(self, signal: Signal, _device_rate_hz: float, now_ns: int) -> "_Stream":
         return RegisterUpdater(self._registers, signal, self.log, now_ns)

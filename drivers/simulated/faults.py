@@ -83,7 +83,9 @@ class FrameDamager:
         if draw < rates.drop + rates.flip:
             return self._flip_bit(frame), FrameFault.FLIP
         if draw < rates.drop + rates.flip + rates.truncate:
-            return self._truncate(frame), FrameFault.TRUNCATE
+            self.is_line_open = bool(self._line_end)  # a line loses its end too
+            kept = self._random.randrange(1, len(frame) - len(self._line_end))
+            return frame[:kept], FrameFault.TRUNCATE
         return frame, FrameFault.MERGED if is_merged else None
 
     def garbage(self, frame: bytes) -> tuple[bytes, FrameFault]:
@@ -99,11 +101,6 @@ class FrameDamager:
         # In text, only bits that make another digit or letter: a change of case may mean the same.
         bit = self._random.choice((0, 1, 2, 3, 6)) if self._line_end else self._random.randrange(8)
         return frame[:at] + bytes([frame[at] ^ (1 << bit)]) + frame[at + 1 :]
-
-    def _truncate(self, frame: bytes) -> bytes:
-        """Keep a byte at least, so that the frame is damaged and not lost; a line loses its end too."""
-        self.is_line_open = bool(self._line_end)
-        return frame[: self._random.randrange(1, len(frame) - len(self._line_end))]
 
     def _choose_byte(self, frame: bytes) -> int:
         """Position of a byte; the end of a line counts as one byte, because one half still ends it."""

@@ -59,24 +59,19 @@ class TransmissionLog:
     damage: list[DamagedStretch] = field(default_factory=list)
 
     def add(self, samples: int, fault: FrameFault | None) -> None:
-        if fault is not None:
-            self._add_fault(samples, fault)
-        self.frames += 1
-        self.samples += samples
-
-    def _add_fault(self, samples: int, fault: FrameFault) -> None:
         if fault in LOSING_FAULTS:
             self.frames_lost += 1
             self.samples_lost += samples
-        else:
+        elif fault is not None:
             self.frames_damaged += 1
             self.samples_damaged += samples
-        last = self.damage[-1] if self.damage else None
-        continues = last and last.fault is fault and last.first_index + last.samples == self.samples
-        if last and continues and fault in LASTING_FAULTS:
+        last = self.damage[-1] if self.damage and fault in LASTING_FAULTS else None
+        if last and last.fault is fault and last.first_index + last.samples == self.samples:
             self.damage[-1] = replace(last, samples=last.samples + samples)
-        elif len(self.damage) < MAX_DAMAGE_LISTED:
+        elif fault is not None and len(self.damage) < MAX_DAMAGE_LISTED:
             self.damage.append(DamagedStretch(self.samples, samples, fault))
+        self.frames += 1
+        self.samples += samples
 
 
 class Signal(Protocol):
@@ -160,42 +155,24 @@ class StreamSender:
     def _send(self, frames: int, has_reader: bool) -> None:
         log, protocol, damager = self._log, self._output.protocol, self._output.damager
         counts, status = self._signal.take(frames * self._n)
-        encoded, taken_s = self._encode(frames, counts, status)
-        was_line_open = damager.is_line_open
-        sent = [self._output.distort(frame, at_s) for frame, at_s in zip(encoded, taken_s, strict=True)]
-        data = b"".join(part for part, _ in sent)
-        room = self._output.transport.send(data) if has_reader else 0
-        if room < len(data):
-            taken = data[:room]
-            line_end = protocol.line_end
-            damager.is_line_open = not taken.endswith(line_end) if taken else was_line_open and has_reader
-        log.bytes_sent += room
-        log.samples_clipped += int(np.count_nonzero(status))
-        is_flagged = [protocol.flags_overload and bool(row.any()) for row in status.reshape(frames, self._n)]
-        self._count(sent, is_flagged, room, FrameFault.CUT if has_reader else FrameFault.NO_READER)
-
-    def _encode(self, frames: int, counts: Int32s, status: UInt8s) -> tuple[list[bytes], list[float]]:
-        """Frames of the next samples, and the stand's time (s) of the first sample of each."""
-        log, clock = self._log, self._clock
         first = log.samples + self._n * np.arange(frames)
         taken_s = log.started_s + first / log.true_rate_hz
         offset_s = self._output.disturbances.clock_offset_s(taken_s)
-        device_s = clock.first_time_s + first / clock.rate_hz + offset_s
-        first_sequence = log.samples + clock.first_sequence
-        return self._output.protocol.encode(first_sequence, counts, status, device_s), taken_s.tolist()
-
-    def _count(
-        self,
-        sent: list[tuple[bytes, FrameFault | None]],
-        is_flagged: list[bool],
-        room: int,
-        beyond: FrameFault,
-    ) -> None:
-        """Count frames of which the port took `room` bytes; the fault of the others is `beyond`."""
-        end = 0
-        for (data, fault), flagged in zip(sent, is_flagged, strict=True):
-            end += len(data)
+        device_s = self._clock.first_time_s + first / self._clock.rate_hz + offset_s
+        encoded = protocol.encode(log.samples + self._clock.first_sequence, counts, status, device_s)
+        was_line_open = damager.is_line_open
+        sent = list(map(self._output.distort, encoded, taken_s.tolist()))
+        data = b"".join(part for part, _ in sent)
+        room = self._output.transport.send(data) if has_reader else 0
+        if room < len(data):
+            ended = data[:room].endswith(protocol.line_end)
+            damager.is_line_open = not ended if room else was_line_open and has_reader
+        log.bytes_sent += room
+        log.samples_clipped += int(np.count_nonzero(status))
+        end, beyond = 0, FrameFault.CUT if has_reader else FrameFault.NO_READER
+        for (part, fault), row in zip(sent, status.reshape(frames, self._n), strict=True):
+            end += len(part)
             happened = fault if end <= room or fault in LOSING_FAULTS else beyond
-            self._log.add(self._n, happened)
-            if flagged and happened is None:
-                self._log.samples_flagged += self._n
+            log.add(self._n, happened)
+            if protocol.flags_overload and happened is None and row.any():
+                log.samples_flagged += self._n

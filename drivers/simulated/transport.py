@@ -154,9 +154,8 @@ def open_tcp_port(number: int = 0) -> Transport:
         return _TcpPort(_listener(number))
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
-            raise PortUnavailableError(
-                "TCP port {number} is used by another program: give another one, or 0 for any", number=number
-            ) from None
+            template = N_("TCP port {number} is used by another program: give another one, or 0 for any")
+            raise PortUnavailableError(template, number=number) from None
         template = N_("TCP port {number} cannot be used ({fault}): give another one, or 0 for any")
         raise PortUnavailableError(template, number=number, fault=error.strerror) from None
 
@@ -250,9 +249,8 @@ def has_pseudo_terminals() -> bool:
 def open_pseudo_terminal() -> Transport:
     """Open a pseudo-terminal in raw mode. Raises PortUnavailableError where there are none."""
     if not has_pseudo_terminals():
-        raise PortUnavailableError(
-            "there are no pseudo-terminals on Windows: let the simulated stand use TCP, --tcp 0"
-        )
+        template = N_("there are no pseudo-terminals on Windows: let the simulated stand use TCP, --tcp 0")
+        raise PortUnavailableError(template)
     folder = Path(tempfile.mkdtemp(prefix="slipstand-stand-"))
     try:
         return _PseudoTerminal(_open_device_end(folder / "port"), folder / "port")
