@@ -1,10 +1,12 @@
 """The only reader and writer of settings files: where they are, what is wrong with them."""
 
+import contextlib
 import csv
 import datetime
 import itertools
 import os
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -13,17 +15,8 @@ from typing import Any, TypeVar
 import msgspec
 import platformdirs
 
-from config.schema import (
-    ConfigError,
-    Gauge,
-    GaugeCheck,
-    GaugeChecks,
-    Gauges,
-    PublishedRow,
-    Settings,
-    Stand,
-    WindowLayout,
-)
+from config import schema
+from config.schema import ConfigError, Gauge, GaugeCheck, GaugeChecks, Gauges, PublishedRow, Settings, Stand
 from messages.i18n import N_
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -86,12 +79,13 @@ def save_calibration(
     text = tomlkit.dumps(document)
     if path is None:
         return _write_dated(f"gauges-{day.isoformat()}", text)
-    try:
-        return _write_new(path, text)
-    except FileExistsError:
-        raise ConfigError(
-            "{path} exists already and is not overwritten. Choose another name", path=path
-        ) from None
+    with _writing(path):
+        try:
+            _write(path, text, "x")
+        except FileExistsError:
+            template = N_("{path} exists already and is not overwritten. Choose another name")
+            raise ConfigError(template, path=path) from None
+    return path
 
 
 def activate_calibration(path: Path, day: datetime.date) -> Path | None:
@@ -102,15 +96,11 @@ def activate_calibration(path: Path, day: datetime.date) -> Path | None:
     """
     load_gauges(path)
     target, kept = config_directory() / "gauges.toml", None
-    try:
+    with _writing(target):
         text = path.read_text(encoding="utf-8")
         if target.is_file():
             kept = _write_dated(f"gauges-until-{day.isoformat()}", target.read_text(encoding="utf-8"))
-        beside = target.with_suffix(".toml.new")
-        _write(beside, text, "w")
-        beside.replace(target)
-    except OSError as error:
-        raise _unwritable(target, error) from None
+        _replace(target, text)
     return kept
 
 
@@ -127,12 +117,10 @@ def append_check(check: GaugeCheck) -> Path:
     load_checks(path)  # nothing is added to a file that cannot be read
     entry = {name: value for name, value in msgspec.structs.asdict(check).items() if value not in ("", ())}
     entry = {name: list(value) if isinstance(value, tuple) else value for name, value in entry.items()}
-    try:
+    with _writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         before = "\n" if path.exists() else _CHECKS_TITLE
         _write(path, f"{before}[[check]]\n{tomlkit.dumps(entry)}", "a")
-    except OSError as error:
-        raise _unwritable(path, error) from None
     return path
 
 
@@ -160,17 +148,17 @@ def save_settings(settings: Settings, day: datetime.date) -> Path | None:
     return _save(settings_path(), msgspec.structs.asdict(settings), Settings, day)
 
 
-def load_window_layout() -> WindowLayout:
+def load_window_layout() -> schema.WindowLayout:
     """Read how the window was left; the defaults where it never was. Raises ConfigError."""
-    return _load_or_default(config_directory() / "window.toml", WindowLayout)
+    return _load_or_default(config_directory() / "window.toml", schema.WindowLayout)
 
 
-def save_window_layout(place: WindowLayout, day: datetime.date) -> Path | None:
+def save_window_layout(place: schema.WindowLayout, day: datetime.date) -> Path | None:
     """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
     values = msgspec.structs.asdict(place)
     for key in ("widths", "sorted_by"):
         values[key] = {name: list(row) for name, row in values[key].items()}
-    return _save(config_directory() / "window.toml", values, WindowLayout, day)
+    return _save(config_directory() / "window.toml", values, schema.WindowLayout, day)
 
 
 def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:
@@ -178,7 +166,7 @@ def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
     import tomlkit  # only needed to write
 
     aside, document = None, tomlkit.document()
-    try:
+    with _writing(path):
         if path.exists():
             try:
                 _load(path, kind)
@@ -188,25 +176,18 @@ def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
                 path.replace(aside)
         document.update(values)
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_suffix(".toml.new")
-        _write(beside, tomlkit.dumps(document), "w")
-        beside.replace(path)
-    except OSError as error:
-        raise _unwritable(path, error) from None
+        _replace(path, tomlkit.dumps(document))
     return aside
 
 
 def _write_dated(stem: str, text: str) -> Path:
-    folder = config_directory()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _unwritable(folder, error) from None
-    while True:
-        try:
-            return _write_new(_free_name(stem), text)
-        except FileExistsError:  # another process took it just now
-            continue
+    with _writing(config_directory()):
+        config_directory().mkdir(parents=True, exist_ok=True)
+        while True:
+            path = _free_name(stem)
+            with contextlib.suppress(FileExistsError):  # another process took it just now
+                _write(path, text, "x")
+                return path
 
 
 def _free_name(stem: str) -> Path:
@@ -215,15 +196,11 @@ def _free_name(stem: str) -> Path:
     return next(path for name in names if not (path := config_directory() / name).exists())
 
 
-def _write_new(path: Path, text: str) -> Path:
-    """Write a file that is not there yet. Raises FileExistsError, ConfigError."""
-    try:
-        _write(path, text, "x")
-    except FileExistsError:
-        raise
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    return path
+def _replace(path: Path, text: str) -> None:
+    """Write a file beside `path` and move it there, so that a failure leaves the old one."""
+    beside = path.with_suffix(".toml.new")
+    _write(beside, text, "w")
+    beside.replace(path)
 
 
 def _write(path: Path, text: str, mode: str) -> None:
@@ -233,9 +210,13 @@ def _write(path: Path, text: str, mode: str) -> None:
         os.fsync(file.fileno())
 
 
-def _unwritable(path: Path, error: OSError) -> ConfigError:
-    template = N_("{path}: cannot be written ({fault}). Check the folder, its rights and its disk")
-    return ConfigError(template, path=path, fault=error.strerror or error)
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        template = N_("{path}: cannot be written ({fault}). Check the folder, its rights and its disk")
+        raise ConfigError(template, path=path, fault=error.strerror or error) from None
 
 
 @cache
@@ -250,9 +231,8 @@ def load_published_rows(path: Path) -> list[PublishedRow]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             texts = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            "{path}: cannot be read ({fault}). Give a readable UTF-8 CSV file", path=path, fault=error
-        ) from None
+        template = N_("{path}: cannot be read ({fault}). Give a readable UTF-8 CSV file")
+        raise ConfigError(template, path=path, fault=error) from None
     if not texts:
         raise ConfigError("{path}: holds no rows. Give a header and a row a series, as in Table 1", path=path)
     rows = []
@@ -260,13 +240,9 @@ def load_published_rows(path: Path) -> list[PublishedRow]:
         try:
             rows.append(msgspec.convert(row, PublishedRow, strict=False))
         except msgspec.ValidationError as error:
-            raise ConfigError(
-                "{path}: line {line}: {fault}. The columns are those of Table 1: {columns}",
-                path=path,
-                line=line,
-                fault=_explain(str(error), row),
-                columns=list(PublishedRow.__struct_fields__),
-            ) from None
+            template = N_("{path}: line {line}: {fault}. The columns are those of Table 1: {columns}")
+            fault, columns = _explain(str(error), row), list(PublishedRow.__struct_fields__)
+            raise ConfigError(template, path=path, line=line, fault=fault, columns=columns) from None
     return rows
 
 
@@ -290,13 +266,11 @@ def _load(path: Path, kind: type[T]) -> T:
         template = N_("{path}: there is no such file. Give the path of a {kind} file")
         raise ConfigError(template, path=path, kind="stand" if kind is Stand else "calibration") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            "{path}: cannot be read ({fault}). Give a readable UTF-8 text file", path=path, fault=error
-        ) from None
+        template = N_("{path}: cannot be read ({fault}). Give a readable UTF-8 text file")
+        raise ConfigError(template, path=path, fault=error) from None
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(
-            "{path}: is not valid TOML ({fault}). Correct that line", path=path, fault=error
-        ) from None
+        template = N_("{path}: is not valid TOML ({fault}). Correct that line")
+        raise ConfigError(template, path=path, fault=error) from None
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:

@@ -25,6 +25,9 @@ _MAX_PIXELS = 100_000
 """More than any wall of screens has; larger numbers come from a damaged file."""
 
 
+_FINITE, _NOT_NEGATIVE, _POSITIVE = "", ", 0 or above", " above 0"
+
+
 class ConfigError(MessageError):
     """A settings file that cannot be used: names file, key, value and what is allowed."""
 
@@ -40,23 +43,18 @@ class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return a copy with `changes`, checked like a new one."""
         return msgspec.structs.replace(self, **changes)
 
-
-def _positive(**values: float) -> None:
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} = {value!r} must be a finite number above 0")
-
-
-def _not_negative(**values: float | None) -> None:
-    for name, value in values.items():
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise ValueError(f"{name} = {value!r} must be a finite number, 0 or above")
-
-
-def _finite(**values: float) -> None:
-    for name, value in values.items():
-        if not math.isfinite(value):
-            raise ValueError(f"{name} = {value!r} must be a finite number")
+    def _check(self, rule: str, *names: str) -> None:
+        """Check fields that hold a number, None, or numbers by key."""
+        for name in names:
+            held = getattr(self, name)
+            is_by_key = isinstance(held, dict)
+            numbers = {f"{name}.{key}": one for key, one in held.items()} if is_by_key else {name: held}
+            for key, value in numbers.items():
+                if value is None:
+                    continue
+                is_allowed = rule == _FINITE or value > 0 or (value == 0 and rule == _NOT_NEGATIVE)
+                if not (math.isfinite(value) and is_allowed):
+                    raise ValueError(f"{key} = {value!r} must be a finite number{rule}")
 
 
 class Contact(_Checked, frozen=True):
@@ -85,18 +83,9 @@ class Stand(_Checked, frozen=True):
     geometry: dict[str, float] = {}
 
     def __post_init__(self) -> None:
-        _positive(
-            table_mass_kg=self.table_mass_kg,
-            plate_mass_kg=self.plate_mass_kg,
-            gravity_m_per_s2=self.gravity_m_per_s2,
-            **{f"pullbacks_m.{key}": pullback_m for key, pullback_m in self.pullbacks_m.items()},
-        )
-        _not_negative(
-            table_mass_standard_uncertainty_kg=self.table_mass_standard_uncertainty_kg,
-            plate_mass_standard_uncertainty_kg=self.plate_mass_standard_uncertainty_kg,
-            gravity_standard_uncertainty_m_per_s2=self.gravity_standard_uncertainty_m_per_s2,
-            **{f"added_masses_kg.{key}": added_kg for key, added_kg in self.added_masses_kg.items()},
-        )
+        self._check(_POSITIVE, "table_mass_kg", "plate_mass_kg", "gravity_m_per_s2", "pullbacks_m")
+        self._check(_NOT_NEGATIVE, "table_mass_standard_uncertainty_kg", "plate_mass_standard_uncertainty_kg")
+        self._check(_NOT_NEGATIVE, "gravity_standard_uncertainty_m_per_s2", "added_masses_kg")
 
     @property
     def all_series(self) -> tuple[str, ...]:
@@ -168,23 +157,16 @@ class Gauge(_Checked, frozen=True):
     def __post_init__(self) -> None:
         if not math.isfinite(self.gain_m_per_count) or self.gain_m_per_count == 0.0:
             raise ValueError(f"gain_m_per_count = {self.gain_m_per_count!r} must be finite and not 0")
-        _finite(zero_count=self.zero_count, delay_s=self.delay_s)
-        _not_negative(
-            gain_relative_standard_uncertainty=self.gain_relative_standard_uncertainty,
-            zero_standard_uncertainty_m=self.zero_standard_uncertainty_m,
-            nonlinearity_m=self.nonlinearity_m,
-            delay_standard_uncertainty_s=self.delay_standard_uncertainty_s,
-            hysteresis_m=self.hysteresis_m,
-            repeatability_m=self.repeatability_m,
-        )
-        if self.range_m is not None:
-            _positive(range_m=self.range_m)
-        if len(self.polynomial) > _MAX_POLYNOMIAL_TERMS:
-            raise ValueError(
-                f"polynomial has {len(self.polynomial)} terms, {_MAX_POLYNOMIAL_TERMS} at most are used"
-            )
-        for term in self.polynomial:
-            _finite(polynomial=term)
+        self._check(_FINITE, "zero_count", "delay_s")
+        self._check(_NOT_NEGATIVE, "gain_relative_standard_uncertainty", "zero_standard_uncertainty_m")
+        self._check(_NOT_NEGATIVE, "nonlinearity_m", "delay_standard_uncertainty_s")
+        self._check(_NOT_NEGATIVE, "hysteresis_m", "repeatability_m")
+        self._check(_POSITIVE, "range_m")
+        terms = len(self.polynomial)
+        if terms > _MAX_POLYNOMIAL_TERMS:
+            raise ValueError(f"polynomial has {terms} terms, {_MAX_POLYNOMIAL_TERMS} at most are used")
+        if not all(map(math.isfinite, self.polynomial)):
+            raise ValueError(f"polynomial = {list(self.polynomial)} must be finite numbers")
 
     def displacement_m(self, counts: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Displacements (n,) that counts (n,) stand for (m)."""
@@ -251,10 +233,8 @@ class GaugeCheck(_Checked, frozen=True):
     def __post_init__(self) -> None:
         if self.at.tzinfo is None:
             raise ValueError(f"at = {self.at.isoformat()} has no time zone")
-        _finite(
-            expected_m=self.expected_m, measured_m=self.measured_m, gain_m_per_count=self.gain_m_per_count
-        )
-        _not_negative(tolerance_m=self.tolerance_m)
+        self._check(_FINITE, "expected_m", "measured_m", "gain_m_per_count")
+        self._check(_NOT_NEGATIVE, "tolerance_m")
 
     @property
     def deviation_m(self) -> float:
@@ -263,11 +243,8 @@ class GaugeCheck(_Checked, frozen=True):
 
     def is_of(self, gauge: Gauge) -> bool:
         """Whether this calibration of this gauge was checked; its zero does not matter."""
-        return (self.gain_m_per_count, self.polynomial, self.serial_number) == (
-            gauge.gain_m_per_count,
-            gauge.polynomial,
-            gauge.serial_number,
-        )
+        names = ("gain_m_per_count", "polynomial", "serial_number")
+        return all(getattr(self, name) == getattr(gauge, name) for name in names)
 
 
 class GaugeChecks(_Checked, frozen=True):
@@ -317,16 +294,13 @@ class WindowLayout(_Checked, frozen=True):
     """By the name of a table: number of the column, from 0, and whether descending."""
 
     def __post_init__(self) -> None:
-        pixels: dict[str, tuple[int, ...]] = {
-            name: (getattr(self, name),) for name in ("x", "y", "width", "height")
-        }
-        pixels |= {f"widths.{name}": widths for name, widths in self.widths.items()}
-        for name, values in pixels.items():
-            for value in values:
-                if abs(value) > _MAX_PIXELS:
-                    raise ValueError(
-                        f"{name} = {value} is beyond any screen: must be within ±{_MAX_PIXELS} pixels"
-                    )
+        pixels = [(name, getattr(self, name)) for name in ("x", "y", "width", "height")]
+        pixels += [(f"widths.{name}", width) for name, widths in self.widths.items() for width in widths]
+        for name, value in pixels:
+            if abs(value) > _MAX_PIXELS:
+                raise ValueError(
+                    f"{name} = {value} is beyond any screen: must be within ±{_MAX_PIXELS} pixels"
+                )
 
 
 class PublishedRow(_Checked, frozen=True):
