@@ -165,8 +165,9 @@ class Gauge(_Checked, frozen=True):
         terms = len(self.polynomial)
         if terms > _MAX_POLYNOMIAL_TERMS:
             raise ValueError(f"polynomial has {terms} terms, {_MAX_POLYNOMIAL_TERMS} at most are used")
-        if not all(map(math.isfinite, self.polynomial)):
-            raise ValueError(f"polynomial = {list(self.polynomial)} must be finite numbers")
+        for term in self.polynomial:
+            if not math.isfinite(term):
+                raise ValueError(f"polynomial = {term!r} must be a finite number")
 
     def displacement_m(self, counts: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Displacements (n,) that counts (n,) stand for (m)."""

@@ -90,11 +90,7 @@ class ClockFit:
         return len(self._earliest)
 
     def add(self, index: int, arrival_ns: int) -> None:
-        """Add the last sample of a block.
-
-        `index` counts from the first sample of the stream, gaps included; `arrival_ns` is the host's
-        monotonic time after the read that brought it.
-        """
+        """Add the last sample of a block: its index in the stream, gaps included, and when it came (ns)."""
         if self._start_ns is None:
             self._start_ns = arrival_ns
         nominal_s = index * self._period_s
@@ -110,12 +106,9 @@ class ClockFit:
         if len(self._earliest) < _MIN_WINDOWS:
             return None
         line = fit_robust_line(*np.array(list(self._earliest.values())).T)
-        return ClockEstimate(
-            rate_hz=1 / (self._period_s * (1 + line.slope)),
-            scale=1 + line.slope,
-            scale_standard_uncertainty=math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span),
-            span_s=line.span,
-        )
+        scale = 1 + line.slope
+        uncertainty = math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span)
+        return ClockEstimate(1 / (self._period_s * scale), scale, uncertainty, line.span)
 
     def _keep(self, nominal_s: float, late_s: float) -> None:
         window = int(nominal_s / self._window_s)
@@ -147,24 +140,19 @@ class RobustLine:
 def fit_robust_line(x: Floats, y: Floats) -> RobustLine:
     """Line by least squares through points (n,), n >= 3, repeated without outliers until none is left."""
     for _ in range(_MAX_REJECTIONS):
-        slope, uncertainty, residual = _fit_line(x, y)
+        dx = x - x.mean()
+        sxx = float(dx @ dx)
+        slope = float(dx @ y) / sxx
+        residual = y - y.mean() - slope * dx
         spread = float(np.median(np.abs(residual))) * _SIGMA_PER_MAD
         kept = np.abs(residual) <= max(_REJECT_SIGMAS * spread, _CLOCK_STEP_S)
         if kept.all():
             break
         x, y = x[kept], y[kept]
+    variance = float(residual @ residual) / (len(residual) - 2)
+    uncertainty = math.sqrt(variance / sxx * _variance_inflation(residual))
     scatter = math.sqrt(float(residual @ residual) / len(residual))
     return RobustLine(float(x.mean()), float(y.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
-
-
-def _fit_line(x: Floats, y: Floats) -> tuple[float, float, Floats]:
-    """Slope by least squares, its standard uncertainty, and the residuals."""
-    dx = x - x.mean()
-    sxx = float(dx @ dx)
-    slope = float(dx @ y) / sxx
-    residual = y - y.mean() - slope * dx
-    variance = float(residual @ residual) / (len(x) - 2)
-    return slope, math.sqrt(variance / sxx * _variance_inflation(residual)), residual
 
 
 def _variance_inflation(residual: Floats) -> float:
@@ -226,25 +214,22 @@ class TimeBase(msgspec.Struct, frozen=True):
     @classmethod
     def from_estimates(cls, clock: ClockEstimate | None, skew: Skew | None) -> "TimeBase":
         """Time base of a device whose clock was timed, or could not be (None)."""
-        if clock is None:
-            return cls(scale_standard_uncertainty=UNTIMED_CLOCK_UNCERTAINTY).with_skew(skew)
-        return cls(clock.scale, clock.scale_standard_uncertainty).with_skew(skew)
+        untimed = cls(scale_standard_uncertainty=UNTIMED_CLOCK_UNCERTAINTY)
+        timed = cls(clock.scale, clock.scale_standard_uncertainty) if clock else untimed
+        return timed.with_skew(skew)
 
     def with_skew(self, skew: Skew | None) -> "TimeBase":
-        if skew is None:
-            return TimeBase(self.scale, self.scale_standard_uncertainty)
-        return TimeBase(self.scale, self.scale_standard_uncertainty, skew.mean_s, skew.standard_uncertainty_s)
+        lags = (skew.mean_s, skew.standard_uncertainty_s) if skew else (None, None)
+        return TimeBase(self.scale, self.scale_standard_uncertainty, *lags)
 
     @property
     def skew_message(self) -> Message:
         """Sentence that is stored with the run; empty without a skew."""
         if self.skew_s is None:
             return EMPTY
-        return message(
-            _LATER if self.skew_s >= 0 else _EARLIER,
-            skew_ms=1e3 * abs(self.skew_s),
-            uncertainty_ms=1e3 * (self.skew_standard_uncertainty_s or 0.0),
-        )
+        uncertainty_ms = 1e3 * (self.skew_standard_uncertainty_s or 0.0)
+        template = _LATER if self.skew_s >= 0 else _EARLIER
+        return message(template, skew_ms=1e3 * abs(self.skew_s), uncertainty_ms=uncertainty_ms)
 
 
 class SkewStatistics:

@@ -41,13 +41,12 @@ def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
     """
     if not 0 <= port <= _MAX_PORT:
         raise ValueError(f"port {port} has no place in an envelope: give 0 to {_MAX_PORT}")
-    starts = range(0, max(len(data), 1), MAX_DATA_BYTES)
-    return b"".join(_envelope(port, arrival_ns, data[at : at + MAX_DATA_BYTES]) for at in starts)
-
-
-def _envelope(port: int, arrival_ns: int, data: bytes) -> bytes:
-    fields = _FIELDS.pack(MAGIC, port, len(data), arrival_ns, zlib.crc32(data))
-    return fields + _CHECK.pack(crc16(fields)) + data
+    wrapped = b""
+    for start in range(0, max(len(data), 1), MAX_DATA_BYTES):
+        part = data[start : start + MAX_DATA_BYTES]
+        fields = _FIELDS.pack(MAGIC, port, len(part), arrival_ns, zlib.crc32(part))
+        wrapped += fields + _CHECK.pack(crc16(fields)) + part
+    return wrapped
 
 
 class Unwrapper:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.port import PROCESSES, PortInfo, program_name
+from messages.i18n import N_
 from messages.message import Message, message
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
@@ -31,27 +32,25 @@ def port_hints(
     port: PortInfo, *, processes: Path = PROCESSES, usb_serial: Path = USB_SERIAL, udev_data: Path = UDEV_DATA
 ) -> Iterator[PortHint]:
     """Hindrances to reading `port`; the folders are those of Linux and need not exist."""
-    for hint in (
-        permission_hint(port.device),
-        modem_manager_hint(port, processes, udev_data),
-        latency_hint(port, usb_serial),
-    ):
-        if hint is not None:
-            yield hint
+    hints = (
+        _permission_hint(port.device),
+        _modem_manager_hint(port, processes, udev_data),
+        _latency_hint(port, usb_serial),
+    )
+    yield from filter(None, hints)
 
 
-def permission_hint(device: str) -> PortHint | None:
-    """Hint where this user may not open an existing port."""
+def _permission_hint(device: str) -> PortHint | None:
     if sys.platform == "win32" or "://" in device or not Path(device).exists():
         return None
     if os.access(device, os.R_OK | os.W_OK):
         return None
-    group = _group_of(Path(device))
-    what = message("{port} may not be opened by this user", port=device)
-    if group:
-        what = message("{port} may not be opened by this user (group {group} may)", port=device, group=group)
+    group, template = "", N_("{port} may not be opened by this user")
+    with contextlib.suppress(OSError, KeyError):
+        group = Path(device).group()
+        template = N_("{port} may not be opened by this user (group {group} may)")
     remedy = message("Run: sudo usermod -aG {group} $USER, then log in again", group=group or "dialout")
-    return PortHint(what, remedy, rule_helps=True)
+    return PortHint(message(template, port=device, group=group), remedy, rule_helps=True)
 
 
 def modem_manager_runs(processes: Path = PROCESSES) -> bool:
@@ -62,17 +61,13 @@ def modem_manager_runs(processes: Path = PROCESSES) -> bool:
     return False
 
 
-def modem_manager_hint(port: PortInfo, processes: Path, udev_data: Path) -> PortHint | None:
+def _modem_manager_hint(port: PortInfo, processes: Path, udev_data: Path) -> PortHint | None:
     """Hint where ModemManager may write to `port`: it takes ACM ports and adapters for modems."""
     if port.vendor_id is None or not modem_manager_runs(processes) or _is_ignored(port.device, udev_data):
         return None
-    return PortHint(
-        message(
-            "ModemManager runs and talks to {port} for some seconds after it is plugged in", port=port.device
-        ),
-        message("Run: sudo systemctl disable --now ModemManager, unless a modem is used here"),
-        rule_helps=True,
-    )
+    template = N_("ModemManager runs and talks to {port} for some seconds after it is plugged in")
+    remedy = message("Run: sudo systemctl disable --now ModemManager, unless a modem is used here")
+    return PortHint(message(template, port=port.device), remedy, rule_helps=True)
 
 
 def latency_ms(port: PortInfo, usb_serial: Path = USB_SERIAL) -> int | None:
@@ -84,25 +79,19 @@ def latency_ms(port: PortInfo, usb_serial: Path = USB_SERIAL) -> int | None:
     return None
 
 
-def latency_hint(port: PortInfo, usb_serial: Path) -> PortHint | None:
-    """Hint for an FTDI adapter that delays bytes by more than 1 ms."""
+def _latency_hint(port: PortInfo, usb_serial: Path) -> PortHint | None:
     delay_ms = latency_ms(port, usb_serial)
     if sys.platform == "win32" and port.vendor_id == FTDI:
-        return PortHint(
-            message("the FTDI adapter of {port} holds bytes back for 16 ms by default", port=port.device),
-            message("Device Manager, the port, Port Settings, Advanced: latency timer 1 ms"),
-        )
+        what = message("the FTDI adapter of {port} holds bytes back for 16 ms by default", port=port.device)
+        remedy = message("Device Manager, the port, Port Settings, Advanced: latency timer 1 ms")
+        return PortHint(what, remedy)
     if delay_ms is None or delay_ms <= MAX_LATENCY_MS:
         return None
-    return PortHint(
-        message(
-            "the FTDI adapter of {port} holds bytes back for {delay_ms} ms until a program asks for less",
-            port=port.device,
-            delay_ms=delay_ms,
-        ),
-        message("Slipstand asks for 1 ms while it reads, where the adapter's driver takes it"),
-        rule_helps=True,
+    template = N_(
+        "the FTDI adapter of {port} holds bytes back for {delay_ms} ms until a program asks for less"
     )
+    remedy = message("Slipstand asks for 1 ms while it reads, where the adapter's driver takes it")
+    return PortHint(message(template, port=port.device, delay_ms=delay_ms), remedy, rule_helps=True)
 
 
 def _is_ignored(device: str, udev_data: Path) -> bool:
@@ -114,14 +103,6 @@ def _is_ignored(device: str, udev_data: Path) -> bool:
         known = udev_data / f"c{os.major(number)}:{os.minor(number)}"
         return "E:ID_MM_PORT_IGNORE=1" in known.read_text("utf-8", "replace").splitlines()
     return False
-
-
-def _group_of(path: Path) -> str:
-    if sys.platform == "win32":
-        return ""
-    with contextlib.suppress(OSError, KeyError):
-        return path.group()
-    return ""
 
 
 FTDI = 0x0403

@@ -75,23 +75,13 @@ class HostMonitor:
         passed_s, suspended_s, wall_s = (
             (now - before) * 1e-9 for now, before in zip(self._times_ns, before_ns, strict=True)
         )
-        found = []
+        found, step_s = [], wall_s - passed_s
         if suspended_s > self._SUSPENDED_S:
-            found.append(
-                message(
-                    "this computer slept for {duration_s:.1f} s: switch its energy saving off to record",
-                    duration_s=suspended_s,
-                )
-            )
+            found.append(message(_SUSPENDED, duration_s=suspended_s))
         elif passed_s > self._STALLED_S:
-            found.append(
-                message(
-                    "this computer or Slipstand stood still for {duration_s:.1f} s: close other programs",
-                    duration_s=passed_s,
-                )
-            )
-        if abs(wall_s - passed_s) > self._CLOCK_STEP_S:
-            found.append(_clock_step(wall_s - passed_s))
+            found.append(message(_STALLED, duration_s=passed_s))
+        if abs(step_s) > self._CLOCK_STEP_S:
+            found.append(message(_SET_FORWARD if step_s > 0 else _SET_BACK, step_s=abs(step_s)))
         return found
 
     @staticmethod
@@ -99,14 +89,13 @@ class HostMonitor:
         return host_ns(), suspended_ns(), time.time_ns()
 
 
-def _clock_step(step_s: float) -> Message:
-    template = N_(
-        "the clock of this computer was set forward by {step_s:.1f} s:"
-        " times of day before and after do not fit together, those within a run do"
-    )
-    if step_s < 0:
-        template = N_(
-            "the clock of this computer was set back by {step_s:.1f} s:"
-            " times of day before and after do not fit together, those within a run do"
-        )
-    return message(template, step_s=abs(step_s))
+_SUSPENDED = N_("this computer slept for {duration_s:.1f} s: switch its energy saving off to record")
+_STALLED = N_("this computer or Slipstand stood still for {duration_s:.1f} s: close other programs")
+_SET_FORWARD = N_(
+    "the clock of this computer was set forward by {step_s:.1f} s:"
+    " times of day before and after do not fit together, those within a run do"
+)
+_SET_BACK = N_(
+    "the clock of this computer was set back by {step_s:.1f} s:"
+    " times of day before and after do not fit together, those within a run do"
+)

@@ -17,15 +17,10 @@ _RESERVED = (
 )
 
 
-def _find_drivers() -> dict[str, DeviceDriver]:
-    entries = iter_modules([str(Path(__file__).with_name("devices"))])
-    folders = (import_module(f"drivers.devices.{entry.name}") for entry in entries)
-    found = {driver.name: driver for driver in _RESERVED}
-    found |= {folder.DRIVER.name: folder.DRIVER for folder in folders}
-    return {driver.name: driver for driver in sorted(found.values(), key=lambda driver: driver.rank)}
-
-
-DRIVERS = _find_drivers()
+_FOLDERS = iter_modules([str(Path(__file__).with_name("devices"))])
+_BUILT = [import_module(f"drivers.devices.{folder.name}").DRIVER for folder in _FOLDERS]
+_BY_NAME = {driver.name: driver for driver in (*_RESERVED, *_BUILT)}
+DRIVERS: dict[str, DeviceDriver] = dict(sorted(_BY_NAME.items(), key=lambda item: item[1].rank))
 """By name, in the order of lists; reserved names included."""
 
 AVAILABLE = tuple(driver for driver in DRIVERS.values() if driver.available)
@@ -35,10 +30,10 @@ AVAILABLE = tuple(driver for driver in DRIVERS.values() if driver.available)
 def find_driver(name: str) -> DeviceDriver:
     """Driver of that name. Raises SettingsError for one that is unknown or only reserved."""
     driver = DRIVERS.get(name)
+    if driver is not None and driver.available:
+        return driver
     usable = [one.name for one in AVAILABLE]
-    if driver is None:
-        raise SettingsError("protocol {name!r} is not known: use one of {usable}", name=name, usable=usable)
-    if not driver.available:
+    template = N_("protocol {name!r} is not known: use one of {usable}")
+    if driver is not None:
         template = N_("protocol {name!r} ({title}) comes later: use one of {usable}")
-        raise SettingsError(template, name=name, title=driver.title, usable=usable)
-    return driver
+    raise SettingsError(template, name=name, title=driver.title if driver else "", usable=usable)

@@ -81,9 +81,8 @@ class SampleSource(ABC):
     def rate_hz(self) -> float:
         """Nominal samples a second. Raises ProtocolError before it is known."""
         if self._rate_hz is None:
-            raise ProtocolError(
-                "{protocol}: the rate is not known before the first samples", protocol=self._identity.protocol
-            )
+            template = N_("{protocol}: the rate is not known before the first samples")
+            raise ProtocolError(template, protocol=self._identity.protocol)
         return self._rate_hz
 
     @property
@@ -231,13 +230,11 @@ def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) 
     """Device settings, given as text, as the driver's typed struct. Raises SettingsError."""
     allowed = [field.name for field in msgspec.structs.fields(kind)]
     unknown = next((key for key in given if key not in allowed), None)
-    if unknown is not None and allowed:
-        template = N_("setting {key!r} is not known to {protocol}: allowed are {allowed}")
-        raise SettingsError(template, key=unknown, protocol=protocol, allowed=allowed)
     if unknown is not None:
-        raise SettingsError(
-            "setting {key!r} is not known to {protocol}: it has none", key=unknown, protocol=protocol
-        )
+        template = N_("setting {key!r} is not known to {protocol}: it has none")
+        if allowed:
+            template = N_("setting {key!r} is not known to {protocol}: allowed are {allowed}")
+        raise SettingsError(template, key=unknown, protocol=protocol, allowed=allowed)
     try:
         return msgspec.convert(given, kind, strict=False)
     except msgspec.ValidationError as error:
@@ -253,9 +250,8 @@ def check_gauge_channels(table: int, relative: int, allowed: range) -> None:
             template = N_("{name} {channel} is no channel: give {first} to {last}")
             raise SettingsError(template, name=name, channel=channel, first=allowed[0], last=allowed[-1])
     if table == relative:
-        raise SettingsError(
-            "table and relative are both channel {channel}: give each gauge its own", channel=table
-        )
+        template = N_("table and relative are both channel {channel}: give each gauge its own")
+        raise SettingsError(template, channel=table)
 
 
 _SAFE_BYTES = 2048
