@@ -15,14 +15,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_MAX_POLYNOMIAL_TERMS = 2
-"""Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
-_NEWTON_STEPS = 8
-"""Enough for bends of a tenth of the range."""
+_MAX_POLYNOMIAL_TERMS = 2  # terms of a gauge's polynomial beyond the line: of degree 3 at most
+_NEWTON_STEPS = 8  # enough for bends of a tenth of the range
 SCALE_MIN, SCALE_MAX = 1.0, 2.0
 """How much larger than the system's scaling the window may be."""
-_MAX_PIXELS = 100_000
-"""More than any wall of screens has; larger numbers come from a damaged file."""
+_MAX_PIXELS = 100_000  # more than any wall of screens has; larger numbers come from a damaged file
 
 
 _FINITE, _NOT_NEGATIVE, _POSITIVE = "", ", 0 or above", " above 0"

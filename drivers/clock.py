@@ -171,8 +171,7 @@ def _variance_inflation(residual: Floats) -> float:
 
 _SKEW_WINDOW_S = 0.25
 """Lags that change within it average out over a period of the stand; slower changes do not."""
-_MAX_SKEW_WINDOWS = 4 * 3600 * 4
-"""Four hours, the longest run."""
+_MAX_SKEW_WINDOWS = 4 * 3600 * 4  # four hours, the longest run
 
 
 @dataclass(frozen=True, slots=True)

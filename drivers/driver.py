@@ -23,10 +23,8 @@ GAUGES = ("table", "relative")
 class SingleGauge(Enum):
     """Where a device with one gauge puts its readings."""
 
-    FIRST_COLUMN = "first-column"
-    """In column 0 of a block, whichever gauge it is."""
-    OWN_COLUMN = "own-column"
-    """In the column of its gauge."""
+    FIRST_COLUMN = "first-column"  # in column 0 of a block, whichever gauge it is
+    OWN_COLUMN = "own-column"  # in the column of its gauge
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,8 +61,7 @@ class HostMonitor:
     _SUSPENDED_S = 0.5
     _STALLED_S = 3.0
     """Longer than a busy computer stops any process, shorter than a stall that loses bytes unseen."""
-    _CLOCK_STEP_S = 0.5
-    """More than a time server slews in 0.1 s."""
+    _CLOCK_STEP_S = 0.5  # more than a time server slews in 0.1 s
 
     def __init__(self) -> None:
         self._times_ns = self._read_clocks()

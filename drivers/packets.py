@@ -63,13 +63,10 @@ class PacketDecoder(Decoder):
     `row_time_s`; `rate_hz` the nominal rate, > 0; `max_gap_s` the longest gap that rows stand for.
     """
 
-    _piece_bytes = 1 << 16
-    """Long data are decoded in pieces that fit a processor's cache."""
-    _has_time = True
-    """Whether the device sends its time."""
+    _piece_bytes = 1 << 16  # long data are decoded in pieces that fit a processor's cache
+    _has_time = True  # whether the device sends its time
 
-    _loss_estimator: "LossEstimator | None" = None
-    """For a device whose stream proves no loss."""
+    _loss_estimator: "LossEstimator | None" = None  # for a device whose stream proves no loss
 
     def __init__(self, state: Records, rate_hz: float, max_gap_s: float) -> None:
         self._state = state
@@ -218,8 +215,7 @@ _JITTER_S = 0.1
 """A count that lags behind the host's clock by less proves no loss: reads are late by up to so much."""
 _RECOVERED_FACTOR = 1.5
 """Nor does a lag below so many times the longest one that was made up before: this computer is that busy."""
-_CLOCK_ERROR = 5e-4
-"""Nor does one that a wrong clock of the device, or a rate that it rounded, explains."""
+_CLOCK_ERROR = 5e-4  # nor does one that a wrong clock of the device, or a rate that it rounded, explains
 
 
 class LossEstimator:

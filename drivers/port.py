@@ -25,8 +25,7 @@ PARITIES = ("N", "E", "O")
 PROCESSES = Path("/proc")
 _READ_TIMEOUT_S = 0.05
 """How long a read waits for its first byte: threads that read are stopped within this time."""
-_WRITE_TIMEOUT_S = 2.0
-"""Commands are a few bytes: a device that takes none for so long hangs."""
+_WRITE_TIMEOUT_S = 2.0  # commands are a few bytes: a device that takes none for so long hangs
 _MAX_READ_BYTES = 1 << 16
 _TERMINAL_BYTES = 1024
 """A terminal that returns so many bytes at once may hold more."""
@@ -398,5 +397,4 @@ _UNREACHABLE = {
         "{port} is not known in this network: check how the address is written"
     ),
     "": N_("{port} does not answer: check address, port number, network and power of the device"),
-}
-"""By what pyserial and the systems write."""
+}  # by what pyserial and the systems write

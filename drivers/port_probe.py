@@ -26,8 +26,7 @@ FIRST_WAIT_S = 3.5
 _WINDOW_S = 0.8
 _SLOW_WINDOW_S = 1.2
 """How long is listened at one setting: to a stream, and to a device of few bytes."""
-_TEXT_WINDOW_S = 6.0
-"""Slow loggers and scales send a line or two a second, after a banner."""
+_TEXT_WINDOW_S = 6.0  # slow loggers and scales send a line or two a second, after a banner
 _ENOUGH_BYTES = 600
 _SURE_SHARE = 0.9
 """Share of good bytes at which no other line settings are tried."""
@@ -48,8 +47,7 @@ class ProbeOutcome(StrEnum):
     """How probing a port ended."""
 
     RECOGNISED = "recognised"
-    UNREADABLE = "unreadable"
-    """Bytes come that no device folder knows."""
+    UNREADABLE = "unreadable"  # bytes come that no device folder knows
     SILENT = "silent"
     IN_USE = "held"
     UNAVAILABLE = "unavailable"

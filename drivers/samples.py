@@ -11,14 +11,11 @@ class SampleStatus(IntFlag):
     """Flags of one sample, as stored in the run file (INTERFACE: `status`)."""
 
     GOOD = 0
-    MISSING = 1
-    """Never arrived; the row replaces it."""
-    DAMAGED = 2
-    """Arrived with a wrong checksum or cut short; the row replaces it."""
+    MISSING = 1  # never arrived; the row replaces it
+    DAMAGED = 2  # arrived with a wrong checksum or cut short; the row replaces it
     OVERLOAD_TABLE = 4
     OVERLOAD_RELATIVE = 8
-    TABLE_MISSING = 16
-    """Two devices: only the reading of gauge 1 is missing or damaged."""
+    TABLE_MISSING = 16  # two devices: only the reading of gauge 1 is missing or damaged
     RELATIVE_MISSING = 32
 
 

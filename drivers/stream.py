@@ -31,10 +31,8 @@ from half a second of times of 1 ms is good to 0.4 %."""
 _MAX_PENDING_BYTES = 1 << 20
 _STALL_S = 0.5
 """A read waits for 50 ms: where more time has passed, this computer stood still."""
-_MIN_WAIT_S = 0.1
-"""Bytes that wait in the port are looked at, even if the deadline has passed."""
-_DRAIN_S = 0.3
-"""Stopped devices still send what is in their buffers."""
+_MIN_WAIT_S = 0.1  # bytes that wait in the port are looked at, even if the deadline has passed
+_DRAIN_S = 0.3  # stopped devices still send what is in their buffers
 
 
 class SampleSource(ABC):
@@ -256,17 +254,14 @@ def check_gauge_channels(table: int, relative: int, allowed: range) -> None:
 
 _SAFE_BYTES = 2048
 """Bytes that may collect before they are read: the smallest buffers of systems and adapters hold 4 kB."""
-_BUSY_BYTES = 512
-"""The same on a busy computer, where a sleep ends late."""
+_BUSY_BYTES = 512  # the same on a busy computer, where a sleep ends late
 _BUSY_DELAY_S = 0.002
 _LATE_S = 0.005
 """A sleep that lasts so much longer than asked shows a busy computer. Quiet ones wake up within 1 ms."""
 _BUSY_S = 5.0
 """How long a computer counts as busy after a late sleep; a balance of processor time against lost bytes."""
-_FULL_READ_BYTES = 4000
-"""After a read of so many bytes, more may wait that had no room."""
-_INITIAL_BYTES_PER_S = 1e6
-"""Assumed before anything is measured; high, so that the first delays are short."""
+_FULL_READ_BYTES = 4000  # after a read of so many bytes, more may wait that had no room
+_INITIAL_BYTES_PER_S = 1e6  # assumed before anything is measured; high, so that the first delays are short
 _MAX_BATCH_BYTES = 1 << 20
 _WAITED_S = 2e-4
 """A read that takes so long has waited for its bytes, so the time after it is that of their arrival."""

@@ -18,10 +18,8 @@ _log = logging.getLogger(__name__)
 
 RECONNECT_TIMEOUT_S = 10.0
 """How long one device is looked for while the other goes on; after it both count as lost."""
-_SILENT_S = 3.0
-"""A device that sends nothing for so long is reconnected."""
-_STALL_S = 2.0
-"""A read of a polled device takes up to a second: after more, this computer stood still."""
+_SILENT_S = 3.0  # a device that sends nothing for so long is reconnected
+_STALL_S = 2.0  # a read of a polled device takes up to a second: after more, this computer stood still
 _SILENT_SAMPLES = 5.0
 _RETRY_S = 0.2
 _WAIT_S = 0.05

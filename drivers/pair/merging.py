@@ -19,8 +19,7 @@ _FIRST_MAX_WAIT_NS = 2_000_000_000
 _KEPT_NS = 10_000_000_000
 MAX_WAITING = 4 * MAX_BLOCK_ROWS
 """Readings of a gauge that may wait. No device sends more in seconds; garbage can claim gaps of so many."""
-_REACH = 1.5
-"""A row takes a reading that is no further than so many periods of its device."""
+_REACH = 1.5  # a row takes a reading that is no further than so many periods of its device
 _OVERLOAD = int(SampleStatus.OVERLOAD_TABLE)
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)

@@ -13,14 +13,12 @@ from drivers.stream import SampleSource
 from messages.i18n import N_
 from messages.message import Message, joined
 
-_OWN_PREFIX = "relative."
-"""Prefix of settings of gauge 2's device alone."""
+_OWN_PREFIX = "relative."  # prefix of settings of gauge 2's device alone
 _OWN_RATE = "relative.rate"
 _RATE_KEY = "{}.rate_hz"
 _STALL_S = 0.5
 """A read waits for 50 ms: after more, this computer stood still."""
-_BATCH_DELAY_S = 0.004
-"""How long bytes collect in each port: rows wait for the other device anyway."""
+_BATCH_DELAY_S = 0.004  # how long bytes collect in each port: rows wait for the other device anyway
 
 
 class PairSource(SampleSource):

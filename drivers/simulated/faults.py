@@ -17,18 +17,12 @@ from messages.i18n import N_
 class FrameFault(StrEnum):
     """What happened to a frame."""
 
-    DROP = "drop"
-    """A byte is missing, or the end of a line."""
-    FLIP = "flip"
-    """A bit is wrong, or the end of a line is another character."""
-    TRUNCATE = "truncate"
-    """Its end is missing."""
-    MERGED = "merged"
-    """The line before lost its end and runs into this one."""
-    GARBAGE = "rubbish"
-    """Random bytes were sent instead."""
-    CUT = "cut"
-    """The port did not take all of it."""
+    DROP = "drop"  # a byte is missing, or the end of a line
+    FLIP = "flip"  # a bit is wrong, or the end of a line is another character
+    TRUNCATE = "truncate"  # its end is missing
+    MERGED = "merged"  # the line before lost its end and runs into this one
+    GARBAGE = "rubbish"  # random bytes were sent instead
+    CUT = "cut"  # the port did not take all of it
     NO_READER = "unheard"
     STALL = "stall"
 
@@ -113,16 +107,11 @@ class FrameDamager:
 class DisturbanceKind(StrEnum):
     """What happens to a device at some time."""
 
-    STALL = "stall"
-    """The device sends nothing; its clock and converter go on."""
-    GARBAGE = "rubbish"
-    """It sends random bytes, as many as its frames would have."""
-    UNPLUG = "unplug"
-    """Its port vanishes and comes back; the device has its own power and goes on."""
-    POWER = "power"
-    """Its port vanishes and comes back, and the device was without power meanwhile."""
-    JUMP = "jump"
-    """The device's time leaps by so many seconds, forward or back."""
+    STALL = "stall"  # the device sends nothing; its clock and converter go on
+    GARBAGE = "rubbish"  # it sends random bytes, as many as its frames would have
+    UNPLUG = "unplug"  # its port vanishes and comes back; the device has its own power and goes on
+    POWER = "power"  # its port vanishes and comes back, and the device was without power meanwhile
+    JUMP = "jump"  # the device's time leaps by so many seconds, forward or back
 
 
 @dataclass(frozen=True, slots=True)

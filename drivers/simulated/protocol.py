@@ -18,8 +18,7 @@ class CommandKind(Enum):
     STOP = auto()
     IDENTIFY = auto()
     RATE = auto()
-    OTHER = auto()
-    """Known to the protocol alone, which answers by itself."""
+    OTHER = auto()  # known to the protocol alone, which answers by itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +31,7 @@ class Command:
     parameters: bytes = b""
 
 
-_MAX_UNFINISHED_BYTES = 256
-"""No command of any device is longer."""
+_MAX_UNFINISHED_BYTES = 256  # no command of any device is longer
 
 
 class CommandParser:

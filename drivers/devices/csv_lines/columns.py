@@ -15,19 +15,13 @@ class Column(StrEnum):
     TIME_S = "time_s"
     TABLE = "table"
     RELATIVE = "relative"
-    VALUE = "value"
-    """The reading of a device with one gauge."""
+    VALUE = "value"  # the reading of a device with one gauge
     SEQUENCE = "sequence"
-    XOR = "xor"
-    """Two hex digits: exclusive or of all characters before its separator."""
-    CRC = "crc"
-    """Four hex digits: CRC-16/CCITT-FALSE of all characters before its separator."""
-    UNIT = "unit"
-    """A word, such as kg."""
-    EMPTY = "empty"
-    """Nothing, as after a separator at the end of a line."""
-    IGNORE = "ignore"
-    """A number that is not used."""
+    XOR = "xor"  # two hex digits: exclusive or of all characters before its separator
+    CRC = "crc"  # four hex digits: CRC-16/CCITT-FALSE of all characters before its separator
+    UNIT = "unit"  # a word, such as kg
+    EMPTY = "empty"  # nothing, as after a separator at the end of a line
+    IGNORE = "ignore"  # a number that is not used
 
 
 TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}

@@ -31,15 +31,12 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _CHECKSUM = re.compile(r"[0-9a-fA-F]{2}([0-9a-fA-F]{2})?")
 _LEAST_VALUES = 5
 """Different values that distinguish a counter from a reading that happens to rise."""
-_STEADY = 0.5
-"""Share of the mean step by which steps may differ."""
-_KILOHERTZ_FACTOR = 1.2
-"""How far a rate may be from 1 kHz for a time in milliseconds that grows by one."""
+_STEADY = 0.5  # share of the mean step by which steps may differ
+_KILOHERTZ_FACTOR = 1.2  # how far a rate may be from 1 kHz for a time in milliseconds that grows by one
 _ROUNDING = 1e-6
 _USUAL_US = 200
 """Without a rate, larger steps are taken for microseconds and smaller ones for milliseconds."""
-_TIME_FACTOR = 3.0
-"""Largest ratio between the rate by a time column and the rate of the lines."""
+_TIME_FACTOR = 3.0  # largest ratio between the rate by a time column and the rate of the lines
 
 _Rows: TypeAlias = list[list[str]]
 

@@ -24,8 +24,7 @@ _STALE_SHARE = 0.5
 _WIRE_S = 0.001
 """A response in less than this share of the shortest time is that of an earlier request, where the shortest
 time is that of a wire: request and response of 8 bytes at 115200 baud take longer than 1 ms."""
-_SMOOTHING = 0.05
-"""Weight of a new response in the mean phase; twenty polls follow a change of the device."""
+_SMOOTHING = 0.05  # weight of a new response in the mean phase; twenty polls follow a change of the device
 _WINDOW_NS = 2_000_000_000
 _BUSY_SHARE = 0.1
 """Share of late wake-ups within 2 s at which this computer counts as busy."""

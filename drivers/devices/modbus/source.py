@@ -25,8 +25,7 @@ from messages.message import Message, joined, message, option
 MAX_RATE_HZ = 1000.0
 QUASI_STATIC_HZ = 500.0
 """Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
-_TRIALS = 24
-"""Trial polls before the stream; the slowest two in ten of them set the rate."""
+_TRIALS = 24  # trial polls before the stream; the slowest two in ten of them set the rate
 _TOO_BUSY = N_(
     "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
     " out: close other programs, or ask for a lower rate"
@@ -77,8 +76,7 @@ class ModbusSource(SampleSource):
         self._timing: ResponseTiming | None = None
         self._response_overdue = False
         """The last request got no response: it may still come."""
-        self._was_invalid = False
-        """What came last was no response."""
+        self._was_invalid = False  # what came last was no response
         self._warnings: deque[Message] = deque()
         self._was_busy = False
 

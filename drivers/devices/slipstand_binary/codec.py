@@ -48,8 +48,7 @@ class FrameFlags(IntFlag):
 
     OVERLOAD_TABLE = 0x01
     OVERLOAD_RELATIVE = 0x02
-    DROPPED_BEFORE = 0x80
-    """The device lost samples before this frame."""
+    DROPPED_BEFORE = 0x80  # the device lost samples before this frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,8 @@ from messages.message import Message, message
 
 _TRIES = 4
 """A board that is reset by opening its port (an Arduino) answers nothing for the first second or two."""
-_LISTEN_S = 0.5
-"""How long a device is listened to that may still be sending; ten frames at 20 Hz."""
-_RATE_S = 0.8
-"""How long its rate is measured, which needs 0.5 s of frames."""
+_LISTEN_S = 0.5  # how long a device is listened to that may still be sending; ten frames at 20 Hz
+_RATE_S = 0.8  # how long its rate is measured, which needs 0.5 s of frames
 
 
 class BinarySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
