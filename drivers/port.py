@@ -242,14 +242,12 @@ class Port:
         _log.info("closed %s", self.url)
 
     def _rest(self) -> bytes:
-        parts: list[bytes] = []
-        size = 0
+        rest = b""
         # An error after the first bytes is raised by the next call; the bytes must not be lost.
         with contextlib.suppress(*PLATFORM_ERRORS):
-            while size < _MAX_READ_BYTES and (waiting := self._wire.in_waiting):
-                parts.append(bytes(self._wire.read(min(waiting, _MAX_READ_BYTES))))
-                size += len(parts[-1])
-        return b"".join(parts)
+            while len(rest) < _MAX_READ_BYTES and (waiting := self._wire.in_waiting):
+                rest += self._wire.read(min(waiting, _MAX_READ_BYTES))
+        return rest
 
     def _socket_rest(self) -> bytes:
         # `in_waiting` of a socket is only 0 or 1. With a timeout of 0, pyserial receives once.

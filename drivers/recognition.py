@@ -139,8 +139,14 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
             protocol=found.protocol,
         )
     if is_text(received):
-        settings = found.settings if found is not None and found.protocol == protocol else {}
-        return _remedy_for_text(received, settings, sends_text=not driver.frames_title)
+        line = _second_line(received)
+        if driver.frames_title:
+            return message("these are lines of text such as {line!r}, choose protocol csv", line=line)
+        if found is not None and found.protocol == protocol and found.settings:
+            given = " ".join(f"--set {key}={value}" for key, value in found.settings.items())
+            return message("these are lines such as {line!r}, try {settings}", line=line, settings=given)
+        template = N_("these are lines such as {line!r}, set columns, separator and decimal to match")
+        return message(template, line=line)
     if has_parity_errors(received):
         return message(
             "this looks like text read with a wrong parity: try --parity N, E or O as the device is set"
@@ -152,16 +158,6 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
             baud=baud,
         )
     return message("check the baud rate and the protocol, or the parity; `slipstand device probe` tries them")
-
-
-def _remedy_for_text(received: bytes, settings: dict[str, str], *, sends_text: bool) -> Message:
-    line = _second_line(received)
-    if not sends_text:
-        return message("these are lines of text such as {line!r}, choose protocol csv", line=line)
-    if settings:
-        given = " ".join(f"--set {key}={value}" for key, value in settings.items())
-        return message("these are lines such as {line!r}, try {settings}", line=line, settings=given)
-    return message("these are lines such as {line!r}, set columns, separator and decimal to match", line=line)
 
 
 def _second_line(received: bytes) -> str:

@@ -293,8 +293,10 @@ class BatchedReader:
         except DeviceLostError:
             if not parts:
                 raise
-        self._update_byte_rate(sum(map(len, parts)))
-        return b"".join(parts)
+        began_s, self._ended_s = self._ended_s, time.monotonic()
+        data = b"".join(parts)
+        self._bytes_per_s = max(len(data), 1) / max(self._ended_s - began_s, _WAITED_S)
+        return data
 
     def _fetch(self, link: Link, batch_delay_s: float, parts: list[bytes]) -> None:
         due_s = time.monotonic() + batch_delay_s
@@ -314,7 +316,6 @@ class BatchedReader:
             self._waited_s = time.monotonic()
 
     def _longest_delay_s(self) -> float:
-        """How long bytes may collect before the port must be read."""
         if time.monotonic() < self._busy_until_s:
             return max(_BUSY_BYTES / self._bytes_per_s, _BUSY_DELAY_S)
         return _SAFE_BYTES / self._bytes_per_s
@@ -334,10 +335,6 @@ class BatchedReader:
         if has_waited:
             self._waited_s = time.monotonic()
         return has_waited
-
-    def _update_byte_rate(self, size: int) -> None:
-        began_s, self._ended_s = self._ended_s, time.monotonic()
-        self._bytes_per_s = max(size, 1) / max(self._ended_s - began_s, _WAITED_S)
 
 
 def read_for(read: Callable[[], bytes], duration_s: float) -> bytes:
@@ -404,7 +401,11 @@ class PortReader:
     def _run(self) -> None:
         end = ReaderEnd(ReaderEndReason.STOPPED)
         try:
-            self._read_until_stopped()
+            while not self._stopping.is_set():
+                data = self._read()
+                arrival_ns = host_ns()
+                if data:
+                    self._sink(arrival_ns, data)
         except DeviceLostError as error:
             end = ReaderEnd(ReaderEndReason.DEVICE_LOST, error.message)
         except QueueFullError as error:
@@ -415,10 +416,3 @@ class PortReader:
             end = ReaderEnd(ReaderEndReason.FAILED, what)
         _log.info("reader ended: %s %s", end.reason, end.message)
         self._on_end(end)
-
-    def _read_until_stopped(self) -> None:
-        while not self._stopping.is_set():
-            data = self._read()
-            arrival_ns = host_ns()
-            if data:
-                self._sink(arrival_ns, data)

@@ -31,7 +31,8 @@ _TIME = 6
 _HEAD = 5
 _ACTIVE = 0x01
 _MODE_AND_MUTE = 0x13
-_LOAD_CELL_EVENTS = 0x01
+LOAD_CELL_EVENTS = 0x01
+"""Bit of `EVENTS`: samples are sent."""
 
 
 class Register(IntEnum):
@@ -99,11 +100,6 @@ START, STOP = encode_write(Register.ACQUISITION, 1), encode_write(Register.ACQUI
 def with_active_mode(operation: int) -> int:
     """Value of `OPERATION` at which events are sent and requests answered."""
     return operation & ~_MODE_AND_MUTE | _ACTIVE
-
-
-def with_load_cells(events: int) -> int:
-    """Value of `EVENTS` at which samples are sent; other events are left as they are."""
-    return events | _LOAD_CELL_EVENTS
 
 
 def find_messages(data: bytes) -> tuple[list[HarpMessage], int]:

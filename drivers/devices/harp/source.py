@@ -51,7 +51,7 @@ class HarpSource(SampleSource):
         self.prepare()
         self._identify(link)
         self._write(link, Register.OPERATION, codec.with_active_mode)
-        self._write(link, Register.EVENTS, codec.with_load_cells)
+        self._write(link, Register.EVENTS, lambda events: events | codec.LOAD_CELL_EVENTS)
         link.write(codec.START)
         received, good = self.await_data(link, self.timeout_s, codec.rate_from_events)
         reply = codec.find_reply(received, Register.ACQUISITION)

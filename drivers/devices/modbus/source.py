@@ -148,7 +148,11 @@ class ModbusSource(SampleSource):
             if transaction.data:
                 wrapped += wrap_response(number, transaction.measured_ns, transaction.data, is_late=is_late)
             response = request.parse_response(transaction.data)
-            self._resynchronise(link, transaction.data, response, is_stale)
+            # One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
+            was_invalid, self._was_invalid = self._was_invalid, response.is_invalid
+            if transaction.data and (is_stale or (was_invalid and response.is_invalid)):
+                drain(link)
+            self._response_overdue = not transaction.data
             if not response.fault and not is_stale:
                 timing.update(number, transaction, schedule)
             if is_late or response.fault:
@@ -166,16 +170,6 @@ class ModbusSource(SampleSource):
     def _decoder_at(self, rate_hz: float) -> ResponseDecoder:
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
         return ResponseDecoder(self._poll, columns, rate_hz)
-
-    def _resynchronise(self, link: Link, data: bytes, response: Response, is_stale: bool) -> None:
-        """Make sure that the next bytes belong to the next request.
-
-        One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
-        """
-        was_invalid, self._was_invalid = self._was_invalid, response.is_invalid
-        if data and (is_stale or (was_invalid and response.is_invalid)):
-            drain(link)
-        self._response_overdue = not data
 
     def _await_responses(self, link: Link) -> None:
         """Send all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""

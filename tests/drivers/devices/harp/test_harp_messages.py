@@ -18,7 +18,6 @@ from drivers.devices.harp.codec import (
     find_messages,
     find_reply,
     with_active_mode,
-    with_load_cells,
 )
 
 
@@ -62,4 +61,3 @@ def test_a_wrong_checksum_makes_it_rubbish():
 def test_bits_of_registers():
     assert with_active_mode(0xE0) == 0xE1
     assert with_active_mode(0xF3) == 0xE1
-    assert with_load_cells(0x0E) == 0x0F
