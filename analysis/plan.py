@@ -16,7 +16,7 @@ from analysis.arrays import Floats
 from analysis.catalogue import MILLIMETRE
 from analysis.fitting.problem import FitProblem
 from analysis.fitting.search import Fit, build_problem_from_channels, fit_at_minimum
-from analysis.laws.catalogue import PARAMETER_COUNT, compared_law, default_point
+from analysis.laws.catalogue import compared_law, default_point
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
 from analysis.motion.two_mass import Motion, TwoMassParameters
@@ -200,9 +200,7 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
     for place, name in FRICTION_PARAMETERS.items():
         if place in test.law.free_parameters and fit.determines(place):
-            weights = np.zeros(PARAMETER_COUNT)
-            weights[place] = 1.0
-            budget.add(name, fit.value(place), "1", fitted.contributions(weights))
+            budget.add(name, fit.value(place), fitted.parameter_contributions(place))
     return budget
 
 

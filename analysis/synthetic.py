@@ -1,7 +1,7 @@
 """Records of known truth: the exact motion, as a stand with gauges, noise and converters would record it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -50,17 +50,9 @@ class Truth:
     seed: int = 0
 
     def parameters(self) -> TwoMassParameters:
-        return TwoMassParameters.from_free_decay(
-            period_s=self.period_s,
-            damping_n1_per_s=self.damping_n1_per_s,
-            table_mass_kg=self.table_mass_kg,
-            plate_mass_kg=self.plate_mass_kg,
-            friction_dynamic=self.friction_dynamic,
-            friction_static=self.friction_static,
-            tilt_rad=self.tilt_rad,
-            pullback_m=self.pullback_m,
-            gravity_m_per_s2=self.gravity_m_per_s2,
-        )
+        names = {field.name for field in fields(TwoMassParameters)} & {field.name for field in fields(self)}
+        values = {name: getattr(self, name) for name in (*names, "period_s", "damping_n1_per_s")}
+        return TwoMassParameters.from_free_decay(**values)
 
     def replace(self, **changes: Any) -> Self:
         return replace(self, **changes)
@@ -73,16 +65,15 @@ def simulate_readings(
     rng = np.random.default_rng(truth.seed)
     time_s, since_s = _times(truth)
     if displacements is None:
-        displacements = (
-            truth.parameters().simulate(truth.duration_s + abs(truth.lag_s) + 1e-6).sample_displacements
-        )
+        motion = truth.parameters().simulate(truth.duration_s + abs(truth.lag_s) + 1e-6)
+        displacements = motion.sample_displacements
     table, _ = displacements(since_s)
     _, relative = displacements(since_s - truth.lag_s)
-    gauges = [
-        _gauge(truth, _pulled(truth, since_s, table), 0, rng),
-        _gauge(truth, relative + truth.drift_m_per_s * time_s, 1, rng),
-    ]
-    return time_s, gauges[0], gauges[1]
+    if truth.pull_s:  # a rest and a slow pull before the hold
+        pulled = np.clip((since_s + truth.hold_s + truth.pull_s) / truth.pull_s, 0.0, 1.0)
+        table = np.where(since_s < 0.0, table * 0.5 * (1.0 - np.cos(np.pi * pulled)), table)
+    first = _gauge(truth, table, 0, rng)
+    return time_s, first, _gauge(truth, relative + truth.drift_m_per_s * time_s, 1, rng)
 
 
 def simulate_record(truth: Truth, displacements: Displacements | None = None, **known: Any) -> Record:
@@ -90,10 +81,9 @@ def simulate_record(truth: Truth, displacements: Displacements | None = None, **
 
     It knows the nominal table mass and the true plate mass unless `known` says otherwise.
     """
-    time_s, table, relative = simulate_readings(truth, displacements)
     masses = StandMasses(TABLE_MASS_KG, truth.plate_mass_kg)
-    made = Record(time_s, table, relative, masses, pullback_m=truth.pullback_m)
-    return made.replace(**known)
+    record = Record(*simulate_readings(truth, displacements), masses, pullback_m=truth.pullback_m)
+    return record.replace(**known)
 
 
 def _times(truth: Truth) -> tuple[Floats, Floats]:
@@ -104,14 +94,6 @@ def _times(truth: Truth) -> tuple[Floats, Floats]:
     since_s = time_s * (1.0 + truth.clock_error) - before_s - truth.release_phase / truth.rate_hz
     within = since_s <= truth.duration_s
     return time_s[within], since_s[within]
-
-
-def _pulled(truth: Truth, since_s: Floats, table: Floats) -> Floats:
-    """Table displacement with the rest and the slow pull before the hold."""
-    if not truth.pull_s:
-        return table
-    pulled = np.clip((since_s + truth.hold_s + truth.pull_s) / truth.pull_s, 0.0, 1.0)
-    return np.where(since_s < 0.0, table * 0.5 * (1.0 - np.cos(np.pi * pulled)), table)
 
 
 def _gauge(truth: Truth, value: Floats, which: int, rng: np.random.Generator) -> Floats:

@@ -1,12 +1,13 @@
 """Standard uncertainties by the law of propagation (JCGM 100, 5.1.2), with contributions by source."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
 from analysis.arrays import Floats, Indices
+from analysis.catalogue import CATALOGUE
 from analysis.fitting.problem import FitProblem, covariance
 from analysis.fitting.search import Fit
 from analysis.laws.catalogue import PARAMETER_COUNT
@@ -23,6 +24,7 @@ _SOURCES = {
     Parameter.RELATIVE_GAIN: BudgetSource.GAUGE_2_GAIN,
     Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
+_UNITS = {row.name: row.unit for row in CATALOGUE}
 LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
 """Of a plane set with a hydraulic level: within 2 mrad, rectangular (JCGM 100, 4.3.7)."""
 _SHARE_MIN = 1e-3
@@ -53,16 +55,17 @@ class ParameterUncertainty:
         shares.update({source: abs(float(column @ weights)) for source, column in self.shifts.items()})
         return shares
 
+    def parameter_contributions(self, place: int) -> dict[Source, float]:
+        """Standard uncertainty of one parameter by source."""
+        return self.contributions(np.eye(PARAMETER_COUNT)[place])
+
 
 def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
     """Distribution of the fitted parameters: noise as the residuals show it, and every stated source."""
     residuals = (fit.table_residual_m, fit.relative_residual_m)
     shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
-    return _propagate(
-        problem,
-        fit,
-        [noise_variance_factor(residual / stated, times, block_s) for residual, stated, times in shown],
-    )
+    factors = [noise_variance_factor(residual / stated, times, block_s) for residual, stated, times in shown]
+    return _propagate(problem, fit, factors)
 
 
 def propagate_expected(problem: FitProblem, fit: Fit) -> ParameterUncertainty:
@@ -74,10 +77,8 @@ def white_noise_variance(problem: FitProblem, fit: Fit, place: int) -> float:
     """Variance of one fitted parameter by white noise of the stated size alone."""
     inverse, _ = covariance(fit.normal_matrix)
     known = problem.prior_deviation[fit.free]
-    informed = (known > 0.0) & np.isfinite(known)
-    from_readings = fit.normal_matrix - np.diag(
-        np.where(informed, 1.0 / np.where(informed, known, 1.0) ** 2, 0.0)
-    )
+    informed = np.where(known > 0.0, known, np.inf)
+    from_readings = fit.normal_matrix - np.diag(1.0 / informed**2)
     row = inverse[np.flatnonzero(fit.free == place)[0]]
     return float(row @ from_readings @ row)
 
@@ -175,20 +176,20 @@ class UncertaintyBudget:
         self,
         name: str,
         value: float,
-        unit: str,
         contributions: dict[Source, float],
+        *,
+        unit: str = "",
         half_widths: tuple[float, float] | None = None,
     ) -> None:
         """Add a quantity with its standard uncertainty from each source; zero contributions are left out.
 
-        `half_widths` of the 95 % interval, below and above the value, replace 1.96 standard uncertainties.
+        `unit` is that of the catalogue where none is given. `half_widths` of the 95 % interval, below and
+        above the value, replace 1.96 standard uncertainties.
         """
-        quantity = Quantity.normal(
-            value, float(np.sqrt(sum(share**2 for share in contributions.values()))), unit
-        )
+        deviation = float(np.sqrt(sum(share**2 for share in contributions.values())))
+        quantity = Quantity.normal(value, deviation, unit or _UNITS[name])
         if half_widths is not None:
-            ends = value - half_widths[0], value + half_widths[1]
-            quantity = Quantity(value, quantity.standard_uncertainty, ends, unit)
+            quantity = replace(quantity, interval_95=(value - half_widths[0], value + half_widths[1]))
         self.results[name] = quantity
         self.lines += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
 

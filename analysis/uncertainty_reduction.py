@@ -17,6 +17,7 @@ from analysis.formatting import format_number
 from analysis.plan import PlannedTest, expected_budget, range_use
 from analysis.quantities import BudgetSource
 from analysis.record import GaugeUncertainty
+from messages.i18n import N_
 from messages.message import Message, message
 
 RATE_MAX_HZ = 100_000.0
@@ -97,39 +98,39 @@ def reduction_options(test: PlannedTest) -> list[ReductionOption]:
 
 
 def _by_rate(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
-    factor = now.readings_to_halve
+    factor, value, left = now.readings_to_halve, None, now.stated
     if factor is None:
         text = message("No rate halves it: {floor}", floor=_floor(now))
-        return ReductionOption(Measure.RATE, None, now.stated, text)
-    rate_hz = test.rate_hz * factor
-    if rate_hz > RATE_MAX_HZ:
+    elif (rate_hz := test.rate_hz * factor) > RATE_MAX_HZ:
+        left = now.with_readings(RATE_MAX_HZ / test.rate_hz)
         text = message(
             "It would take {rate} samples a second, more than converters give.",
             rate=format_number(rate_hz, 2),
         )
-        return ReductionOption(Measure.RATE, None, now.with_readings(RATE_MAX_HZ / test.rate_hz), text)
-    text = message(
-        "{rate_hz:.0f} samples a second instead of {planned} halve it, if each is as noisy as now and their"
-        " noise is white.",
-        rate_hz=rate_hz,
-        planned=format_number(test.rate_hz),
-    )
-    return ReductionOption(Measure.RATE, rate_hz, 0.5 * now.total, text)
+    else:
+        value, left = rate_hz, 0.5 * now.total
+        text = message(
+            "{rate_hz:.0f} samples a second instead of {planned} halve it, if each is as noisy as now and"
+            " their noise is white.",
+            rate_hz=rate_hz,
+            planned=format_number(test.rate_hz),
+        )
+    return ReductionOption(Measure.RATE, value, left, text)
 
 
 def _by_repeats(now: UncertaintyParts) -> ReductionOption:
-    factor = now.readings_to_halve
+    factor, value = now.readings_to_halve, None
     if factor is None:
         text = message("No number of repeats halves it: {floor}", floor=_floor(now))
         return ReductionOption(Measure.REPEATS, None, now.stated, text)
     count = math.ceil(factor)
     if count > _REPEATS_MAX:
         text = message("It would take {count} tests: too many.", count=count)
-        return ReductionOption(Measure.REPEATS, None, now.with_readings(count), text)
-    text = message(
-        "The mean of {count} tests halves it, if the contact itself scatters less than that.", count=count
-    )
-    return ReductionOption(Measure.REPEATS, float(count), now.with_readings(count), text)
+    else:
+        value = float(count)
+        template = N_("The mean of {count} tests halves it, if the contact itself scatters less than that.")
+        text = message(template, count=count)
+    return ReductionOption(Measure.REPEATS, value, now.with_readings(count), text)
 
 
 def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
@@ -143,47 +144,43 @@ def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
         if parts is not None and parts.total < best:
             best, best_m = parts.total, longer.parameters.pullback_m
         if best <= 0.5 * now.total:
-            text = message(
-                "A pullback of {pullback_mm:.1f} mm halves it.", pullback_mm=MILLIMETRE.scale * abs(best_m)
-            )
-            return ReductionOption(Measure.PULLBACK, best_m, best, text)
-    if best_m == planned_m:
-        text = message("No longer pullback within the gauges' ranges makes it smaller.")
-    else:
+            break
+    pullback_mm = MILLIMETRE.scale * abs(best_m)
+    if best <= 0.5 * now.total:
+        text = message("A pullback of {pullback_mm:.1f} mm halves it.", pullback_mm=pullback_mm)
+        return ReductionOption(Measure.PULLBACK, best_m, best, text)
+    text = message("No longer pullback within the gauges' ranges makes it smaller.")
+    if best_m != planned_m:
         text = message(
             "No longer pullback within the gauges' ranges halves it; {pullback_mm:.1f} mm gives {best}.",
-            pullback_mm=MILLIMETRE.scale * abs(best_m),
+            pullback_mm=pullback_mm,
             best=format_number(best, 2),
         )
     return ReductionOption(Measure.PULLBACK, None, best, text)
 
 
 def _by_calibration(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
+    gauges = (test.table_gauge, test.relative_gauge)
+
     def total(share: float) -> float:
-        parts = uncertainty_parts(
-            test.replace(
-                table_gauge=_improved(test.table_gauge, share),
-                relative_gauge=_improved(test.relative_gauge, share),
-            )
-        )
+        table, relative = (_improved(gauge, share) for gauge in gauges)
+        parts = uncertainty_parts(test.replace(table_gauge=table, relative_gauge=relative))
         return math.inf if parts is None else parts.total
 
-    gains = [gauge.gain_relative for gauge in (test.table_gauge, test.relative_gauge)]
-    if gains == [None, None]:
+    stated = [gauge.gain_relative for gauge in gauges if gauge.gain_relative is not None]
+    if not stated:
         text = message("What the calibration adds is not known: state the uncertainty of its gains.")
         return ReductionOption(Measure.CALIBRATION, None, now.total, text)
     least = total(0.0)
     if least > 0.5 * now.total:
-        text = message(
-            "No calibration alone halves it: with perfect gauges {least} would be left.",
-            least=format_number(least, 2),
-        )
+        template = N_("No calibration alone halves it: with perfect gauges {least} would be left.")
+        text = message(template, least=format_number(least, 2))
         return ReductionOption(Measure.CALIBRATION, None, least, text)
     share = _largest(lambda tried: total(tried) <= 0.5 * now.total)
     text = message(
         "Gauges calibrated {factor:.1f} times as well halve it: gains known to {gain} %.",
         factor=1.0 / share,
-        gain=format_number(100.0 * share * max(gain or 0.0 for gain in gains), 2),
+        gain=format_number(100.0 * share * max(stated), 2),
     )
     return ReductionOption(Measure.CALIBRATION, share, total(share), text)
 

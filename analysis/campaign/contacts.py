@@ -1,7 +1,7 @@
 """Static and dynamic friction and their ratio by contact, with uncertainties (the paper's Fig. 2)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,37 +106,26 @@ class ContactRatio:
 def friction_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[ContactRatio, ...]:
     """Ratios by contact, in the order of the table; `rows` are those of `series`."""
     contacts = dict.fromkeys(each.key.contact for each in series)
-    return tuple(
-        _of_contact(
-            contact,
-            [each for each in series if each.key.contact == contact],
-            [row for row in rows if row.series.contact == contact],
-        )
-        for contact in contacts
-    )
+    return tuple(_of_contact(contact, series, rows) for contact in contacts)
 
 
 def _of_contact(contact: str, series: Sequence[Series], rows: Sequence[SeriesRow]) -> ContactRatio:
-    runs = [[run_ratio(run, _STATIC, _DYNAMIC) for run in each.runs] for each in series]
+    own = [each for each in series if each.key.contact == contact]
+    runs = [[run_ratio(run, _STATIC, _DYNAMIC) for run in each.runs] for each in own]
     found = [[one for one in some if one is not None] for some in runs]
     pooled = pool([some for some in found if some], proportional=True) if any(found) else []
-    bounds = _bounds([row for row in rows if _STATIC not in row.quantities])
-    if not pooled:
-        return ContactRatio(contact, None, 0, None, bounds)
     values = [one.quantity.value for one in pooled]
     between = float(np.std(values, ddof=1)) if len(values) > 1 else None
+    bounded = [row for row in rows if row.series.contact == contact and _STATIC not in row.quantities]
+    bounds = (
+        min(_ratios(bounded, STATIC_LOWER), default=None),
+        max(_ratios(bounded, STATIC_UPPER), default=None),
+    )
     return ContactRatio(contact, mean_over_series(pooled), len(pooled), between, bounds)
 
 
-def _bounds(rows: Sequence[SeriesRow]) -> tuple[float | None, float | None]:
-    """Smallest lower and largest upper bound of f_s over f_d."""
-    ends = [[_over(row, name) for row in rows] for name in (STATIC_LOWER, STATIC_UPPER)]
-    lows, highs = ([end for end in some if end is not None] for some in ends)
-    return min(lows, default=None), max(highs, default=None)
-
-
-def _over(row: SeriesRow, name: str) -> float | None:
-    bound, friction = row.quantities.get(name), row.quantities.get(_DYNAMIC)
-    if bound is None or friction is None or friction.quantity.value <= 0.0:
-        return None
-    return bound.quantity.value / friction.quantity.value
+def _ratios(rows: Sequence[SeriesRow], name: str) -> Iterator[float]:
+    """A bound of f_s over f_d, of each row that has both."""
+    for quantities in (row.quantities for row in rows):
+        if name in quantities and _DYNAMIC in quantities and quantities[_DYNAMIC].quantity.value > 0.0:
+            yield quantities[name].quantity.value / quantities[_DYNAMIC].quantity.value

@@ -1,6 +1,7 @@
 """Pooling of repeats: weighted means, with errors that repeats share and the scatter between runs."""
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -92,6 +93,11 @@ def is_fully_stated(run: RunResult, name: str) -> bool:
 
 
 def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedError, float], float]:
+    shared_by = {
+        SharedBy.CALIBRATION: run.calibration_id,
+        SharedBy.STAND: run.stand_id,
+        SharedBy.SERIES: run.series.label,
+    }
     common: dict[SharedError, float] = {}
     own = 0.0
     for line in lines:
@@ -100,16 +106,9 @@ def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedE
         if line.source.shared_by is SharedBy.NONE:
             own = math.hypot(own, line.standard_uncertainty)
         else:
-            key = SharedError(line.source, _shared_by(run, line.source))
+            key = SharedError(line.source, shared_by[line.source.shared_by])
             common[key] = math.hypot(common.get(key, 0.0), line.standard_uncertainty)
     return common, own
-
-
-def _shared_by(run: RunResult, source: Source) -> str:
-    """Identity of the calibration, the stand, or the series whose plane was levelled once."""
-    if source.shared_by is SharedBy.CALIBRATION:
-        return run.calibration_id
-    return run.series.label if source.shared_by is SharedBy.SERIES else run.stand_id
 
 
 def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, float]) -> float:
@@ -160,11 +159,11 @@ def pool(
         of_kind.setdefault(kind, []).append(place)
     repeats = [_repeats([series[place] for place in places], proportional) for places in of_kind.values()]
     pooled: dict[int, PooledQuantity] = {}
-    for places, of_it, some in zip(of_kind.values(), repeats, estimate_scatter(repeats), strict=True):
-        far = find_outliers(of_it)
-        for number, (place, scatter) in enumerate(zip(places, some, strict=True)):
-            mine = of_it.series == number
-            pooled[place] = _pooled(series[place], of_it.select(mine), scatter, far[mine])
+    for places, values, scatters in zip(of_kind.values(), repeats, estimate_scatter(repeats), strict=True):
+        far = find_outliers(values)
+        for number, (place, scatter) in enumerate(zip(places, scatters, strict=True)):
+            own = values.series == number
+            pooled[place] = _pooled(series[place], values.select(own), scatter, far[own])
     return [pooled[place] for place in range(len(series))]
 
 
@@ -186,8 +185,11 @@ def _pooled(
     weights = repeats.weights(scatter.between)
     shares = weights / weights.sum()
     value, stated = float(shares @ repeats.values), 1.0 / math.sqrt(repeats.weights(0.0).sum())
-    seen = math.sqrt(scatter.factor / weights.sum())
-    own, common = max(stated, seen), _common(readings, shares.tolist())
+    seen, common = math.sqrt(scatter.factor / weights.sum()), defaultdict[SharedError, float](float)
+    for one, share in zip(readings, shares.tolist(), strict=True):
+        for key, deviation in one.common.items():
+            common[key] += share * deviation
+    own = max(stated, seen)
     shared = math.hypot(*common.values())
     below, above = _half_widths(readings, stated, seen, shared, scatter)
     degrees = len(readings) - 1
@@ -195,7 +197,7 @@ def _pooled(
         Quantity(value, math.hypot(own, shared), (value - below, value + above), readings[0].unit),
         len(readings),
         own,
-        common,
+        dict(common),
         _between_runs(repeats, scatter) if scatter.degrees_of_freedom else None,
         float(np.std(repeats.values, ddof=1)) if degrees else None,
         math.sqrt(float(repeats.chi_squares(0.0)[0]) / degrees) if degrees else None,
@@ -209,14 +211,6 @@ def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:
     noise = 1.0 / float(np.mean(repeats.weights(0.0)))
     run = noise + (scatter.between * float(repeats.scales[0])) ** 2
     return math.sqrt(max(0.0, scatter.factor * run - noise))
-
-
-def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[SharedError, float]:
-    common: dict[SharedError, float] = {}
-    for one, share in zip(readings, shares, strict=True):
-        for key, deviation in one.common.items():
-            common[key] = common.get(key, 0.0) + share * deviation
-    return common
 
 
 def _half_widths(

@@ -99,19 +99,17 @@ def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter
     variances: Smyth, Statistical Applications in Genetics and Molecular Biology 3 (2004) 3, section 6). The
     degrees of freedom are those of the series plus those lent by its kind.
     """
-    betweens = [repeats.between_run_deviation() for repeats in kinds]
-    degrees = [np.bincount(repeats.series).astype(np.float64) - 1.0 for repeats in kinds]
-    squares = [
-        np.asarray(repeats.chi_squares(between) / np.maximum(counts, 1.0), dtype=np.float64)
-        for repeats, between, counts in zip(kinds, betweens, degrees, strict=True)
-    ]
-    logs = [_logs(some, counts) for some, counts in zip(squares, degrees, strict=True)]
-    means = [float(some.mean()) if len(some) else 0.0 for some in logs]
+    betweens, degrees, squares, logs = [], [], [], []
+    for repeats in kinds:
+        betweens.append(repeats.between_run_deviation())
+        degrees.append(np.bincount(repeats.series).astype(np.float64) - 1.0)
+        squares.append(np.asarray(repeats.chi_squares(betweens[-1]) / np.maximum(degrees[-1], 1.0)))
+        logs.append(_logs(squares[-1], degrees[-1]))
     lent = _lent(logs, [counts[counts > 0.0] for counts in degrees])
     known = sum(max(0, len(some) - 1) for some in logs)
     return [
-        _moderated(between, some, counts, mean, lent, known)
-        for between, some, counts, mean in zip(betweens, squares, degrees, means, strict=True)
+        _moderated(between, some, counts, float(log.mean()) if len(log) else 0.0, lent, known)
+        for between, some, counts, log in zip(betweens, squares, degrees, logs, strict=True)
     ]
 
 
@@ -207,15 +205,18 @@ def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], pla
     scatter = estimate_scatter([rest])[0][number]
     if scatter.degrees_of_freedom == 0.0:
         return 1.0
-    weights = repeats.weights(scatter.between)
-    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
-    stated = float(
-        repeats.variances[place] * weights[place]
-    )  # the runs scatter by their own variances at least
-    spread = max(scatter.factor, stated)
-    deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
-    distance = abs(float(repeats.values[place]) - mean) / deviation
+    # The runs scatter by their own variances at least.
+    stated = float(repeats.variances[place] * repeats.weights(scatter.between)[place])
+    distance = _distance(repeats, place, mates, scatter.between) / math.sqrt(max(scatter.factor, stated))
     return 2.0 * float(stdtr(scatter.degrees_of_freedom, -distance))
+
+
+def _distance(repeats: RepeatedValues, place: int, mates: NDArray[np.bool_], between: float) -> float:
+    """Distance of a value from the mean of its `mates` (n,) in standard deviations."""
+    weights = repeats.weights(between)
+    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
+    deviation = math.sqrt(1.0 / weights[place] + 1.0 / float(weights[mates].sum()))
+    return abs(float(repeats.values[place]) - mean) / deviation
 
 
 def _distances(repeats: RepeatedValues) -> Floats:
@@ -235,10 +236,6 @@ def _is_outlier(repeats: RepeatedValues, place: int, count: int) -> bool:
     degrees = rest.degrees_of_freedom
     if degrees == 0:
         return False
-    between = rest.between_run_deviation()
     mates = others & (repeats.series == repeats.series[place])
-    weights = repeats.weights(between)
-    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
-    deviation = math.sqrt(1.0 / weights[place] + 1.0 / float(weights[mates].sum()))
-    distance = abs(float(repeats.values[place]) - mean) / deviation
+    distance = _distance(repeats, place, mates, rest.between_run_deviation())
     return 2.0 * float(stdtr(degrees, -distance)) < _CHANCE / count

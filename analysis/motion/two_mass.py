@@ -52,6 +52,15 @@ class MotionSamples:
         return type(self)(**columns)
 
 
+PEAK_RATES = (
+    "table_velocity_max_m_per_s",
+    "plate_velocity_max_m_per_s",
+    "table_acceleration_max_m_per_s2",
+    "plate_acceleration_max_m_per_s2",
+)
+"""Fields of a `Motion`, and results, in the order in which `peak_rates` of a solver gives them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Motion(ABC):
     """One simulated test from release to `duration_s`."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -148,7 +149,7 @@ def _identification(
     budget: UncertaintyBudget,
     warnings: list[ResultWarning],
 ) -> Identification:
-    significant = _is_significant(solution)
+    significant, parameters = _is_significant(solution), solution.fit.parameters
     _clip_coulomb(budget, significant)
     warnings += _classical_figures(channels.table, solution, budget, significant)
     return Identification(
@@ -159,7 +160,14 @@ def _identification(
         budget.lines,
         _events(channels, solution.fit, significant),
         warnings,
-        _named(channels, solution.fit),
+        {
+            "turning_s": channels.to_record_time(parameters.turning_s),
+            "turning_displacement_m": parameters.turning,
+            "period_s": parameters.period_s,
+            "damping_n_per_s": parameters.damping_n_per_s,
+            _COULOMB: parameters.coulomb,
+            "offset": parameters.offset,
+        },
         _curves(channels, solution.fit, record.table_gauge.delay_s),
     )
 
@@ -175,13 +183,13 @@ def _uncertainty_budget(
     columns = _sources(found, record)
     columns[BudgetSource.MASS] = np.array([0.0] * 6 + [deviation])
     budget = UncertaintyBudget()
-    for name, its_unit, function in _QUANTITIES + (() if mass is None else _WITH_MASS):
+    for name, function in (_QUANTITIES if mass is None else _QUANTITIES | _WITH_MASS).items():
         weights = numerical_gradient(function, point)
         shares: dict[Source, float] = {
             BudgetSource.NOISE: math.sqrt(max(0.0, float(weights @ noise @ weights)))
         }
         shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
-        budget.add(name, function(point), its_unit or unit, shares)
+        budget.add(name, function(point), shares, unit=unit if name == _COULOMB else "")
     return budget
 
 
@@ -206,11 +214,9 @@ def _clip_coulomb(budget: UncertaintyBudget, significant: bool) -> None:
     """Without significance, x_k is not below zero and its interval begins there."""
     if significant:
         return
-    coulomb = budget.results["coulomb_displacement_m"]
-    upper = max(coulomb.interval_95[1], 0.0)
-    budget.results["coulomb_displacement_m"] = Quantity(
-        max(coulomb.value, 0.0), coulomb.standard_uncertainty, (0.0, upper), coulomb.unit
-    )
+    coulomb = budget.results[_COULOMB]
+    ends = 0.0, max(coulomb.interval_95[1], 0.0)
+    budget.results[_COULOMB] = replace(coulomb, value=max(coulomb.value, 0.0), interval_95=ends)
 
 
 def _classical_figures(
@@ -228,10 +234,10 @@ def _classical_figures(
     if classical is None:
         return []
     value, deviation = classical
-    budget.add("log_decrement_classical", value, "1", {BudgetSource.NOISE: deviation})
+    budget.add("log_decrement_classical", value, {BudgetSource.NOISE: deviation})
     if not significant:
         return []
-    displacement = budget.results["coulomb_displacement_m"].unit
+    displacement = budget.results[_COULOMB].unit
     return [
         result_warning(
             "coulomb-biases-log-decrement",
@@ -276,18 +282,6 @@ def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:
     return Events(rest_s=None if stop_s is None else channels.to_record_time(stop_s))
 
 
-def _named(channels: Channels, found: OneMassFit) -> dict[str, float]:
-    parameters = found.parameters
-    return {
-        "turning_s": channels.to_record_time(parameters.turning_s),
-        "turning_displacement_m": parameters.turning,
-        "period_s": parameters.period_s,
-        "damping_n_per_s": parameters.damping_n_per_s,
-        "coulomb_displacement_m": parameters.coulomb,
-        "offset": parameters.offset,
-    }
-
-
 def _curves(channels: Channels, found: OneMassFit, delay_s: float) -> Callable[[Floats], Curves]:
     """Fitted readings at record times; before the fitted stretch they go on as if the mass had swung."""
 
@@ -306,17 +300,17 @@ def _k(p: Floats) -> float:
     return float(np.hypot(p[2], p[3]))
 
 
-_Row = tuple[str, str, Callable[[Floats], float]]
-_QUANTITIES: Final[tuple[_Row, ...]] = (
-    ("period_s", "s", _period),
-    ("damping_n_per_s", "1/s", lambda p: float(p[3])),
-    ("log_decrement", "1", lambda p: float(p[3]) * _period(p)),
-    ("damping_ratio", "1", lambda p: float(p[3]) / _k(p)),
-    ("frequency_k_rad_per_s", "rad/s", _k),
-    ("coulomb_displacement_m", "", lambda p: float(p[4])),
-)
-"""Names, units ("": that of the displacement) and functions of (the six fitted parameters, mass)."""
-_WITH_MASS: Final[tuple[_Row, ...]] = (
-    ("stiffness_n_per_m", "N/m", lambda p: _k(p) ** 2 * float(p[6])),
-    ("damping_coefficient_kg_per_s", "kg/s", lambda p: 2.0 * float(p[3] * p[6])),
-)
+_COULOMB: Final = "coulomb_displacement_m"
+_QUANTITIES: Final[dict[str, Callable[[Floats], float]]] = {
+    "period_s": _period,
+    "damping_n_per_s": lambda p: float(p[3]),
+    "log_decrement": lambda p: float(p[3]) * _period(p),
+    "damping_ratio": lambda p: float(p[3]) / _k(p),
+    "frequency_k_rad_per_s": _k,
+    _COULOMB: lambda p: float(p[4]),
+}
+"""Functions of (the six fitted parameters, mass)."""
+_WITH_MASS: Final[dict[str, Callable[[Floats], float]]] = {
+    "stiffness_n_per_m": lambda p: _k(p) ** 2 * float(p[6]),
+    "damping_coefficient_kg_per_s": lambda p: 2.0 * float(p[3] * p[6]),
+}

@@ -84,12 +84,13 @@ def find_turning_points(channel: Channel, first_s: float, period_s: float) -> Tu
     read = np.unique(np.round(halves))  # a gap may be millions of half periods long
     for count in read[(read >= 0.0) & (read <= halves[-1])].tolist():
         middle_s = first_s + 0.5 * period_s * count
-        top = _extreme_near(channel, middle_s, period_s)
-        if top is None:
+        part = channel.between(middle_s - 0.26 * period_s, middle_s + 0.26 * period_s)
+        if len(part) < 5 or part.time_s[-1] - part.time_s[0] < 0.35 * period_s:
             continue
-        if top.height < 4.0 * top.noise_gain * top.noise:
+        time_s, value, side, height, noise, gain = _extreme(part, middle_s, period_s)
+        if height < 4.0 * gain * noise:
             break
-        found.append((count, top.time_s, top.value, top.side, top.noise_gain))
+        found.append((count, time_s, value, side, gain))
     number, *columns = np.array(found, dtype=np.float64).reshape(-1, 5).T
     return TurningPoints(number.astype(np.int64), *columns)
 
@@ -145,28 +146,21 @@ def _period_of(crossing_s: Floats) -> float:
     return 2.0 * float(np.polyfit(number, early_s, 1)[0]) if number[-1] > 1.0 else whole_s
 
 
-@dataclass(frozen=True, slots=True)
-class _Extreme:
-    time_s: float
-    value: float
-    side: float
-    height: float
-    noise: float
-    noise_gain: float
+def _extreme(
+    part: Channel, middle_s: float, period_s: float
+) -> tuple[float, float, float, float, float, float]:
+    """Top of a sine with offset, fitted to half a period about `middle_s`.
 
-
-def _extreme_near(channel: Channel, middle_s: float, period_s: float) -> _Extreme | None:
-    """Extreme near `middle_s`: the top of a sine with offset through half a period; None in a gap."""
-    part = channel.between(middle_s - 0.26 * period_s, middle_s + 0.26 * period_s)
-    if len(part) < 5 or part.time_s[-1] - part.time_s[0] < 0.35 * period_s:
-        return None
+    Time, reading and side there, height above the offset, noise of a reading, and standard uncertainty per
+    unit of that noise.
+    """
     angle = 2.0 * math.pi * (part.time_s - middle_s) / period_s
     columns = np.column_stack((np.ones(len(part)), np.cos(angle), np.sin(angle)))
     level, cosine, sine = np.linalg.lstsq(columns, part.value_m, rcond=None)[0].tolist()
     residual = part.value_m - columns @ (level, cosine, sine)
     side, height = math.copysign(1.0, cosine), math.hypot(cosine, sine)
     at_top = np.array([1.0, side * cosine / height, side * sine / height]) if height else np.ones(3)
-    return _Extreme(
+    return (
         middle_s + math.atan2(side * sine, side * cosine) / (2.0 * math.pi) * period_s,
         level + side * height,
         side,

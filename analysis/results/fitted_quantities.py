@@ -1,8 +1,9 @@
 """Results from the fitted parameters and slips, each with its uncertainty by source."""
 
 import math
+from bisect import bisect_left
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final, Self
 
 import numpy as np
@@ -11,9 +12,10 @@ from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, covariance, motion_phases, project_to_bounds
 from analysis.fitting.search import Fit
 from analysis.identification import Events
-from analysis.laws.catalogue import PARAMETER_COUNT, compared_law
+from analysis.laws.catalogue import compared_law
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
+from analysis.motion.two_mass import PEAK_RATES
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
 from analysis.record import AnalysisError, Record
@@ -40,15 +42,14 @@ def add_fitted_quantities(
     own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
     of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
     friction = [(place, name, "1") for place, name in FRICTION_PARAMETERS.items()]
-    for place, name, unit in (*friction, *of_law, *_STAND):
+    of_stand = (Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m")
+    for place, name, unit in (*friction, *of_law, *of_stand):
         if fit.determines(place):
             sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
-            weights = np.zeros(PARAMETER_COUNT)
-            weights[place] = 1.0
-            shares, reach = fitted.contributions(weights), None
+            shares, reach = fitted.parameter_contributions(place), None
             if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
                 shares, reach = _by_profile(joint.problem, fit, place, shares)
-            budget.add(name, sign * fit.value(place), unit, shares, reach)
+            budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach)
     if slip_ended:
         _add_residual_displacement(joint, budget)
     _add_peak_rates(joint, budget)
@@ -82,11 +83,16 @@ def _add_peak_rates(joint: JointFit, budget: UncertaintyBudget) -> None:
         return law.solver.peak_rates(law.vector(project_to_bounds(parameters, law)), duration_s)
 
     point = joint.chosen.parameters
-    for (name, unit), value, weights in zip(
-        _RATES, rates(point), numerical_gradient(rates, point), strict=True
-    ):
+    _add_finite(joint, budget, zip(PEAK_RATES, rates(point), numerical_gradient(rates, point), strict=True))
+
+
+def _add_finite(
+    joint: JointFit, budget: UncertaintyBudget, quantities: Iterable[tuple[str, float, Floats]]
+) -> None:
+    """Add quantities (name, value, derivatives by the parameters) that have a value."""
+    for name, value, slopes in quantities:
         if np.isfinite(value):
-            budget.add(name, float(value), unit, joint.uncertainty.contributions(np.nan_to_num(weights)))
+            budget.add(name, float(value), joint.uncertainty.contributions(np.nan_to_num(slopes)))
 
 
 def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> None:
@@ -112,19 +118,10 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
             BudgetSource.GAUGE_2_GAIN: value * (gauge.gain_relative or 0.0),
             BudgetSource.GAUGE_2_NONLINEARITY: gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
         }
-    budget.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
+    budget.add("residual_displacement_m", decay.relative_sign * value, shares)
 
 
-_STAND = (Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m")
-_RATES = (
-    ("table_velocity_max_m_per_s", "m/s"),
-    ("plate_velocity_max_m_per_s", "m/s"),
-    ("table_acceleration_max_m_per_s2", "m/s2"),
-    ("plate_acceleration_max_m_per_s2", "m/s2"),
-)
-
-
-_DEGREES: Final = ("V", "VI", "VII", "VIII", "IX", "X")
+_DEGREES: Final = ("below V", "V", "VI", "VII", "VIII", "IX", "X", "above X")
 _BOUNDS_M_PER_S: Final = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64)
 
 
@@ -140,12 +137,7 @@ def msk64_degree(velocity_max_m_per_s: float) -> str:
             "velocity {velocity!r} m/s has no MSK-64 degree: give a finite number, 0 or above",
             velocity=velocity_max_m_per_s,
         )
-    if velocity_max_m_per_s <= _BOUNDS_M_PER_S[0]:
-        return "below V"
-    for degree, (_, upper) in zip(_DEGREES, pairwise(_BOUNDS_M_PER_S), strict=True):
-        if velocity_max_m_per_s <= upper:
-            return degree
-    return "above X"
+    return _DEGREES[bisect_left(_BOUNDS_M_PER_S, velocity_max_m_per_s)]
 
 
 CHI_SQUARE_RISE_95 = 3.841458820694124
@@ -211,18 +203,16 @@ class Profile:
         return distribution(reach * np.array(shares), np.array(rises))
 
     def _side(self, side: float) -> list[tuple[float, float]]:
-        """Rises on one side of the fit, until there is no hope of less."""
+        """Lowest rises on one side of the fit, until there is no hope of less."""
         found = []
         for distance in _DISTANCES:
-            rise = self._lowest_rise(side * distance)
+            rise = self._rise(side * distance, follow=True)
+            if rise > CHI_SQUARE_RISE_95:
+                rise = min(rise, self._rise(side * distance, follow=False))
             found.append((side * distance, rise))
             if rise > _HOPELESS and distance > 1.0:
                 break
         return found
-
-    def _lowest_rise(self, share: float) -> float:
-        rise = self._rise(share, follow=True)
-        return rise if rise <= CHI_SQUARE_RISE_95 else min(rise, self._rise(share, follow=False))
 
     def _rise(self, share: float, *, follow: bool) -> float:
         """Rise of chi-square with the parameter held off its value, in units of the true noise.
@@ -281,10 +271,10 @@ def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> No
     def bounds(parameters: Floats) -> Floats:
         return _bounds_of_motion(project_to_bounds(parameters, chosen.law), chosen.law, duration_s)
 
-    values, slopes = bounds(chosen.parameters), numerical_gradient(bounds, chosen.parameters)
-    for name, value, weights in zip((LOWER, UPPER), values, slopes, strict=True):
-        if np.isfinite(value):
-            budget.add(name, float(value), "1", joint.uncertainty.contributions(np.nan_to_num(weights)))
+    point = chosen.parameters
+    _add_finite(
+        joint, budget, zip((LOWER, UPPER), bounds(point), numerical_gradient(bounds, point), strict=True)
+    )
 
 
 def add_no_slip_bound(
@@ -311,7 +301,7 @@ def add_no_slip_bound(
     shares[BudgetSource.GAUGE_1_GAIN] = value * (record.table_gauge.gain_relative or 0.0)
     shares[BudgetSource.GRAVITY] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
     shares[BudgetSource.LEVELLING] = LEVELLING_UNCERTAINTY_RAD
-    budget.add(LOWER, value, "1", shares)
+    budget.add(LOWER, value, shares)
 
 
 def largest_static_friction(joint: JointFit) -> tuple[float, float]:
@@ -347,14 +337,12 @@ def _add_tied(joint: JointFit, budget: UncertaintyBudget) -> None:
     friction = chosen.value(Parameter.FRICTION_DYNAMIC)
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         return
-    weights = np.zeros(PARAMETER_COUNT)
-    weights[Parameter.FRICTION_DYNAMIC] = 1.0
-    shares = joint.uncertainty.contributions(weights)
-    budget.add(LOWER, friction, "1", shares)
+    shares = joint.uncertainty.parameter_contributions(Parameter.FRICTION_DYNAMIC)
+    budget.add(LOWER, friction, shares)
     likeliest, end = largest_static_friction(joint)
     likeliest, end = max(likeliest, friction), max(end, friction)
     noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares[BudgetSource.NOISE]))
-    budget.add(UPPER, likeliest, "1", {**shares, BudgetSource.NOISE: noise})
+    budget.add(UPPER, likeliest, {**shares, BudgetSource.NOISE: noise})
 
 
 def _unseen_slip_m(record: Record, decay: FreeDecay) -> float:
@@ -425,17 +413,14 @@ def find_slip_end(joint: JointFit) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
     The last slips are often smaller than the noise. Gauge 2 alone gives the end to a quarter period, rather
-    too early than too late.
-
-    Returns
-    -------
-    SlipEnd or None
-        None where slip lasts to the end of the record, or comes again after it.
+    too early than too late. None where slip lasts to the end of the record, or comes again after it.
     """
     decay, chosen, adequate = joint.decay, joint.chosen, joint.selection.adequate
     end_s, largest = joint.end_s, np.inf
-    if adequate and _slips_on(chosen, end_s, decay.period_s):
-        return None
+    if adequate:  # a period later the widest swing is past
+        later = _end_of(chosen.parameters, chosen.law, end_s + decay.period_s)
+        if later is None or later > end_s:
+            return None
     if not chosen.law.has_static_friction:
         _, largest = largest_static_friction(joint)
     fitted = _fitted_slip_end(chosen, joint.candidates, end_s, largest)
@@ -499,11 +484,6 @@ def _end_of(parameters: Floats, model: FrictionLaw, end_s: float) -> float | Non
     release = float(parameters[Parameter.RELEASE])
     phases = motion_phases(parameters, model, end_s - release)
     return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
-
-
-def _slips_on(chosen: Fit, end_s: float, period_s: float) -> bool:
-    end = _end_of(chosen.parameters, chosen.law, end_s + period_s)
-    return end is None or end > end_s
 
 
 def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float) -> SlipEnd:

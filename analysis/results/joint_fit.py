@@ -309,12 +309,9 @@ def friction_curves(
 
 
 def _with_friction(fit: Fit, friction_dynamic: float) -> Floats:
-    ratio = fit.value(Parameter.FRICTION_STATIC) / fit.value(Parameter.FRICTION_DYNAMIC)
+    both = [Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC]
     point = fit.parameters.copy()
-    point[Parameter.FRICTION_DYNAMIC], point[Parameter.FRICTION_STATIC] = (
-        friction_dynamic,
-        ratio * friction_dynamic,
-    )
+    point[both] *= friction_dynamic / fit.value(Parameter.FRICTION_DYNAMIC)
     return project_to_bounds(point, fit.law)
 
 
@@ -337,20 +334,15 @@ def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
     times = np.linspace(tail.start_s, tail.end_s, len(tail.residual_m))
     unit = tail.residual_m / max(tail.rms_m, 1e-300)
     by_shape = np.array([[0.0, -(tail.period_s**2) / (2.0 * np.pi)], [1.0, 0.0]])
+    factor = noise_variance_factor(unit, times, decay.period_s / 4.0)
     noise = np.zeros((4, 4))
-    noise[:2, :2] = (
-        noise_variance_factor(unit, times, decay.period_s / 4.0)
-        * by_shape
-        @ tail.covariance[:2, :2]
-        @ by_shape.T
-    )
+    noise[:2, :2] = factor * by_shape @ tail.covariance[:2, :2] @ by_shape.T
+    bend = np.append(by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0))
     columns: dict[Source, Floats] = {
         BudgetSource.TABLE_MASS: np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
         BudgetSource.PLATE_MASS: np.array([0.0, 0.0, 0.0, record.masses.plate_mass_uncertainty_kg]),
         BudgetSource.TIME_BASE: record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
-        BudgetSource.GAUGE_1_NONLINEARITY: np.append(
-            by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)
-        ),
+        BudgetSource.GAUGE_1_NONLINEARITY: bend,
     }
     return DecayConstants(point, ParameterUncertainty(columns, noise))
 
@@ -383,9 +375,9 @@ def period_and_damping(parameters: Floats) -> tuple[float, float]:
 
 def add_constants(constants: DecayConstants, budget: UncertaintyBudget) -> None:
     """Add period, damping and stiffness to the budget."""
-    for name, unit, function in _DECAY_QUANTITIES:
+    for name, function in _DECAY_QUANTITIES.items():
         weights = numerical_gradient(function, constants.point)
-        budget.add(name, function(constants.point), unit, constants.uncertainty.contributions(weights))
+        budget.add(name, function(constants.point), constants.uncertainty.contributions(weights))
 
 
 def _mass(p: Floats) -> float:
@@ -412,13 +404,13 @@ def _k1(p: Floats) -> float:
     return float(np.hypot(2.0 * np.pi / p[0], p[1]))
 
 
-_DECAY_QUANTITIES: tuple[tuple[str, str, Callable[[Floats], float]], ...] = (
-    ("period_s", "s", lambda p: float(p[0])),
-    ("log_decrement", "1", lambda p: float(p[0] * p[1])),
-    ("damping_n1_per_s", "1/s", lambda p: float(p[1])),
-    ("damping_n2_per_s", "1/s", lambda p: float(p[1] * (p[2] + p[3]) / p[2])),
-    ("damping_coefficient_kg_per_s", "kg/s", lambda p: float(2.0 * p[1] * (p[2] + p[3]))),
-    ("frequency_k1_rad_per_s", "rad/s", _k1),
-    ("frequency_k2_rad_per_s", "rad/s", lambda p: _k1(p) * float(np.sqrt((p[2] + p[3]) / p[2]))),
-    ("stiffness_n_per_m", "N/m", lambda p: _k1(p) ** 2 * float(p[2] + p[3])),
-)
+_DECAY_QUANTITIES: dict[str, Callable[[Floats], float]] = {
+    "period_s": lambda p: float(p[0]),
+    "log_decrement": lambda p: float(p[0] * p[1]),
+    "damping_n1_per_s": lambda p: float(p[1]),
+    "damping_n2_per_s": lambda p: float(p[1] * (p[2] + p[3]) / p[2]),
+    "damping_coefficient_kg_per_s": lambda p: float(2.0 * p[1] * (p[2] + p[3])),
+    "frequency_k1_rad_per_s": _k1,
+    "frequency_k2_rad_per_s": lambda p: _k1(p) * float(np.sqrt((p[2] + p[3]) / p[2])),
+    "stiffness_n_per_m": lambda p: _k1(p) ** 2 * float(p[2] + p[3]),
+}

@@ -1,10 +1,10 @@
 """Motion of the simulated stand: repeated pullback tests, and the parameters of the chosen series."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from analysis.motion.two_mass import Motion, simulate, stiffness_and_damping
+from analysis.motion.two_mass import Motion, TwoMassParameters, stiffness_and_damping
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.truth import StandTruth
 from config.files import published_row
@@ -74,18 +74,8 @@ class RepeatedPullback:
 
 def released_motion(true: StandTruth, timetable: Timetable) -> Motion:
     """Exact motion after each release. Raises MotionError for parameters that no stand can have."""
-    return simulate(
-        table_mass_kg=true.table_mass_kg,
-        plate_mass_kg=true.plate_mass_kg,
-        stiffness_n_per_m=true.stiffness_n_per_m,
-        damping_coefficient_kg_per_s=true.damping_coefficient_kg_per_s,
-        friction_dynamic=true.friction_dynamic,
-        friction_static=true.friction_static,
-        tilt_rad=true.tilt_rad,
-        pullback_m=true.pullback_m,
-        duration_s=timetable.decay_s + timetable.recentre_s,
-        gravity_m_per_s2=true.gravity_m_per_s2,
-    )
+    of_motion = {each.name: getattr(true, each.name) for each in fields(TwoMassParameters)}
+    return TwoMassParameters(**of_motion).simulate(timetable.decay_s + timetable.recentre_s)
 
 
 def _smooth(x: Floats) -> Floats:
@@ -99,25 +89,20 @@ def stand_truth(options: SimulatedStandOptions, stand: Stand) -> StandTruth:
     series = stand.series(options.series)
     row = published_row(series.code)
     friction = _or(options.friction, row.friction_dynamic)
-    stiffness, damping = stiffness_and_damping(
-        row.period_s,
-        row.damping_n1_per_s,
-        table_mass_kg=stand.table_mass_kg,
-        plate_mass_kg=series.plate_mass_kg,
-    )
+    decay = {"period_s": row.period_s, "damping_n1_per_s": row.damping_n1_per_s}
+    masses = {"table_mass_kg": stand.table_mass_kg, "plate_mass_kg": series.plate_mass_kg}
+    stiffness, damping = stiffness_and_damping(**decay, **masses)
     return StandTruth(
         series=series.code,
         friction_dynamic=friction,
         friction_static=_or(options.static_friction, friction),
         tilt_rad=options.tilt_rad,
         pullback_m=_or(options.pullback_m, series.pullback_m),
-        table_mass_kg=stand.table_mass_kg,
-        plate_mass_kg=series.plate_mass_kg,
         gravity_m_per_s2=stand.gravity_m_per_s2,
-        period_s=row.period_s,
-        damping_n1_per_s=row.damping_n1_per_s,
         stiffness_n_per_m=stiffness,
         damping_coefficient_kg_per_s=damping,
+        **decay,
+        **masses,
     )
 
 

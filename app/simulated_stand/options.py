@@ -134,10 +134,10 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
 
     def __post_init__(self) -> None:
         for name, (low, high) in _LIMITS.items():
-            _within(name, getattr(self, name), low, high)
-        _within("every_s", self.every_s, self.timetable().parts_s, 86400.0)
+            check_within(name, getattr(self, name), low, high)
+        check_within("every_s", self.every_s, self.timetable().parts_s, 86400.0)
         for name in ("drop", "flip", "truncate", "drop + flip + truncate"):
-            _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
+            check_within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
         for text in self.disturbances:
             parse_disturbance(text)
 
@@ -153,6 +153,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         return msgspec.convert(self, Timetable, from_attributes=True)
 
 
-def _within(name: str, value: float | None, low: float, high: float) -> None:
+def check_within(name: str, value: float | None, low: float, high: float) -> None:
+    """Raise ValueError unless a value is in its range."""
     if value is not None and not (math.isfinite(value) and low <= value <= high):
         raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")

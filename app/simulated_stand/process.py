@@ -37,7 +37,7 @@ def serve(
     at the end. `has_ended` and `next_disturbance` (None for none) are asked every few milliseconds.
     """
 
-    def tell_all(truth: Truth) -> None:
+    def publish(truth: Truth) -> None:
         if options.truth_file:
             write_truth(Path(options.truth_file), truth)
         if on_truth is not None:
@@ -46,14 +46,14 @@ def serve(
     is_tcp = options.tcp_port is not None or not has_pseudo_terminals()
     transport = open_tcp_port(options.tcp_port or 0) if is_tcp else open_pseudo_terminal()
     try:
-        stand = SimulatedStandDevice(options, transport, tell_all)
+        stand = SimulatedStandDevice(options, transport, publish)
         on_ready(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
-        tell_all(stand.truth())
+        publish(stand.truth())
         while not has_ended():
             while (disturbance := next_disturbance()) is not None:
                 stand.disturb(disturbance, time.monotonic_ns())
             transport.wait(stand.step(time.monotonic_ns()))
-        tell_all(stand.truth())
+        publish(stand.truth())
     finally:
         transport.close()
 

@@ -30,7 +30,7 @@ class SimulatedStandDevice:
         self, options: SimulatedStandOptions, transport: Transport, on_truth: Callable[[Truth], None]
     ) -> None:
         self._options = options
-        self._tell = on_truth
+        self._on_truth = on_truth
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
         self._timetable = options.timetable()
@@ -44,22 +44,16 @@ class SimulatedStandDevice:
         settings, self._is_swapped = options.device_settings()
         protocol = find_driver(options.protocol).make_simulated(settings)
         self._device = make_device(transport, protocol, self._signal_at, _setup(options))
-        self._told: tuple[object, ...] = ()
+        self._published: tuple[object, ...] = ()
 
     def step(self, now_ns: int) -> float:
         """Do what is due; return seconds to wait at most."""
         wait_s = self._device.step(now_ns)
         device = self._device
-        turn = (
-            device.streams,
-            device.is_streaming,
-            device.is_plugged_in,
-            device.disturbances,
-            self._releases(),
-        )
-        if turn != self._told:
-            self._told = turn
-            self._tell(self.truth())
+        state = device.streams, device.is_streaming, device.is_plugged_in, device.disturbances
+        if (turn := (*state, self._releases())) != self._published:
+            self._published = turn
+            self._on_truth(self.truth())
         return wait_s
 
     def truth(self) -> Truth:
@@ -89,8 +83,8 @@ class SimulatedStandDevice:
 
     def _releases(self) -> int:
         """Releases until the last sample of this session."""
-        account = self._device.log
-        shown_s = account.started_s + account.samples / account.true_rate_hz - self._timetable.release_s
+        log = self._device.log
+        shown_s = log.started_s + log.samples / log.true_rate_hz - self._timetable.release_s
         shown = max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
         return shown if self._timetable.count is None else min(shown, self._timetable.count)
 

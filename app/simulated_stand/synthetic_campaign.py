@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from analysis.campaign.rows import SeriesRow
-from analysis.catalogue import table_columns
+from analysis.catalogue import CATALOGUE, table_columns
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from app.runs.analyze import Progress
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
@@ -21,10 +21,11 @@ from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.errors import RunError
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
+from app.simulated_stand.options import check_within
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
-from config.schema import Gauge, Gauges, Stand
-from drivers.arrays import Flags, Floats, Int32s
+from config.schema import Gauges, Stand
+from drivers.arrays import Floats
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
@@ -63,9 +64,7 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
             "noise_m": (0.0, 1e-3), "friction_scatter": (0.0, 0.3), "friction_per_kg": (-0.04, 0.2),
         }  # fmt: skip
         for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")
+            check_within(name, getattr(self, name), low, high)
 
 
 class SystematicErrors(msgspec.Struct, frozen=True):
@@ -161,36 +160,28 @@ def series_parameters(
     )
 
 
-_OF_MOTION = (
-    "residual_displacement_m", "table_velocity_max_m_per_s", "plate_velocity_max_m_per_s",
-    "table_acceleration_max_m_per_s2", "plate_acceleration_max_m_per_s2",
-)  # fmt: skip
-
-
 def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
     """What a perfect analysis would find, by the names of its results."""
-    row = published_row(code)
+    printed = published_row(code)
     motion = parameters.simulate(_UNTIL_REST_S)
     given = {name: value for name, value in asdict(parameters).items() if value is not None}
     return given | {
         "friction_static": parameters.static_or_dynamic,
-        "period_s": row.period_s,
-        "damping_n1_per_s": row.damping_n1_per_s,
+        "period_s": printed.period_s,
+        "damping_n1_per_s": printed.damping_n1_per_s,
         "damping_n2_per_s": parameters.damping_coefficient_kg_per_s / (2.0 * parameters.table_mass_kg),
-        **{name: getattr(motion, name) for name in _OF_MOTION},
+        **{row.name: getattr(motion, row.name) for row in CATALOGUE if hasattr(motion, row.name)},
     }
 
 
 def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]) -> TwoMassParameters:
     own = parameters.friction_dynamic * (1.0 + scatter * np.random.default_rng(seed).standard_normal())
-    static = parameters.friction_static
-    return replace(
-        parameters, friction_dynamic=own, friction_static=None if static is None else max(static, own)
-    )
+    static = None if parameters.friction_static is None else max(parameters.friction_static, own)
+    return replace(parameters, friction_dynamic=own, friction_static=static)
 
 
 class Comparison(msgspec.Struct, frozen=True):
-    """One quantity of one series."""
+    """One quantity of one series beside its truth."""
 
     series: str
     name: str
@@ -219,24 +210,20 @@ def series_truths(
 def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Comparison]:
     """Every quantity of the table that was found, beside its truth."""
     for row in rows:
-        truth = truths[row.series.code]
-        for column, _ in table_columns():
-            if column.name in row.quantities:
-                found = row.quantities[column.name].quantity
-                low, high = found.interval_95
+        code = row.series.code
+        for name in (column.name for column, _ in table_columns()):
+            if name in row.quantities:
+                found = row.quantities[name].quantity
+                truth = float(truths[code][name])
                 yield Comparison(
-                    row.series.code,
-                    column.name,
-                    float(found.value),
-                    float(found.standard_uncertainty),
-                    (float(low), float(high)),
-                    float(truth[column.name]),
+                    code, name, found.value, found.standard_uncertainty, found.interval_95, truth
                 )
 
 
 _HELD_S = 1.0
 _PLACES_M = (2e-4, 2e-3)
 """Standard deviations of where table and plate stand at rest, as the gauges read them."""
+_OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 
 
 def write_test(test: SyntheticTest) -> StoredRun:
@@ -267,19 +254,17 @@ def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
     places_m = rng.normal(scale=_PLACES_M)
     shown = _displacements(motion, since_s, errors.lag_s, of_plate=gauges.relative.measures == "plate")
     stated = (gauges.table, gauges.relative)
-    columns = [
-        _converted(gauge, gain, bend, place + x, options.noise_m, rng)
-        for gauge, gain, bend, place, x in zip(
-            stated, errors.gains, errors.bends_m, places_m, shown, strict=True
-        )
-    ]
-    status = np.zeros(count, np.uint8)
-    flags = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
-    for (_, overloaded), flag in zip(columns, flags, strict=True):
+    gauge_errors = zip(stated, errors.gains, errors.bends_m, places_m, shown, _OVERLOADS, strict=True)
+    counts, readings, status = [], [], np.zeros(count, np.uint8)
+    for gauge, gain, bend_m, place_m, shown_m, flag in gauge_errors:
+        true = gauge.replace(gain_m_per_count=gauge.gain_m_per_count / (1.0 + gain))
+        simulated = SimulatedGauge(true, GaugeFaults(options.noise_m, nonlinearity_m=bend_m), rng)
+        read, overloaded = simulated.read(place_m + shown_m, np.zeros(count))
+        counts.append(read)
+        readings.append(gauge.displacement_m(read.astype(float)))
         status[overloaded] |= np.uint8(flag)
-    counts = np.column_stack([counts for counts, _ in columns])
-    readings = [gauge.displacement_m(c.astype(float)) for gauge, c in zip(stated, counts.T, strict=True)]
-    return RunBlock(time_s, np.column_stack(readings), status, counts), release_s / (1.0 + errors.clock)
+    block = RunBlock(time_s, np.column_stack(readings), status, np.column_stack(counts))
+    return block, release_s / (1.0 + errors.clock)
 
 
 class RecordedTest(msgspec.Struct, frozen=True):
@@ -328,13 +313,3 @@ def _displacements(motion: Motion, since_s: Floats, lag_s: float, *, of_plate: b
     table, _ = motion.sample_displacements(since_s)
     table_then, relative = motion.sample_displacements(since_s - lag_s)
     return table, relative + table_then if of_plate else relative
-
-
-def _converted(
-    gauge: Gauge, gain: float, bend_m: float, displacement_m: Floats, noise_m: float, rng: np.random.Generator
-) -> tuple[Int32s, Flags]:
-    """Counts (n,) of a gauge that reads too much by the share `gain`, and where it is overloaded."""
-    true = gauge.replace(gain_m_per_count=gauge.gain_m_per_count / (1.0 + gain))
-    return SimulatedGauge(true, GaugeFaults(noise_m, nonlinearity_m=bend_m), rng).read(
-        displacement_m, np.zeros(len(displacement_m))
-    )

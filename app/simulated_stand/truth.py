@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions, Timetable
+from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from drivers.simulated.faults import Disturbance
 from drivers.simulated.stream_sender import TransmissionLog
 
@@ -63,15 +63,3 @@ def write_truth(path: Path, truth: Truth) -> None:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
-
-
-def read_truth(path: Path) -> Truth:
-    """Read a truth file. Raises SimulatedStandError."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Truth)
-    except (OSError, msgspec.DecodeError) as error:
-        raise SimulatedStandError(
-            "{path} is not the truth file of a simulated stand ({error}). Give the one it was told to write",
-            path=path,
-            error=error,
-        ) from None

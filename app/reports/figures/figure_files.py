@@ -16,7 +16,7 @@ from analysis.campaign.series import RunResult
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style, save_figure
-from app.runs.analyze import Analysis, Progress, repeat_saved_analysis
+from app.runs.analyze import Progress, repeat_saved_analysis
 from app.runs.disk import atomic_write, storage_error
 from app.runs.errors import RunExistsError, RunNotFoundError
 from app.runs.exchange.exporting import unique_names
@@ -54,12 +54,6 @@ class FigureFolder(msgspec.Struct, frozen=True):
         if not os.access(there, os.W_OK):
             raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
-    def create(self) -> None:
-        try:
-            Path(self.path).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise storage_error(Path(self.path), error) from None
-
     def check_not_existing(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
         for number in numbers:
             for stem in [""] if number == FRICTION_FIGURE else stems:
@@ -76,8 +70,11 @@ class FigureFolder(msgspec.Struct, frozen=True):
     def write(
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
     ) -> FigureFile:
-        self.create()
         target = self.file(number, stem)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise storage_error(target.parent, error) from None
         with atomic_write(target, replace=self.replace) as made:
             save_figure(figure, made)
         return FigureFile(number, str(target), caption, run)
@@ -100,48 +97,30 @@ def write_figures(
     stems = unique_names(path.stem for path in chosen)
     folder.check_not_existing(stems, numbers)
     written, notes = [], []
-    if FRICTION_FIGURE in numbers:
-        of_all = write_friction_figure(folder, campaign, stands)
-        written += [of_all] if of_all else []
-        notes += [] if of_all else ["no run determined f_s or f_d: Fig. 2 is left out"]
-    with Validator() as validator:
+    with print_style(), Validator() as validator:
+        if FRICTION_FIGURE in numbers:
+            figure = friction_figure(friction_by_contact(campaign.rows), contact_names(stands))
+            if figure is None:
+                notes.append("no run determined f_s or f_d: Fig. 2 is left out")
+            else:
+                written.append(folder.write(FRICTION_FIGURE, figure, CAPTION))
         for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
             progress(done / len(chosen), path.name)
-            drawn, left_out = write_run_figures(folder, repeat_saved_analysis(path, validator), stem, numbers)
-            written += drawn
+            analysis, left_out = repeat_saved_analysis(path, validator), []
+            run = RunFigureData.from_identification(analysis.record, analysis.identification)
+            name = analysis.run.metadata.series or path.stem
+            for one in RUN_FIGURES:
+                if one.number not in numbers:
+                    continue
+                if (figure := one.render(run)) is None:
+                    left_out.append(one.number)
+                else:
+                    caption = f"{name}. {one.caption}"
+                    written.append(folder.write(one.number, figure, caption, stem=stem, run=str(path)))
             if left_out:
                 figures = ", ".join(left_out)
                 notes.append(f"{path.name}: no law of motion was fitted, Figs. {figures} are left out")
     return written, notes
-
-
-def write_friction_figure(
-    folder: FigureFolder, campaign: Campaign, stands: Iterable[Stand]
-) -> FigureFile | None:
-    """Write Fig. 2 of a campaign on these stands; None without a friction coefficient. Raises RunError."""
-    with print_style():
-        figure = friction_figure(friction_by_contact(campaign.rows), contact_names(stands))
-        return None if figure is None else folder.write(FRICTION_FIGURE, figure, CAPTION)
-
-
-def write_run_figures(
-    folder: FigureFolder, analysis: Analysis, stem: str, numbers: Iterable[str]
-) -> tuple[list[FigureFile], list[str]]:
-    """Write Figs. 3a to 5b as far as wanted; returns the figures, and the numbers that need a fitted law."""
-    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
-    run = analysis.run.metadata.series or analysis.run.path.stem
-    written, left_out = [], []
-    with print_style():
-        for one in RUN_FIGURES:
-            if one.number not in numbers:
-                continue
-            figure = one.render(drawn)
-            if figure is None:
-                left_out.append(one.number)
-                continue
-            caption = f"{run}. {one.caption}"
-            written.append(folder.write(one.number, figure, caption, stem=stem, run=str(analysis.run.path)))
-    return written, left_out
 
 
 PAPER_SERIES = "1FFM0"
@@ -161,17 +140,15 @@ def representative_runs(
     if not wanted:
         known = [label for label, row in rows.items() if _FRICTION in row.quantities] or list(rows)
         wanted = [PAPER_SERIES] if PAPER_SERIES in known else known[:1]
-    by_name = {run.name: run for run in runs}
-    return [Path(_nearest(_row(rows, label), by_name)) for label in dict.fromkeys(wanted)]
-
-
-def _row(rows: dict[str, SeriesRow], label: str) -> SeriesRow:
-    row = rows.get(label) or rows.get(label.strip().upper())
-    if row is None:
-        raise RunNotFoundError(
-            "series {label!r} has no run there. Choose from {rows}", label=label, rows=", ".join(rows)
-        )
-    return row
+    by_name, chosen = {run.name: run for run in runs}, []
+    for label in dict.fromkeys(wanted):
+        row = rows.get(label) or rows.get(label.strip().upper())
+        if row is None:
+            raise RunNotFoundError(
+                "series {label!r} has no run there. Choose from {rows}", label=label, rows=", ".join(rows)
+            )
+        chosen.append(Path(_nearest(row, by_name)))
+    return chosen
 
 
 def _nearest(row: SeriesRow, runs: dict[str, RunResult]) -> str:

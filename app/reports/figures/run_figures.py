@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, definition
+from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, Unit, definition
 from analysis.identification import Identification
 from analysis.laws.catalogue import fitted_law
 from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
@@ -176,8 +176,7 @@ class RunFigure:
 
 def _table_displacement(axes: Axes, run: RunFigureData) -> None:
     _experiment(axes, run, run.table_m, TABLE)
-    if run.motion is not None:
-        _simulated(axes, run.motion.time_s, run.motion.table_displacement_m * MILLIMETRE.scale)
+    _simulated(axes, run.motion, "table_displacement_m")
     axes.set_ylabel(MILLIMETRE.labelled("table $u_1$"))
 
 
@@ -193,30 +192,29 @@ def _relative_displacement(axes: Axes, run: RunFigureData) -> None:
     if run.relative_m is not None:
         relative = MILLIMETRE.scale * run.relative_m
         axes.plot(run.time_s, relative, color=PLATE, linewidth=2.2, alpha=0.45, label="experiment")
-    if run.motion is not None:
-        _simulated(axes, run.motion.time_s, run.motion.relative_displacement_m * MILLIMETRE.scale)
+    _simulated(axes, run.motion, "relative_displacement_m")
     axes.set_ylabel(MILLIMETRE.labelled("relative $u_2 - u_1$"))
 
 
+def _rates(axes: Axes, run: RunFigureData, symbol: str, rate: str, unit: Unit, suffix: str) -> None:
+    """Draw a rate of both bodies with its largest values."""
+    motion, curves, labels = _motion(run), [], []
+    for number, body in enumerate(("table", "plate"), start=1):
+        name = f"{body}_{rate}_max_{suffix}"
+        largest = run.results.get(name)
+        shown = "unknown" if largest is None else definition(name).format(largest, Place.REPORT).in_print
+        labels.append(f"${symbol}_{number}$, at most {shown}")
+        curves.append(getattr(motion, f"{body}_{rate}_{suffix}"))
+    _bodies(axes, motion.time_s, (curves[0], curves[1]), (labels[0], labels[1]))
+    axes.set_ylabel(unit.labelled(rate))
+
+
 def _velocities(axes: Axes, run: RunFigureData) -> None:
-    motion = _motion(run)
-    both = motion.table_velocity_m_per_s, motion.plate_velocity_m_per_s
-    _rates(axes, run, both, "v", METRES_PER_SECOND.labelled("velocity"), "velocity_max_m_per_s")
+    _rates(axes, run, "v", "velocity", METRES_PER_SECOND, "m_per_s")
 
 
 def _accelerations(axes: Axes, run: RunFigureData) -> None:
-    motion = _motion(run)
-    both = motion.table_acceleration_m_per_s2, motion.plate_acceleration_m_per_s2
-    _rates(axes, run, both, "a", ACCELERATION.labelled("acceleration"), "acceleration_max_m_per_s2")
-
-
-def _rates(
-    axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], symbol: str, label: str, largest: str
-) -> None:
-    table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}')}"
-    plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}')}"
-    _bodies(axes, _motion(run).time_s, both, (table, plate))
-    axes.set_ylabel(label)
+    _rates(axes, run, "a", "acceleration", ACCELERATION, "m_per_s2")
 
 
 def _relative_acceleration(axes: Axes, run: RunFigureData) -> None:
@@ -256,18 +254,17 @@ def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) 
     axes.plot(*curve, color=colour, linewidth=width, alpha=alpha, label="experiment")
 
 
-def _simulated(axes: Axes, time_s: Floats, value: Floats) -> None:
-    axes.plot(time_s, value, color=SIMULATION, linewidth=0.8, linestyle=DASHED, label="simulation")
+def _simulated(axes: Axes, motion: MotionSamples | None, name: str) -> None:
+    if motion is not None:
+        value_mm = MILLIMETRE.scale * getattr(motion, name)
+        axes.plot(
+            motion.time_s, value_mm, color=SIMULATION, linewidth=0.8, linestyle=DASHED, label="simulation"
+        )
 
 
 def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: tuple[str, str]) -> None:
     axes.plot(time_s, values[0], color=TABLE, linewidth=0.9, label=labels[0])
     axes.plot(time_s, values[1], color=PLATE, linewidth=1.1, linestyle=DASHED, label=labels[1])
-
-
-def _largest(run: RunFigureData, name: str) -> str:
-    found = run.results.get(name)
-    return "unknown" if found is None else definition(name).format(found, Place.REPORT).in_print
 
 
 _LONG_LABELS = ("4b", "5a")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import as_file, files
 from io import StringIO
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +22,6 @@ FORMATS: Final = ("png", "svg", "pdf")
 FAMILY = "IBM Plex Sans"
 COLUMN_IN = 3.46
 """Width of a column of a journal, 88 mm."""
-_DPI = 300
 _STRETCHES = 4000
 """More stretches than a page has dots across at 300 dpi."""
 Floats = NDArray[np.float64]
@@ -35,42 +35,13 @@ _REPRODUCIBLE: Final[dict[str, dict[str, Any]]] = {
 
 @contextmanager
 def print_style() -> Iterator[None]:
-    """Context with the style of printed figures: 9 pt IBM Plex Sans, thin lines, no box."""
-    _load_typeface()
-    with mpl.rc_context(
-        {
-            "font.family": FAMILY,
-            "font.size": 9.0,
-            "mathtext.fontset": "custom",
-            "mathtext.rm": FAMILY,
-            "mathtext.it": f"{FAMILY}:italic",
-            "mathtext.bf": FAMILY,
-            "mathtext.cal": FAMILY,
-            "mathtext.sf": FAMILY,
-            "mathtext.tt": FAMILY,
-            "axes.titlesize": 9.0,
-            "axes.titlelocation": "left",
-            "axes.labelsize": 9.0,
-            "axes.linewidth": 0.6,
-            "axes.edgecolor": MUTED,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "axes.grid": True,
-            "axes.axisbelow": True,
-            "grid.alpha": 0.2,
-            "grid.linewidth": 0.6,
-            "grid.color": MUTED,
-            "xtick.labelsize": 8.0,
-            "ytick.labelsize": 8.0,
-            "xtick.major.width": 0.6,
-            "ytick.major.width": 0.6,
-            "legend.fontsize": 8.0,
-            "legend.frameon": False,
-            "lines.linewidth": 1.0,
-            "svg.hashsalt": "slipstand",
-            "pdf.fonttype": 42,
-            "savefig.dpi": _DPI,
-        }
+    """Context with the style of printed figures (`print.mplstyle`)."""
+    if not any(entry.name == FAMILY for entry in font_manager.fontManager.ttflist):
+        for file in typeface_files():
+            font_manager.fontManager.addfont(file)
+    with (
+        as_file(files("app.reports.figures") / "print.mplstyle") as style,
+        mpl.rc_context(mpl.rc_params_from_file(style, use_default_template=False)),
     ):
         yield
 
@@ -107,13 +78,6 @@ def figure_svg(figure: Figure) -> str:
     buffer = StringIO()
     figure.savefig(buffer, format="svg", metadata=_REPRODUCIBLE["svg"])
     return buffer.getvalue()
-
-
-def _load_typeface() -> None:
-    if any(entry.name == FAMILY for entry in font_manager.fontManager.ttflist):
-        return
-    for file in typeface_files():
-        font_manager.fontManager.addfont(file)
 
 
 def typeface_files() -> list[Path]:

@@ -13,7 +13,6 @@ from analysis.campaign.pooling import PooledQuantity
 from analysis.catalogue import Place
 from analysis.formatting import format_uncertainty, format_value, typeset, typeset_sentence
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
-from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
 from app.reports.table.content import TableContent, row_cells, table_quantities
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
@@ -21,7 +20,6 @@ from app.reports.test_report import shared
 from app.reports.test_report.blocks import (
     Block,
     Cell,
-    Drawing,
     Drawings,
     Facts,
     Grid,
@@ -62,11 +60,10 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     table: list[list[Cell]] = [[typeset_sentence(text) for text in row_cells(row)] for row in rows]
     columns = table_quantities()
     symbols = [Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol) for row in columns]
-    heads: list[Cell] = ["series", "n", *symbols]
-    results = Grid(heads, table, len(heads) - 1, small=True, note=LEGEND)
-    no_units: list[Cell] = ["series", *(Symbol(row.symbol.markup) for row in columns[1:])]
+    results = Grid(["series", "n", *symbols], table, len(symbols) + 1, small=True, note=LEGEND)
+    no_units = [Symbol(row.symbol.markup) for row in columns[1:]]
     scatter: list[list[Cell]] = [list(row) for row in repeats_grid(material.content)[1]]
-    repeats = Grid(no_units, scatter, len(no_units) - 1, small=True, note=REPEATS_LEGEND)
+    repeats = Grid(["series", *no_units], scatter, len(no_units), small=True, note=REPEATS_LEGEND)
     return [
         Section("Campaign", [_summary(material)]),
         *_notes(material),
@@ -76,10 +73,10 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
         Section("Figures", list(_figures(material))),
         shared.stand_section(list(gathered.stands.values())),
         shared.gauges_section(list(gathered.gauges.values())),
-        shared.procedure(),
+        shared.PROCEDURE,
         Section("Runs", [_runs(material)], wide=True),
         Section("Data", shared.fingerprint_columns(prints)),
-        shared.signatures(),
+        shared.SIGNATURES,
     ]
 
 
@@ -119,28 +116,21 @@ def _local(text: str, material: CampaignReportInput) -> str:
 
 def _budget(material: CampaignReportInput) -> Iterator[Block]:
     """One row for each series, one column for each source of the uncertainty of f_d."""
-    pooled = {
-        row.label: row.quantities[_FRICTION]
-        for row in material.content.campaign.rows
-        if _FRICTION in row.quantities
-    }
-    by_source = {label: _by_source(one) for label, one in pooled.items()}
-    sources = list(dict.fromkeys(source for of_it in by_source.values() for source in of_it))
-    rows: list[list[Cell]] = [
-        [
-            label,
-            format_value(one.quantity.value, one.quantity.standard_uncertainty).in_print,
-            typeset(format_uncertainty(one.repeatable)),
-            *(
-                typeset(format_uncertainty(by_source[label][source])) if source in by_source[label] else ""
-                for source in sources
-            ),
-        ]
-        for label, one in pooled.items()
-    ]
-    if not rows:
+    found = [row for row in material.content.campaign.rows if _FRICTION in row.quantities]
+    if not found:
         yield Text("No run determined the dynamic friction coefficient.")
         return
+    by_source = {row.label: _by_source(row.quantities[_FRICTION]) for row in found}
+    sources = list(dict.fromkeys(source for shares in by_source.values() for source in shares))
+    rows: list[list[Cell]] = []
+    for row in found:
+        pooled = row.quantities[_FRICTION]
+        value = format_value(pooled.quantity.value, pooled.quantity.standard_uncertainty).in_print
+        shares = [by_source[row.label].get(source) for source in sources]
+        parts = [
+            "" if one is None else typeset(format_uncertainty(one)) for one in (pooled.repeatable, *shares)
+        ]
+        rows.append([row.label, value, *parts])
     note = "Standard uncertainties. Repeats reduce the noise and the scatter between runs, and nothing else."
     header: list[Cell] = ["series", "value", "noise and repeats", *sources]
     yield Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
@@ -148,11 +138,11 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
 
 def _by_source(pooled: PooledQuantity) -> dict[str, float]:
     """Shared uncertainties by source, combined over calibrations and stands."""
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for error, deviation in pooled.common.items():
         source = str(error.source)
-        found[source] = math.hypot(found.get(source, 0.0), deviation)
-    return found
+        shares[source] = math.hypot(shares.get(source, 0.0), deviation)
+    return shares
 
 
 def _figures(material: CampaignReportInput) -> Iterator[Block]:
@@ -161,41 +151,19 @@ def _figures(material: CampaignReportInput) -> Iterator[Block]:
         figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
         items = [] if figure is None else [shared.drawing(figure, CAPTION)]
         for analysis in material.shown:
-            items += _of_run(analysis)
+            run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
+            items += shared.run_drawings(analysis, _DRAWN, f"{run}. ")
     yield Drawings(items) if items else Text("No run determined friction.")
 
 
-def _of_run(analysis: Analysis) -> list[Drawing]:
-    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
-    run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
-    made = [(one.render(drawn), f"{run}. {one.caption}") for one in RUN_FIGURES if one.number in _DRAWN]
-    return [shared.drawing(figure, said) for figure, said in made if figure is not None]
-
-
 def _runs(material: CampaignReportInput) -> Grid:
-    header: list[Cell] = [
-        "run",
-        "series",
-        "begun",
-        "operator",
-        "conditions",
-        "note",
-        "law",
-        "dynamic friction",
-    ]
+    columns = "run", "series", "begun", "operator", "conditions", "note", "law", "dynamic friction"
     rows: list[list[Cell]] = []
     for run in material.gathered.runs:
         metadata, found = material.gathered.details[run.name].metadata, run.results.get(_FRICTION)
-        rows.append(
-            [
-                _local(run.name, material),
-                run.series.label,
-                metadata.start_time.strftime("%Y-%m-%d %H:%M"),
-                metadata.operator,
-                metadata.conditions.as_text(),
-                metadata.note,
-                "left out" if run.excluded else _VERDICTS[run.adequate],
-                "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print,
-            ]
-        )
-    return Grid(header, rows, numbers=1, small=True)
+        name, begun = _local(run.name, material), metadata.start_time.strftime("%Y-%m-%d %H:%M")
+        law = "left out" if run.excluded else _VERDICTS[run.adequate]
+        value = "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print
+        texts = metadata.operator, metadata.conditions.as_text(), metadata.note
+        rows.append([name, run.series.label, begun, *texts, law, value])
+    return Grid(list(columns), rows, numbers=1, small=True)

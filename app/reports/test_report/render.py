@@ -1,8 +1,6 @@
 """Typesetting of a report as PDF/A: offline, reproducible to the byte."""
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -32,16 +30,27 @@ def write_report(report: Report, path: Path, *, replace: bool = False) -> None:
 
 def render_pdf(report: Report) -> bytes:
     """Typeset a report as PDF/A. Raises WriteError."""
-    with _compiler(report) as compiler:
-        made = compiler.compile(format="pdf", pdf_standards=[PDF_STANDARD])
+    made = typeset_report(report, format="pdf", pdf_standards=[PDF_STANDARD])
     return made if isinstance(made, bytes) else b""
 
 
-def render_pages(report: Report, dots_per_inch: float = 100.0) -> list[bytes]:
-    """Typeset a report as one PNG for each page. Raises WriteError."""
-    with _compiler(report) as compiler:
-        made = compiler.compile(format="png", ppi=dots_per_inch)
-    return made if isinstance(made, list) else [made or b""]  # a single page is no list
+def typeset_report(report: Report, **options: Any) -> bytes | list[bytes] | None:
+    """Typeset a report; `options` are those of `typst.Compiler.compile`. Raises WriteError."""
+    document = msgspec.json.encode(_printable(msgspec.to_builtins(report))).decode()
+    with as_file(files("app.reports.test_report") / "template.typ") as template:
+        try:
+            compiler = typst.Compiler(
+                input=str(template),
+                font_paths=[str(typeface_files()[0].parent)],
+                ignore_system_fonts=True,
+                sys_inputs={"report": document},
+            )
+            return compiler.compile(**options)
+        except typst.TypstError as error:
+            said = " ".join(str(error).split())[:200]
+            raise WriteError(
+                "the report cannot be typeset ({said}). Report this with the runs", said=said
+            ) from None
 
 
 def printable(text: str) -> str:
@@ -52,24 +61,6 @@ def printable(text: str) -> str:
         for sign in text.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
     )
     return _LONG_WORD.sub(lambda word: word[0] + _BREAK, shown)
-
-
-@contextmanager
-def _compiler(report: Report) -> Iterator[typst.Compiler]:
-    document = msgspec.json.encode(_printable(msgspec.to_builtins(report))).decode()
-    with as_file(files("app.reports.test_report") / "template.typ") as template:
-        try:
-            yield typst.Compiler(
-                input=str(template),
-                font_paths=[str(typeface_files()[0].parent)],
-                ignore_system_fonts=True,
-                sys_inputs={"report": document},
-            )
-        except typst.TypstError as error:
-            said = " ".join(str(error).split())[:200]
-            raise WriteError(
-                "the report cannot be typeset ({said}). Report this with the runs", said=said
-            ) from None
 
 
 def _printable(value: Any, key: str = "") -> Any:

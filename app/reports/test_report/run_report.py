@@ -19,7 +19,6 @@ from analysis.formatting import format_interval, format_uncertainty, typeset
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
-from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style
 from app.reports.test_report import shared
 from app.reports.test_report.blocks import (
@@ -40,13 +39,7 @@ from app.runs.metadata import Conditions, RunMetadata
 from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
-_BUDGETED: Final = (
-    "friction_dynamic",
-    "friction_static",
-    "period_s",
-    "damping_n1_per_s",
-    "stiffness_n_per_m",
-)
+_BUDGETED: Final = "friction_dynamic", "friction_static", "period_s", "damping_n1_per_s", "stiffness_n_per_m"
 _HEADLINES: Final = ("friction_dynamic", "friction_static_lower", "period_s")
 _FIGURES: Final = ("3b", "4b", "5a", "5b")
 _ENDINGS: Final = {
@@ -69,13 +62,13 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Conditions", [_conditions(run.metadata)]),
         shared.stand_section([run.metadata.stand]),
         shared.gauges_section([run.metadata.gauges]),
-        shared.procedure(),
+        shared.PROCEDURE,
         Section("Results", list(_results(found))),
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
         Section("Warnings", [Points(warnings) if warnings else Text("None.")]),
         Section("Data", [*shared.fingerprint_columns([print_of_file]), shared.without_empty(columns)]),
-        shared.signatures(),
+        shared.SIGNATURES,
     ]
 
 
@@ -98,10 +91,9 @@ def _result(found: Identification) -> Iterator[Block]:
     row, quantity = definition(key), found.results[key]
     symbol, value = Symbol(row.symbol.markup), row.format(quantity, Place.REPORT).in_print
     if found.model is None:
-        relation = row.symbol.relation
-        text = (
-            "The plate did not slip: f_s is at least so large." if relation else "No friction law was fitted."
-        )
+        relation, text = row.symbol.relation, "No friction law was fitted."
+        if relation:
+            text = "The plate did not slip: f_s is at least so large."
         yield Conclusion(symbol, value, text, "warn", relation or "=")
         return
     residual, noise = (
@@ -126,7 +118,7 @@ def _test(analysis: Analysis) -> Facts:
         ("title", metadata.title),
         ("series", metadata.series or "none"),
         ("contact", metadata.contact),
-        ("begun", shared.format_time(metadata.start_time)),
+        ("begun", metadata.start_time.strftime("%Y-%m-%d %H:%M:%S %z")),
         ("operator", metadata.operator),
         ("nominal pullback", shared.in_unit(metadata.pullback_m, MILLIMETRE, 2)),
         ("table mass m1", f"{metadata.table_mass_kg:g} {KILOGRAM.symbol}"),
@@ -154,16 +146,14 @@ def _samples(losses: Losses) -> str:
 
 def _conditions(metadata: RunMetadata) -> Facts:
     conditions: Conditions = metadata.conditions
+    number = conditions.run_in_number
     rows = [
         ("temperature", shared.in_unit(conditions.temperature_c, Unit("°C"), 1)),
         ("humidity", shared.in_unit(conditions.humidity_percent, Unit("%"), 0)),
         ("plate", conditions.plate_id),
         ("surfaces", conditions.contact_id),
         ("surface preparation", conditions.surface_preparation),
-        (
-            "pullback number on these surfaces",
-            "" if conditions.run_in_number is None else str(conditions.run_in_number),
-        ),
+        ("pullback number on these surfaces", "" if number is None else str(number)),
         *conditions.other.items(),
     ]
     stated = shared.without_empty(rows)
@@ -184,15 +174,10 @@ def _results(found: Identification) -> Iterator[Block]:
     header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
     yield Grid(header, rows, numbers=4)
     if found.model is not None and found.model.tried:
-        laws: list[list[Cell]] = [
-            [
-                law.name,
-                f"{law.friction_dynamic:.6f}",
-                typeset(f"{law.bic:.1f}"),
-                MICROMETRE.number(law.residual_rms_m, 2),
-            ]
-            for law in found.model.tried
-        ]
+        laws: list[list[Cell]] = []
+        for law in found.model.tried:
+            friction, bic = f"{law.friction_dynamic:.6f}", typeset(f"{law.bic:.1f}")
+            laws.append([law.name, friction, bic, MICROMETRE.number(law.residual_rms_m, 2)])
         heads: list[Cell] = ["friction law", Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
         yield Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
 
@@ -213,30 +198,24 @@ def _budget(found: Identification) -> Iterator[Block]:
         yield Text("No result has an uncertainty budget.")
         return
     heads = [Symbol(row.symbol.markup, row.unit_at(Place.REPORT).symbol) for row in rows]
-    body: list[list[Cell]] = [
-        [
-            source,
-            "A" if source == str(BudgetSource.NOISE) else "B",
-            *(_share(shares.get((source, row.name)), row) for row in rows),
-        ]
-        for source in sources
-    ]
-    total: list[Cell] = ["together", ""]
-    total += [_share(found.results[row.name].standard_uncertainty, row) for row in rows]
+    body: list[list[Cell]] = []
+    for source in sources:
+        kind = "A" if source == str(BudgetSource.NOISE) else "B"
+        body.append([source, kind, *(_share(shares.get((source, row.name)), row) for row in rows)])
+    total = [_share(found.results[row.name].standard_uncertainty, row) for row in rows]
+    body.append(["together", "", *total])
     note = "Standard uncertainty by source; A: from statistics, B: from stated values. Empty: none."
-    yield Grid(["source", "type", *heads], [*body, total], numbers=len(shown), note=note)
+    yield Grid(["source", "type", *heads], body, numbers=len(shown), note=note)
 
 
 def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
     """Sources of the results shown, sorted by their contribution to the first result, then to the others."""
-    found: dict[str, None] = {}
-    for key in shown:
-        lines = [line for line in budget if line.contribution_to == key]
-        lines.sort(
-            key=lambda line: math.inf if math.isnan(line.standard_uncertainty) else line.standard_uncertainty
-        )
-        found |= dict.fromkeys(str(line.source) for line in reversed(lines))
-    return list(found)
+    sources: dict[str, None] = {}
+    for name in shown:
+        lines = [line for line in budget if line.contribution_to == name]
+        lines.sort(key=lambda line: (math.isnan(line.standard_uncertainty), line.standard_uncertainty))
+        sources |= dict.fromkeys(str(line.source) for line in reversed(lines))
+    return list(sources)
 
 
 def _share(deviation: float | None, row: QuantityDefinition) -> str:
@@ -248,10 +227,8 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
 
 
 def _figures(analysis: Analysis) -> list[Block]:
-    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
     with print_style():
         whole = shared.drawing(record_figure(analysis.record, analysis.identification), caption)
-        made = [(one.render(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
-        items = [shared.drawing(figure, said) for figure, said in made if figure is not None]
+        items = shared.run_drawings(analysis, _FIGURES)
     return [whole, Drawings(items)] if items else [whole]

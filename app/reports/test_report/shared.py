@@ -1,6 +1,5 @@
 """Sections that the reports of a run and of a campaign share."""
 
-import datetime
 from collections.abc import Sequence
 from typing import Final
 
@@ -8,33 +7,40 @@ from matplotlib.figure import Figure
 
 from analysis.catalogue import ACCELERATION, KILOGRAM, MICROMETRE, MILLIMETRE, Unit
 from analysis.formatting import NO_BREAK_SPACE, format_compact, format_value, format_with_prefix, typeset
+from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS
+from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import figure_svg
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
+from app.runs.analyze import Analysis
 from app.runs.reader import Fingerprint
 from config.schema import Gauge, Gauges, Stand
 
-ROLES: Final = ("Tested by", "Checked by", "Approved by")
 NOT_STATED = "not stated"
 
-_PROCEDURE: Final = (
-    "The table is pulled back from rest, held, and released without a push. Gauge 1 measures the table"
-    " against the fixed base, gauge 2 the upper plate. Both are recorded from the hold until the table is"
-    " at rest, or until waiting no longer narrows the results.",
-    "Both records are compared with the exact motion of two masses with dry friction between them: period and"
-    " damping come from the decay after the last slip; f_d, stiffness, damping, pullback, release and zeros"
-    " are fitted together to all readings by least squares. The friction laws (f_s = f_d or f_s above f_d,"
-    " plane level or tilted, and friction that falls with speed where none of these is adequate) are compared"
-    " by their likelihood (BIC), and the chosen one is tested by itself: its residuals must be those of the"
-    " gauges' noise.",
-    "Uncertainties are standard uncertainties (coverage factor 1) by the law of propagation of JCGM 100: the"
-    " noise of the readings as the residuals show it, and every stated uncertainty of calibration, masses,"
-    " gravity, time base and levelling. Intervals are those of 95 % coverage.",
+SIGNATURES: Final = Section("Signatures", [Signatures(["Tested by", "Checked by", "Approved by"])])
+PROCEDURE: Final = Section(
+    "Procedure",
+    [
+        Text(
+            "The table is pulled back from rest, held, and released without a push. Gauge 1 measures the"
+            " table against the fixed base, gauge 2 the upper plate. Both are recorded from the hold until"
+            " the table is at rest, or until waiting no longer narrows the results."
+        ),
+        Text(
+            "Both records are compared with the exact motion of two masses with dry friction between them:"
+            " period and damping come from the decay after the last slip; f_d, stiffness, damping, pullback,"
+            " release and zeros are fitted together to all readings by least squares. The friction laws"
+            f" ({', '.join(law.name for law in COMPARED_LAWS)}, and where none of these is adequate"
+            f" {', '.join(law.name for law in FALLBACK_LAWS)}) are compared by their likelihood (BIC), and"
+            " the chosen one is tested by itself: its residuals must be those of the gauges' noise."
+        ),
+        Text(
+            "Uncertainties are standard uncertainties (coverage factor 1) by the law of propagation of"
+            " JCGM 100: the noise of the readings as the residuals show it, and every stated uncertainty of"
+            " calibration, masses, gravity, time base and levelling. Intervals are those of 95 % coverage."
+        ),
+    ],
 )
-
-
-def procedure() -> Section:
-    """Procedure of test and evaluation."""
-    return Section("Procedure", [Text(paragraph) for paragraph in _PROCEDURE])
 
 
 def stand_section(stands: Sequence[Stand]) -> Section:
@@ -63,19 +69,16 @@ def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
     return [Text(note), Grid(["file", "bytes", "SHA-256"], rows, small=True)]
 
 
-def signatures() -> Section:
-    """Fields for signatures."""
-    return Section("Signatures", [Signatures(list(ROLES))])
-
-
 def drawing(figure: Figure, caption: str) -> Drawing:
     """A figure drawn in `print_style`, as a block."""
     return Drawing(figure_svg(figure), caption)
 
 
-def format_time(at: datetime.datetime) -> str:
-    """Format a time in its own zone."""
-    return at.strftime("%Y-%m-%d %H:%M:%S %z")
+def run_drawings(analysis: Analysis, numbers: Sequence[str], prefix: str = "") -> list[Drawing]:
+    """The figures of a run with these numbers, drawn in `print_style`, that it has something to show in."""
+    run = RunFigureData.from_identification(analysis.record, analysis.identification)
+    made = [(one.render(run), prefix + one.caption) for one in RUN_FIGURES if one.number in numbers]
+    return [drawing(figure, caption) for figure, caption in made if figure is not None]
 
 
 def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:

@@ -24,7 +24,7 @@ from app.reports.test_report.blocks import (
     Text,
 )
 from app.reports.test_report.build import ReportHead, build_report
-from app.reports.test_report.render import printable, render_pages, render_pdf, write_report
+from app.reports.test_report.render import printable, render_pdf, typeset_report, write_report
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.runs.errors import RunExistsError
@@ -61,6 +61,10 @@ def of_run(folder):
 @pytest.fixture(scope="module")
 def of_campaign(folder):
     return made(folder, excluded={str(folder / "b.h5"): "gauge 2 was touched"})
+
+
+def render_pages(report, dots_per_inch):
+    return typeset_report(report, format="png", ppi=dots_per_inch)
 
 
 def part(report, title):

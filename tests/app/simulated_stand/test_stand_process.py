@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.signal import StandSignal
-from app.simulated_stand.truth import Truth, read_truth
+from app.simulated_stand.truth import Truth
 from config.files import load_gauges
 from config.schema import Gauges
 from drivers.devices.slipstand_binary.codec import FrameDecoder
@@ -185,7 +186,7 @@ def test_the_truth_can_be_read_where_it_was_wanted(tmp_path):
     with SimulatedStand.start(options) as stand:
         assert stand.truth().stand.friction_dynamic == 0.15
         listen(stand.port, 0.8, 2000.0)
-    truth = read_truth(path)
+    truth = msgspec.json.decode(path.read_bytes(), type=Truth)
     assert truth == stand.truth()
     assert truth.port == stand.port
     assert truth.options == options

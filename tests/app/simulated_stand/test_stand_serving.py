@@ -5,9 +5,11 @@ import subprocess
 import sys
 import time
 
+import msgspec
+
 import app.simulated_stand.process as stand_process
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import read_truth
+from app.simulated_stand.truth import Truth
 
 
 def announced(**options) -> str:
@@ -39,12 +41,15 @@ def test_the_command_line_takes_faults_as_options_and_as_lines(tmp_path):
         process.stdin.flush()
         refusal = process.stderr.readline()
         deadline = time.monotonic() + 30.0
-        while not (truth.exists() and read_truth(truth).disturbances) and time.monotonic() < deadline:
+        while (
+            not (truth.exists() and msgspec.json.decode(truth.read_bytes(), type=Truth).disturbances)
+            and time.monotonic() < deadline
+        ):
             time.sleep(0.02)
         process.terminate()
         process.communicate()
     assert refusal.startswith("error: 'explode' is no fault")
-    told = read_truth(truth)
+    told = msgspec.json.decode(truth.read_bytes(), type=Truth)
     assert [(one.kind, one.at_s) for one in told.disturbances] == [("unplug", 9.0)]  # before any session
     assert told.options.disturbances == ("stall 1 at 5", "jump -2 at 6")
 
