@@ -13,7 +13,6 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 Floats = NDArray[np.float64]
 NO_EVENTS = Events()
 AnalysisKind = Literal["two-mass", "one-mass"]
-"""Number of masses in the model."""
 
 AUTO_MODEL = "auto"
 
@@ -64,14 +63,11 @@ class Objective:
     interval_95: tuple[float, float]
 
     def residual_at(self, friction: float) -> float:
-        """Residual at any f_d, by linear interpolation."""
         return float(np.interp(friction, self.friction, self.residual_m))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AnalysedRun:
-    """A stored run and its identification."""
-
     path: Path
     time_s: Floats
     """In the base of the record, as are `events`."""
@@ -93,4 +89,3 @@ class AnalysedRun:
     kind: AnalysisKind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
-    """As stored with the run."""

@@ -1,7 +1,6 @@
 """Tasks of the window's analysis process: identify a run, and recover unfinished runs."""
 
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -26,16 +25,13 @@ _PER_PERIOD = 60
 _BEFORE_RELEASE_S = 0.2
 
 
-class _AnalysisCache:
-    """Analyses of the last run: a handle that is dragged asks for one many times a second."""
-
-    path: ClassVar = ""
-    analyses: ClassVar[dict[AnalysisTask, Analysis]] = {}
+_analyses: dict[AnalysisTask, Analysis] = {}
+"""Analyses of the last run: a handle that is dragged asks for one many times a second."""
 
 
 def analyse_run(path: str, report: ReportProgress) -> AnalysedRun:
     """Read and identify a run. Raises RunError, AnalysisError."""
-    _AnalysisCache.path = ""  # the file may have changed
+    _analyses.clear()  # the file may have changed
     return run_analysis(AnalysisTask(path), report)
 
 
@@ -67,14 +63,14 @@ def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
 
 def cached_analysis(task: AnalysisTask, report: ReportProgress) -> Analysis:
     """Analysis of a run, from the cache if it is there. Raises RunError, AnalysisError."""
-    if _AnalysisCache.path != task.path:
-        _AnalysisCache.path, _AnalysisCache.analyses = task.path, {}
-    if task not in _AnalysisCache.analyses:
+    if any(analysed.path != task.path for analysed in _analyses):
+        _analyses.clear()
+    if task not in _analyses:
         request = AnalysisRequest(model=task.model, kind=task.kind, classical=False)
-        _AnalysisCache.analyses[task] = analyze_run(
+        _analyses[task] = analyze_run(
             Path(task.path), request, progress=lambda share, what: report(Progress(sentence(what), share))
         )
-    return _AnalysisCache.analyses[task]
+    return _analyses[task]
 
 
 def warm_up() -> None:

@@ -69,8 +69,6 @@ class Tone(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Chip:
-    """Short text with a tone and a tool tip."""
-
     text: str
     tone: Tone = Tone.PLAIN
     hint: str = ""
@@ -81,8 +79,6 @@ EMPTY_CHIP = Chip("")
 
 @dataclass(frozen=True, slots=True)
 class LabelledValue:
-    """A row of a table: a label, and a value with its unit."""
-
     label: str
     value: str
 
@@ -134,5 +130,4 @@ def batch_progress(
 
 
 def run_count_text(paths: Sequence[str]) -> str:
-    """Name of a single run, or the number of runs."""
     return Path(paths[0]).stem if len(paths) == 1 else ngettext("{count} run", "{count} runs", len(paths))

@@ -17,15 +17,7 @@ from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from config.files import (
-    load_gauges,
-    load_settings,
-    load_stand,
-    published_table,
-    save_settings,
-    settings_file,
-    settings_path,
-)
+from config import files
 from config.schema import ConfigError, Settings
 from drivers.registry import DRIVERS
 from messages.i18n import N_
@@ -35,17 +27,17 @@ def read_personal() -> PersonalSettings:
     """Read the person's settings; defaults with the reason where they cannot be read."""
     settings, fault = Settings(), ""
     try:
-        settings = load_settings()
+        settings = files.load_settings()
     except ConfigError as error:
         fault = str(error)
     recordings = recordings_directory(settings)
-    files = (
-        SettingsFile(N_("These settings"), str(settings_path())),
-        SettingsFile(N_("Stand"), str(settings_file("stand.toml"))),
-        SettingsFile(N_("Gauges"), str(settings_file("gauges.toml"))),
+    shown = (
+        SettingsFile(N_("These settings"), str(files.settings_path())),
+        SettingsFile(N_("Stand"), str(files.settings_file("stand.toml"))),
+        SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return PersonalSettings(settings, fault, str(recordings), overridden, files, _save)
+    return PersonalSettings(settings, fault, str(recordings), overridden, shown, _save)
 
 
 def make_window_presenter(
@@ -60,7 +52,7 @@ def make_window_presenter(
     simulation = simulation or SimulatedStandOptions()
     personal = personal or read_personal()
     errors = errors or ErrorReporter()
-    stand, gauges = load_stand(), load_gauges()
+    stand, gauges = files.load_stand(), files.load_gauges()
     context = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
         Connection(start_engine, SimulatedStand.start, errors.report),
@@ -79,7 +71,7 @@ def make_window_presenter(
 
 
 def _save(settings: Settings) -> Path | None:
-    return save_settings(settings, datetime.datetime.now().astimezone().date())
+    return files.save_settings(settings, datetime.datetime.now().astimezone().date())
 
 
 def _list_ports() -> tuple[PortChoice, ...]:
@@ -100,7 +92,7 @@ def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> St
         for entry in DRIVERS.values()
         if entry.available
     )
-    all_series, folder = tuple(published_table()), str(context.directory)
+    all_series, folder = tuple(files.published_table()), str(context.directory)
     return StartState(all_series, simulation.series, protocols, form=form, recordings=folder)
 
 
@@ -109,5 +101,5 @@ def start_engine(port: PortSettings) -> EngineClient:
 
     It takes the settings that are in use now: a calibration may have been made meanwhile.
     """
-    stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
+    stand, gauges = (str(files.settings_file(name)) for name in ("stand.toml", "gauges.toml"))
     return EngineClient.start(port, stand, gauges, low_latency=True)

@@ -57,16 +57,13 @@ class Connection:
         return self._opening is not None or self._opened is not None
 
     def open_port(self, port: PortSettings) -> None:
-        """Replace the connection by one to a port, in the background."""
         self._open(lambda: _Opened(self._start_engine(port)))
 
     @property
     def stand(self) -> SimulatedStand | None:
-        """Simulated stand that is connected; None without one."""
         return None if self._opened is None else self._opened.stand
 
     def open_simulated(self, options: SimulatedStandOptions) -> None:
-        """Start a simulated stand in the background and connect to it."""
         self._open(lambda: self._simulate(options))
 
     def poll(self) -> list[Event | SimulationStarted]:
@@ -79,7 +76,6 @@ class Connection:
         return events
 
     def send(self, command: Command) -> None:
-        """Send a command to the engine, if one is connected."""
         if self._opened is not None:
             self._opened.engine.send(command)
 
@@ -92,7 +88,6 @@ class Connection:
         return rows
 
     def add_row_listener(self, listener: Callable[[RingRows], None]) -> None:
-        """Call `listener` with the samples of each `new_rows`."""
         self._listeners.append(listener)
 
     def disconnect(self) -> None:
@@ -158,7 +153,6 @@ class Connection:
             raise
 
     def _take_opened(self) -> list[Event | SimulationStarted]:
-        """Take a connection that was opened in the background."""
         if self._opening is None or not self._opening.done():
             return []
         opening, self._opening = self._opening, None

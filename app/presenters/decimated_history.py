@@ -17,7 +17,6 @@ class Polyline:
 
     time_s: NDArray[np.float64]
     value: NDArray[np.float64]
-    """In the unit that was put in; NaN breaks the line."""
 
     @classmethod
     def empty(cls) -> "Polyline":
@@ -69,7 +68,6 @@ class _Level:
         self.end += len(time_s)
 
     def spans(self, first: int, end: int) -> _Spans:
-        """Spans by number, as far as they are kept."""
         kept = slice(max(first - self.first, 0), max(end - self.first, 0))
         return self._time_s[kept], self._low[kept], self._high[kept]
 

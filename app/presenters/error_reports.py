@@ -47,11 +47,9 @@ class ErrorReporter:
         self._waiting.append(report)
 
     def next_report(self) -> ErrorReport | None:
-        """Remove and return the oldest report; None without any."""
         return self._waiting.popleft() if self._waiting else None
 
     def install_hooks(self) -> None:
-        """Report uncaught exceptions of slots and threads from now on."""
         sys.excepthook = self._on_uncaught
         threading.excepthook = lambda args: self._on_uncaught(
             args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback

@@ -11,24 +11,18 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True, slots=True)
 class TaskFailure:
-    """Why a task has failed."""
-
     message: Message
     is_cancelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class TaskDone(Generic[Answer]):
-    """A task has returned `answer`."""
-
     argument: Any
     answer: Answer
 
 
 @dataclass(frozen=True, slots=True)
 class TaskFailed:
-    """A task has failed, or was cancelled."""
-
     argument: Any
     message: Message
     is_cancelled: bool = False
@@ -36,8 +30,6 @@ class TaskFailed:
 
 @dataclass(frozen=True, slots=True)
 class TaskProgress:
-    """A task has reported progress."""
-
     argument: Any
     progress: Progress
 

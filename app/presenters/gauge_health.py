@@ -17,8 +17,6 @@ GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
 @dataclass(frozen=True, slots=True)
 class SymptomText:
-    """A symptom in the language of the window."""
-
     code: str
     grade: HealthGrade
     message: str
@@ -27,8 +25,6 @@ class SymptomText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GaugeHealthState:
-    """Health of one gauge as shown."""
-
     name: str
     verdict: HealthGrade
     symptoms: tuple[SymptomText, ...]
@@ -41,7 +37,6 @@ class GaugeHealthState:
 
 
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
-    """Describe the health of a gauge: figures and symptoms."""
     symptoms = diagnose(health)
     return GaugeHealthState(
         name,

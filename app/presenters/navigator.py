@@ -24,7 +24,6 @@ class StandContext:
     today: Callable[[], datetime.date] = datetime.date.today
     """Current date, for the validity of calibrations."""
     clock: Callable[[], float] = time.monotonic
-    """Monotonic time (s)."""
 
     def pullback_m(self, series: str) -> float:
         return self.stand.series(series).pullback_m
@@ -38,8 +37,6 @@ class StandContext:
 
 @dataclass(frozen=True, slots=True)
 class ConnectForm:
-    """Form of the Start screen, as typed."""
-
     port: str = ""
     protocol: str = ""
     baud: str = ""

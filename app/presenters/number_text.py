@@ -3,7 +3,7 @@
 import math
 
 from analysis import formatting
-from analysis.catalogue import MILLIMETRE, Unit
+from analysis.catalogue import Unit
 from analysis.formatting import MINUS, format_value, typeset, with_unit
 from analysis.quantities import Quantity
 from messages.message import MessageError
@@ -39,15 +39,10 @@ def parse_field(text: str, name: str, scale: float = 1.0) -> float | None:
     return None if value is None else value / scale
 
 
-def format_uncertain(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
-    """Write value and uncertainty to the same digit, multiplied by `scale`."""
-    formatted = format_value(quantity.value * scale, quantity.standard_uncertainty * scale)
+def format_uncertain(quantity: Quantity) -> tuple[str, str]:
+    """Write value and uncertainty to the same digit."""
+    formatted = format_value(quantity.value, quantity.standard_uncertainty)
     return typeset(formatted.value), formatted.uncertainty
-
-
-def format_millimetres(value_m: float, decimals: int = 1) -> str:
-    """Write a length (m) in millimetres, without unit; a dash for NaN."""
-    return typeset(MILLIMETRE.number(value_m, decimals))
 
 
 def format_in(unit: Unit, value: float, decimals: int = 1) -> str:

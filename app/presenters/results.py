@@ -118,14 +118,12 @@ def failed_result(message: Message | str, path: str, ended: str) -> Result:
 
 
 def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
-    """Every quantity that was found, f_d first, in the order of the paper."""
     rows = _rows(run, _ALL)
     degree = run.labels.get("msk64_degree")
     return (*rows, ResultRow("", gettext("MSK-64 degree"), str(degree))) if degree else rows
 
 
 def make_row(row: QuantityDefinition, quantity: Quantity) -> ResultRow:
-    """One quantity with symbol, description, value and unit."""
     shown = row.format(quantity, Place.WINDOW)
     return ResultRow(
         row.symbol.html, gettext(row.description), typeset(shown.value), shown.uncertainty, shown.unit
@@ -133,7 +131,6 @@ def make_row(row: QuantityDefinition, quantity: Quantity) -> ResultRow:
 
 
 def model_status(model: ModelSelection | None) -> Chip:
-    """Say whether the model explains the record."""
     if model is None:
         return Chip(gettext("No motion to fit"), Tone.WARN)
     if model.adequate:
@@ -150,7 +147,6 @@ def model_status(model: ModelSelection | None) -> Chip:
 
 
 def end_status(reason: str) -> Chip:
-    """Say why a recording ended; empty for a run that was not recorded here."""
     known = _ENDINGS.get(reason)
     if known is None:
         return Chip(gettext("Ended: {reason}", reason=reason) if reason else "")

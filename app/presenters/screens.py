@@ -13,7 +13,6 @@ class Screen(StrEnum):
     """
 
     label: str
-    """Title in the side bar."""
     icon: str
     """Phosphor name."""
 

@@ -11,53 +11,45 @@ from config.schema import ConfigError, Settings
 from messages.i18n import N_, gettext
 from messages.message import message_of
 
-THEMES = {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")}
-LANGUAGES = {"system": N_("As the system"), "en": "English", "ru": "Русский"}
-LOG_LEVELS = {
-    "error": N_("Errors only"),
-    "warning": N_("Errors and warnings"),
-    "info": N_("Usual"),
-    "debug": N_("Everything"),
+CHOICES: dict[str, dict[Any, str]] = {
+    "theme": {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")},
+    "language": {"system": N_("As the system"), "en": "English", "ru": "Русский"},
+    "scale": {scale: f"{scale:.0%}" for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
+    "log_level": {
+        "error": N_("Errors only"),
+        "warning": N_("Errors and warnings"),
+        "info": N_("Usual"),
+        "debug": N_("Everything"),
+    },
 }
-SCALES = (1.0, 1.25, 1.5, 1.75, 2.0)
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsFile:
-    """A settings file, and a label of its content."""
-
-    name: str
-    path: str
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsState:
-    """State of the screen; folder, override and files as in `PersonalSettings`."""
-
-    settings: Settings = field(default_factory=Settings)
-    recordings: str = ""
-    override: str = ""
-    files: tuple[SettingsFile, ...] = ()
-    needs_restart: bool = False
-    """A change takes effect after a restart."""
-    can_undo: bool = False
-    message: Chip = EMPTY_CHIP
-    """Fault of the last change."""
-
-
+"""Values of settings and their titles."""
 _AT_START = ("language", "scale", "recordings", "log_level")
 """Settings that take effect after a restart."""
 
 
 @dataclass(frozen=True, slots=True)
+class SettingsState:
+    settings: Settings = field(default_factory=Settings)
+    needs_restart: bool = False
+    can_undo: bool = False
+    message: Chip = EMPTY_CHIP
+    """Fault of the last change."""
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsFile:
+    name: str
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
 class PersonalSettings:
-    """Personal settings at the start of the window."""
+    """Personal settings at the start of the window, and where runs and settings are."""
 
     settings: Settings = field(default_factory=Settings)
     fault: str = ""
     """Why the defaults are used; empty if the settings were read."""
     recordings: str = ""
-    """Folder of the runs that is in use."""
     override: str = ""
     """Environment variable that overrides the folder; empty if none does."""
     files: tuple[SettingsFile, ...] = ()
@@ -69,11 +61,8 @@ class SettingsPresenter(Presenter[SettingsState]):
     """Changes personal settings; `apply` applies new ones to the window."""
 
     def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
-        super().__init__(
-            SettingsState(personal.settings, personal.recordings, personal.override, personal.files)
-        )
-        self._at_start = personal.settings
-        self._save_settings = personal.save
+        super().__init__(SettingsState(personal.settings))
+        self.personal = personal
         self._apply = apply
         self._before: list[Settings] = []
 
@@ -96,7 +85,7 @@ class SettingsPresenter(Presenter[SettingsState]):
             self._apply_settings(self._before.pop())
 
     def _apply_settings(self, settings: Settings) -> None:
-        waits = any(getattr(settings, name) != getattr(self._at_start, name) for name in _AT_START)
+        waits = any(getattr(settings, name) != getattr(self.personal.settings, name) for name in _AT_START)
         self._update(
             settings=settings, needs_restart=waits, can_undo=bool(self._before), message=self._save(settings)
         )
@@ -104,7 +93,7 @@ class SettingsPresenter(Presenter[SettingsState]):
 
     def _save(self, settings: Settings) -> Chip:
         try:
-            backup = self._save_settings(settings)
+            backup = self.personal.save(settings)
         except ConfigError as error:
             return Chip(sentence(error.message), Tone.BAD)
         if backup is None:

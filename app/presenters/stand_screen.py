@@ -16,7 +16,7 @@ from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptio
 from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 from messages.message import message_of
 
 
@@ -33,6 +33,17 @@ class StandForm:
     flip_percent: str = ""
 
 
+_FIELDS: Final = {
+    "friction": ("friction", N_("Friction"), 1.0),
+    "tilt_mrad": ("tilt_rad", N_("Tilt"), 1e3),
+    "noise_um": ("noise_m", N_("Noise"), 1e6),
+    "rate_hz": ("rate_hz", N_("Rate"), 1.0),
+    "drop_percent": ("drop", N_("Frames that lose a byte"), 100.0),
+    "flip_percent": ("flip", N_("Frames with a wrong bit"), 100.0),
+}
+"""Option of the stand, title in messages, and units per unit of the option, of each field of `StandForm`."""
+
+
 @dataclass(frozen=True, slots=True)
 class StandState:
     all_series: tuple[str, ...]
@@ -40,12 +51,9 @@ class StandState:
     defaults: StandForm
     is_running: bool = False
     fault_duration_s: str = "2"
-    """Duration of the next fault, as typed."""
     truth: tuple[LabelledValue, ...] = ()
     disturbances: tuple[str, ...] = ()
-    """Injected faults, the newest first."""
     message: Chip = EMPTY_CHIP
-    """What is wrong with the last input."""
 
 
 _MAX_LISTED: Final = 8
@@ -121,20 +129,15 @@ class StandPresenter(Presenter[StandState]):
 
 def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """Options of a form. Raises ValueError that names field, value and remedy."""
-    wanted = {
-        "friction": parse_field(form.friction, gettext("Friction")),
-        "tilt_rad": parse_field(form.tilt_mrad, gettext("Tilt"), 1e3),
-        "noise_m": parse_field(form.noise_um, gettext("Noise"), 1e6),
-        "rate_hz": parse_field(form.rate_hz, gettext("Rate")),
-        "drop": parse_field(form.drop_percent, gettext("Frames that lose a byte"), 100.0),
-        "flip": parse_field(form.flip_percent, gettext("Frames with a wrong bit"), 100.0),
-    }
-    filled = {name: value for name, value in wanted.items() if value is not None}
+    filled = {}
+    for name, (option, title, scale) in _FIELDS.items():
+        value = parse_field(getattr(form, name), gettext(title), scale)
+        if value is not None:
+            filled[option] = value
     return msgspec.structs.replace(base, series=form.series, **filled)
 
 
 def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
-    """True parameters of a stand, and counts of its transmission."""
     stand, wire = truth.stand, truth.wire
     releases = str(len(truth.release_s))
     if truth.release_s:
@@ -168,15 +171,8 @@ def _happened(truth: Truth) -> tuple[str, ...]:
 
 
 def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
-    friction = options.friction
-    if friction is None:
-        friction = published_row(form.series).friction_dynamic
-    return StandForm(
-        form.series,
-        f"{friction:g}",
-        f"{options.tilt_rad * 1e3:g}",
-        f"{options.noise_m * 1e6:g}",
-        f"{options.rate_hz:g}",
-        f"{options.drop * 100:g}",
-        f"{options.flip * 100:g}",
-    )
+    values = {name: getattr(options, option) for name, (option, _, _) in _FIELDS.items()}
+    if options.friction is None:
+        values["friction"] = published_row(form.series).friction_dynamic
+    texts = {name: f"{value * _FIELDS[name][2]:g}" for name, value in values.items()}
+    return StandForm(form.series, **texts)

@@ -19,13 +19,10 @@ class PortChoice:
 
 @dataclass(frozen=True, slots=True)
 class ProtocolChoice:
-    """A protocol that devices speak."""
-
     name: str
     title: str
     default_baud: int | None = None
     verified: str = ""
-    """How it was verified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +78,6 @@ class StartPresenter(Presenter[StartState]):
         else:
             self.navigator.open_port(port)
 
-    def open_run(self, path: str) -> None:
-        if path:
-            self.navigator.open_run(path)
-
     def set_busy(self, what: str) -> None:
         self._update(busy=what)
 
@@ -119,15 +112,6 @@ def _settings(text: str) -> dict[str, str]:
     return settings
 
 
-def _whole(text: str, name: str) -> int | None:
-    value = _positive(text, name)
-    if value is not None and value != int(value):
-        raise FormError(
-            "{name} {text!r} is not a whole number: write one, or leave it empty", name=name, text=text
-        )
-    return None if value is None else int(value)
-
-
 def _positive(text: str, name: str) -> float | None:
     value = parse_number(text)
     if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -135,3 +119,12 @@ def _positive(text: str, name: str) -> float | None:
             "{name} {text!r} is not a number above 0: write one, or leave it empty", name=name, text=text
         )
     return value
+
+
+def _whole(text: str, name: str) -> int | None:
+    value = _positive(text, name)
+    if value is not None and value != int(value):
+        raise FormError(
+            "{name} {text!r} is not a whole number: write one, or leave it empty", name=name, text=text
+        )
+    return None if value is None else int(value)

@@ -73,7 +73,6 @@ class WorkerPool:
         self._idle: list[_TaskProcess] = []
 
     def make_worker(self) -> "Worker":
-        """Make a worker that shares the processes; close it before the pool."""
         return Worker(self._report_error, self)
 
     def acquire(self) -> "_TaskProcess":
@@ -295,12 +294,10 @@ class _TaskProcess:
         return received
 
     def abort(self) -> None:
-        """End the process at once, with the processes that it has started."""
         self._drop_lifeline()
         self.detach()
 
     def detach(self) -> None:
-        """Let the process exit when its task has ended."""
         self._pipe.close()
         self._end_s = time.monotonic() + _END_S
 

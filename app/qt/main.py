@@ -77,7 +77,6 @@ def _load_layout(errors: ErrorReporter) -> WindowLayout:
 
 
 def _save_layout(layout: WindowLayout, errors: ErrorReporter) -> None:
-    """Save the layout of the window; an error is reported when the window has closed."""
     try:
         save_window_layout(layout, datetime.datetime.now().astimezone().date())
     except ConfigError as error:

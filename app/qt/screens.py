@@ -1,7 +1,6 @@
 """Factory of screens. A screen in a folder is imported when it is first shown: its plots load pyqtgraph."""
 
 import importlib
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from PySide6.QtWidgets import QWidget
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def build_screen(screen: Screen, window: WindowPresenter, theme: Theme, dialogs: "MainWindow") -> QWidget:
-    """Build the view of a screen, attached to its presenter."""
     presenter = window.presenters[screen]
+    more = {Screen.RECORD: window.show_start, Screen.IDENTIFY: dialogs.ask_for_run, Screen.RUNS: dialogs}
     view: Any
     match screen:
         case Screen.START:
@@ -28,21 +27,9 @@ def build_screen(screen: Screen, window: WindowPresenter, theme: Theme, dialogs:
             view = StandScreen(window.stand)
         case Screen.SETTINGS:
             view = SettingsScreen(window.settings)
-        case Screen.RECORD:
-            view = _view_class(screen)(theme, presenter, window.show_start)
-        case Screen.IDENTIFY:
-            view = _view_class(screen)(theme, presenter, dialogs.ask_for_run)
-        case Screen.RUNS:
-            view = _view_class(screen)(theme, presenter, dialogs)
         case _:
-            view = _view_class(screen)(theme, presenter)
+            module = importlib.import_module(f"app.qt.{screen}.screen")
+            needed = (more[screen],) if screen in more else ()
+            view = getattr(module, f"{screen.capitalize()}Screen")(theme, presenter, *needed)
     presenter.attach(view)
     return cast(QWidget, view)
-
-
-def _view_class(screen: Screen) -> Callable[..., QWidget]:
-    """Class `<Name>Screen` of `app.qt.<name>.screen`."""
-    view: Callable[..., QWidget] = getattr(
-        importlib.import_module(f"app.qt.{screen}.screen"), f"{screen.capitalize()}Screen"
-    )
-    return view

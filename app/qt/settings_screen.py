@@ -1,24 +1,19 @@
 """View of the Settings screen: look, recording, and the files of the other settings."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.settings_screen import (
-    LANGUAGES,
-    LOG_LEVELS,
-    SCALES,
-    THEMES,
+    CHOICES,
+    PersonalSettings,
     SettingsFile,
     SettingsPresenter,
     SettingsState,
 )
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_choice, show_texts
+from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_button, make_choice, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -39,72 +34,47 @@ class SettingsScreen(QWidget):
     def __init__(self, presenter: SettingsPresenter) -> None:
         super().__init__()
         self._presenter = presenter
-        self._state = SettingsState()
-        scales = {scale: f"{scale:.0%}" for scale in SCALES}
-        choices: dict[str, Mapping[Any, str]] = {
-            "theme": THEMES,
-            "language": LANGUAGES,
-            "scale": scales,
-            "log_level": LOG_LEVELS,
-        }
-        self._choices = {name: _choice(presenter, name, items) for name, items in choices.items()}
+        self._choices = {name: self._choice(name) for name in CHOICES}
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
-        self._browse = QPushButton(gettext("Browse…"))
-        self._in_use = label(muted=True, wrap=True)
+        self._recordings.setPlaceholderText(presenter.personal.recordings)
         self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
-        self._undo = QPushButton(gettext("Undo"))
+        self._undo = make_button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
-        self._files = QGridLayout()
         self._lay_out()
-        self._connect()
+        self._operator.editingFinished.connect(
+            lambda: presenter.change(operator=self._operator.text().strip())
+        )
+        self._recordings.editingFinished.connect(self._write_folder)
+        self._sounds.clicked.connect(lambda checked: presenter.change(sounds=checked))
+        bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def show_state(self, state: SettingsState) -> None:
-        old, self._state = self._state, state
         settings = state.settings
         for name, choice in self._choices.items():
             choice.setCurrentIndex(choice.findData(getattr(settings, name)))
         show_texts({"operator": self._operator, "recordings": self._recordings}, settings)
-        self._recordings.setPlaceholderText(state.recordings)
         self._sounds.setChecked(settings.sounds)
         self._undo.setEnabled(state.can_undo)
-        self._in_use.setText(_folder_words(state))
         show_chip(self._message, state.message)
         waits = gettext("Language, size, folder and log change at the next start")
         show_chip(self._waits, Chip(waits if state.needs_restart else "", Tone.WARN))
-        if state.files != old.files:
-            self._list_files(state.files)
 
-    def _list_files(self, files: tuple[SettingsFile, ...]) -> None:
-        for row, file in enumerate(files):
-            name = gettext(file.name)
-            button = QPushButton(gettext("Open"))
-            button.setToolTip(gettext("Open {path} in the system's editor", path=file.path))
-            button.setAccessibleName(gettext("Open {name}", name=name))
-            url = QUrl.fromLocalFile(file.path)
-            button.clicked.connect(lambda _checked, url=url: QDesktopServices.openUrl(url))
-            self._files.addWidget(label(name), row, 0)
-            self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
-            self._files.addWidget(button, row, 2)
+    def _choice(self, name: str) -> ComboBox:
+        choice = make_choice(CHOICES[name])
+        choice.setMinimumWidth(200)
+        choice.activated.connect(lambda _: self._presenter.change(**{name: choice.currentData()}))
+        return choice
 
     def _choose_folder(self) -> None:
-        title, start = gettext("Folder of the runs"), self._state.recordings
+        title, start = gettext("Folder of the runs"), self._presenter.personal.recordings
         ask_for_folder(self, title, start, lambda path: self._presenter.change(recordings=path))
 
     def _write_folder(self) -> None:
         """Apply the typed folder; the field gets its old text back if it cannot be used."""
         self._presenter.change(recordings=self._recordings.text().strip())
-        self._recordings.setText(self._state.settings.recordings)
-
-    def _connect(self) -> None:
-        operator = self._operator
-        operator.editingFinished.connect(lambda: self._presenter.change(operator=operator.text().strip()))
-        self._recordings.editingFinished.connect(self._write_folder)
-        self._browse.clicked.connect(lambda _checked: self._choose_folder())
-        self._sounds.clicked.connect(lambda checked: self._presenter.change(sounds=checked))
-        self._undo.clicked.connect(lambda _checked: self._presenter.undo())
-        bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
+        self._recordings.setText(self._presenter.state.settings.recordings)
 
     def _lay_out(self) -> None:
         page = QWidget()
@@ -134,19 +104,26 @@ class SettingsScreen(QWidget):
     def _record_card(self) -> QFrame:
         self._operator.setPlaceholderText(gettext("written into each run"))
         folder = QWidget()
-        make_row((self._recordings, 1), self._browse, spacing=8, of=folder)
+        browse = make_button(gettext("Browse…"), self._choose_folder)
+        make_row((self._recordings, 1), browse, spacing=8, of=folder)
         fields = ((gettext("Operator"), self._operator), (gettext("Folder of the runs"), folder))
         grid = make_form_grid(fields)
         self._recordings.setAccessibleName(gettext("Folder of the runs"))
-        return _card(gettext("Recording"), "", grid, self._in_use, self._sounds)
+        in_use = label(_folder_words(self._presenter.personal), muted=True, wrap=True)
+        return _card(gettext("Recording"), "", grid, in_use, self._sounds)
 
     def _files_card(self) -> QFrame:
         hint = gettext("Stand and gauges are read when the window starts or a device is connected.")
-        self._files.setHorizontalSpacing(12)
-        self._files.setVerticalSpacing(8)
-        self._files.setColumnStretch(1, 1)
+        files = QGridLayout()
+        files.setHorizontalSpacing(12)
+        files.setVerticalSpacing(8)
+        files.setColumnStretch(1, 1)
+        for row, file in enumerate(self._presenter.personal.files):
+            files.addWidget(label(gettext(file.name)), row, 0)
+            files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
+            files.addWidget(_open_button(file), row, 2)
         log = make_form_grid(((gettext("Log"), self._choices["log_level"]),), wide=False)
-        return _card(gettext("Files"), hint, self._files, log)
+        return _card(gettext("Files"), hint, files, log)
 
 
 def _card(title: str, hint: str, *parts: Item) -> QFrame:
@@ -155,16 +132,16 @@ def _card(title: str, hint: str, *parts: Item) -> QFrame:
     return card
 
 
-def _choice(presenter: SettingsPresenter, name: str, items: Mapping[Any, str]) -> ComboBox:
-    """Make a combo box that changes the setting `name`; `items` are its values and their texts."""
-    made = make_choice(items)
-    made.setMinimumWidth(200)
-    made.activated.connect(lambda _: presenter.change(**{name: made.currentData()}))
-    return made
+def _open_button(file: SettingsFile) -> QPushButton:
+    hint = gettext("Open {path} in the system's editor", path=file.path)
+    url = QUrl.fromLocalFile(file.path)
+    button = make_button(gettext("Open"), lambda: QDesktopServices.openUrl(url), hint)
+    button.setAccessibleName(gettext("Open {name}", name=gettext(file.name)))
+    return button
 
 
-def _folder_words(state: SettingsState) -> str:
-    said = gettext("Runs are stored in {folder}", folder=break_path(state.recordings))
-    if not state.override:
+def _folder_words(personal: PersonalSettings) -> str:
+    said = gettext("Runs are stored in {folder}", folder=break_path(personal.recordings))
+    if not personal.override:
         return said
-    return f"{said}. " + gettext("{variable} says so, whatever is chosen here", variable=state.override)
+    return f"{said}. " + gettext("{variable} says so, whatever is chosen here", variable=personal.override)

@@ -29,8 +29,6 @@ _PARITIES = {"N": N_("none"), "E": N_("even"), "O": N_("odd")}
 
 
 class StartScreen(QWidget):
-    """Shows `StartState`; `ask_for_run` lets the operator choose a run file."""
-
     def __init__(self, presenter: StartPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self._presenter = presenter
@@ -133,11 +131,14 @@ class _Form(QWidget):
         self._rare = QWidget()
         self._lay_out()
         bind_button(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
-        self._port.currentTextChanged.connect(lambda _: presenter.set_form(self._read()))
-        self._protocol.activated.connect(lambda _: presenter.set_form(self._read()))
-        self._parity.activated.connect(lambda _: presenter.set_form(self._read()))
-        for field in self._fields.values():
-            field.textEdited.connect(lambda _: presenter.set_form(self._read()))
+        edits = [field.textEdited for field in self._fields.values()]
+        for edited in (
+            self._port.currentTextChanged,
+            self._protocol.activated,
+            self._parity.activated,
+            *edits,
+        ):
+            edited.connect(lambda _: presenter.set_form(self._read()))
 
     def show_form(self, state: StartState) -> None:
         self._port.blockSignals(True)

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QPalette
@@ -35,40 +36,29 @@ class Tokens:
     """Runs drawn over one another."""
 
 
-LIGHT = Tokens(
-    bg="#F7F8FA",
-    surface="#FFFFFF",
-    line="#D5DAE1",
-    text="#1B2330",
-    muted="#5A6675",
-    accent="#0B5FA5",
-    on_accent="#FFFFFF",
-    ok="#1E7B45",
-    warn="#8A5A00",
-    bad="#B3261E",
-    channel_1="#0B5FA5",
-    channel_2="#B8500A",
-    simulation="#1B2330",
-    slip_alpha=0.10,
-    overlay=("#0B5FA5", "#B8500A", "#1E7B45", "#8E3B8A", "#007C89", "#B3261E", "#7A6100", "#4A5568"),
-)
-DARK = Tokens(
-    bg="#12161C",
-    surface="#1A2028",
-    line="#323B47",
-    text="#E8ECF1",
-    muted="#9DA9B8",
-    accent="#6DB3F2",
-    on_accent="#12161C",
-    ok="#63C98A",
-    warn="#E6B450",
-    bad="#FF8A80",
-    channel_1="#6DB3F2",
-    channel_2="#F2A65A",
-    simulation="#E8ECF1",
-    slip_alpha=0.14,
-    overlay=("#6DB3F2", "#F2A65A", "#63C98A", "#D69BE0", "#5CC8D6", "#FF8A80", "#E6D06A", "#A7B1BF"),
-)
+_SCHEMES: dict[str, tuple[Any, Any]] = {
+    "bg": ("#F7F8FA", "#12161C"),
+    "surface": ("#FFFFFF", "#1A2028"),
+    "line": ("#D5DAE1", "#323B47"),
+    "text": ("#1B2330", "#E8ECF1"),
+    "muted": ("#5A6675", "#9DA9B8"),
+    "accent": ("#0B5FA5", "#6DB3F2"),
+    "on_accent": ("#FFFFFF", "#12161C"),
+    "ok": ("#1E7B45", "#63C98A"),
+    "warn": ("#8A5A00", "#E6B450"),
+    "bad": ("#B3261E", "#FF8A80"),
+    "channel_1": ("#0B5FA5", "#6DB3F2"),
+    "channel_2": ("#B8500A", "#F2A65A"),
+    "simulation": ("#1B2330", "#E8ECF1"),
+    "slip_alpha": (0.10, 0.14),
+    "overlay": (
+        ("#0B5FA5", "#B8500A", "#1E7B45", "#8E3B8A", "#007C89", "#B3261E", "#7A6100", "#4A5568"),
+        ("#6DB3F2", "#F2A65A", "#63C98A", "#D69BE0", "#5CC8D6", "#FF8A80", "#E6D06A", "#A7B1BF"),
+    ),
+}
+"""Each colour of the light and of the dark scheme."""
+LIGHT = Tokens(**{name: light for name, (light, _) in _SCHEMES.items()})
+DARK = Tokens(**{name: dark for name, (_, dark) in _SCHEMES.items()})
 
 
 SCHEMES = {
@@ -101,7 +91,6 @@ def font(role: TextRole) -> QFont:
 
 
 def colour(token: str, alpha: float = 1.0) -> QColor:
-    """Colour of a token, more or less transparent."""
     made = QColor(token)
     made.setAlphaF(alpha)
     return made
@@ -184,5 +173,4 @@ def _palette(tokens: Tokens) -> QPalette:
 
 
 def _style_sheet(tokens: Tokens) -> str:
-    """Style sheet with the colours of a scheme in place of its `$names`."""
     return Template(_STYLE.read_text(encoding="utf-8")).substitute(asdict(tokens))

@@ -36,7 +36,6 @@ class MainWindow(QMainWindow):
     """Shows `WindowState`; a timer calls the presenter's `tick`. The presenter is closed with the window."""
 
     closed = Signal(WindowLayout)
-    """Layout of the window when it closes."""
 
     def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowLayout | None = None) -> None:
         super().__init__()
@@ -88,7 +87,6 @@ class MainWindow(QMainWindow):
         dialog.open()
 
     def ask_for_export(self) -> None:
-        """Show the dialog to export the selected runs; it does not block the window."""
         from app.qt.runs.export_dialog import ExportDialog
 
         if not self._presenter.runs.open_export():
@@ -100,7 +98,6 @@ class MainWindow(QMainWindow):
         self._export.raise_()
 
     def show_import(self) -> None:
-        """Show the dialog to import files; it does not block the window."""
         from app.qt.runs.import_dialog import ImportDialog
 
         if self._import is None:
@@ -177,7 +174,6 @@ class MainWindow(QMainWindow):
 
 
 def icon(name: str, colour: str, *, active: str = "") -> QIcon:
-    """Icon by its Phosphor name; `active` is its colour when checked."""
     options = {"color": colour}
     if active:
         options["color_on"] = active

@@ -22,8 +22,6 @@ def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
 
 
 class WindowGeometry:
-    """Layout of the window: restores the stored one, and captures the current one."""
-
     def __init__(self, place: WindowLayout) -> None:
         self._place = place
 
@@ -49,7 +47,6 @@ class WindowGeometry:
         return smallest.boundedTo(free).expandedTo(_LEAST)
 
     def restore_parts(self, screen: QWidget) -> None:
-        """Restore widths of tables and splitters, and the sort order of tables."""
         for name, part in _parts(screen):
             widths = self._place.widths.get(name, ())
             if len(widths) == part.count():
@@ -97,7 +94,6 @@ def _sort(titles: QHeaderView, column: int, *, descending: bool) -> None:
 
 
 def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, bool]]:
-    """Sort column of each sortable table, and whether it is descending."""
     return {
         name: (part.sortIndicatorSection(), part.sortIndicatorOrder() is Qt.SortOrder.DescendingOrder)
         for name, part in parts.items()

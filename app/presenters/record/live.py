@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.catalogue import MILLIMETRE
-from analysis.formatting import THIN_SPACE, with_unit
+from analysis.formatting import THIN_SPACE, typeset, with_unit
 from analysis.quantities import Quantity
 from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
@@ -67,7 +67,6 @@ class LiveTraces:
     """
 
     ranges_m: tuple[float | None, float | None] = (None, None)
-    """Ranges of both gauges."""
     width_px: int = 800
     samples: DecimatedHistory = field(default_factory=DecimatedHistory)
     """Table and relative displacement (m)."""
@@ -75,7 +74,6 @@ class LiveTraces:
     zero_m: Floats = field(default_factory=lambda: np.zeros(2))
     """Shown readings count from `zero_m`: the zero of a run, else the tare. Neither is stored."""
     tolerance_m: float = 0.0
-    """Allowed deviation from the pullback."""
     state: PullbackState | None = None
     release_s: float | None = None
     slip_s: Span | None = None
@@ -84,9 +82,7 @@ class LiveTraces:
     is_pulled: bool = False
     """The table is being pulled or held."""
     is_held: bool = False
-    """The traces of an earlier run are shown."""
     read_s: float = float("-inf")
-    """Time of the sample that the readings were taken at."""
     traces: Traces = field(default_factory=Traces)
     readings: LiveReadings = field(default_factory=LiveReadings)
 
@@ -109,11 +105,9 @@ class LiveTraces:
         return replace(LiveTraces.of_gauges(gauges), width_px=self.width_px, traces=self.traces)
 
     def cleared(self, pullback_m: float) -> "LiveTraces":
-        """Draw the samples that are there now."""
         return replace(self, traces=self._draw(pullback_m, None))
 
     def restarted(self) -> "LiveTraces":
-        """Roll again, for the next run."""
         rolling = replace(self, release_s=None, slip_s=None, end_s=None)
         return replace(rolling, zero_m=self.tare_m, is_pulled=False, is_held=False)
 
@@ -162,7 +156,7 @@ class LiveTraces:
         return replace(self, tare_m=zero_m, zero_m=zero_m)._read(self.read_s)
 
     def _read(self, at_s: float) -> "LiveTraces":
-        table, relative = (number_text.format_millimetres(m, 2) for m in self.newest_m() - self.zero_m)
+        table, relative = (typeset(MILLIMETRE.number(m, 2)) for m in self.newest_m() - self.zero_m)
         return replace(self, read_s=at_s, readings=LiveReadings(table, relative, self._origin()))
 
     def _origin(self) -> str:
@@ -216,7 +210,6 @@ class LiveTraces:
         )
 
     def _time_axis(self) -> tuple[float, Span]:
-        """Origin of the shown axis on the samples' axis, and the shown span."""
         now_s = self.samples.end_s if self.end_s is None else self.end_s
         if not np.isfinite(now_s):
             return 0.0, (-ROLLING_S, 0.0)
@@ -225,7 +218,6 @@ class LiveTraces:
         return self.release_s, (-BEFORE_RELEASE_S, _step_up(now_s - self.release_s, _SPANS_S))
 
     def _target_mm(self, table: Polyline, pullback_m: float) -> Span | None:
-        """Allowed displacement at the end of the pull, on the side that the table is pulled to."""
         if len(table.value) == 0:
             return None
         target_m = -pullback_m if table.value[-1] < 0.0 else pullback_m
@@ -262,7 +254,6 @@ def _step_up(wanted: float, steps: Iterable[float]) -> float:
 
 
 def tare_chip(live: LiveTraces | None) -> Chip:
-    """Offsets of the tare that was set; None if the stand moved."""
     if live is None:
         return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
     by = gettext(" and ").join(number_text.format_in(MILLIMETRE, m, 2) for m in live.tare_m.tolist())
@@ -308,11 +299,11 @@ def lost_samples_chip(health: Health) -> Chip:
     return Chip(gettext("Lost {lost}", lost=lost), Tone.WARN if lost else Tone.OK, hint)
 
 
-def disk_chip(free_bytes: int, bytes_per_s: float = 0.0) -> Chip:
-    """Free space of the disk that runs are stored on, and how long a recording it holds."""
+def disk_chip(health: Health) -> Chip:
+    free_bytes = health.free_disk_bytes
     text = gettext("{size} free", size=number_text.format_file_size(free_bytes))
-    if bytes_per_s > 0.0:
-        text += f", {_duration_text(free_bytes / bytes_per_s)}"
+    if health.bytes_per_s > 0.0:
+        text += f", {_duration_text(free_bytes / health.bytes_per_s)}"
     if free_bytes < DISK_CRITICAL_BYTES:
         hint = gettext("Make room before the next run.")
         return Chip(gettext("Disk nearly full: {text}", text=text), Tone.BAD, hint)
@@ -340,7 +331,6 @@ class GaugeMonitor:
     """0 table, 1 relative."""
     gauge: Gauge
     overload_s: float = float("-inf")
-    """Time of the last overloaded sample."""
 
     @property
     def name(self) -> str:

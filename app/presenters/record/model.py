@@ -28,14 +28,11 @@ RECORDING_STATES = frozenset(PullbackState) - _NOT_RECORDING
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """A run that is or was decided about."""
-
     path: str
     note: str | None
     """As stored; None where that is uncertain."""
     edited_note: str
     results_text: str = ""
-    """Main result in words, for messages."""
     has_results: bool = False
 
     @classmethod
@@ -65,15 +62,11 @@ class RunDecisions:
     """Decisions about recorded runs, one after another; the last one can be undone. No file is deleted."""
 
     pending: RecordedRun | None = None
-    """Waits for the decision."""
     message: Chip = EMPTY_CHIP
-    """Outcome of the last decision."""
     last: RecordedRun | None = None
-    """Decided about last."""
     trash_path: str = ""
     """Where `last` lies in the trash; empty if it does not."""
     is_moving: bool = False
-    """`last` is being moved to the trash."""
     restoring: RecordedRun | None = None
     """Is being moved out of the trash."""
     to_keep: frozenset[str] = frozenset()
@@ -101,8 +94,6 @@ class ArmedRun:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Engine and current run."""
-
     engine: PullbackState | None = None
     """State that the engine reported last; None without an engine."""
     is_command_pending: bool = False
@@ -158,8 +149,6 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordModel:
-    """Everything that the Record screen is made of."""
-
     stand: StandContext
     author: str
     """Who decides about runs, for their history."""
@@ -170,7 +159,6 @@ class RecordModel:
     ended: EndedRun | None = None
     """Run that is shown; None while the next one is prepared or recorded."""
     snapshot: Snapshot | None = None
-    """Of the run that was shown before."""
     decisions: RunDecisions = field(default_factory=RunDecisions)
     status_bar: StatusBar = field(default_factory=StatusBar)
     sounds: bool = False
@@ -236,7 +224,6 @@ class RecordModel:
 
 
 def monitors_of(gauges: Gauges) -> tuple[GaugeMonitor, GaugeMonitor]:
-    """Monitors of both gauges, without a sample."""
     return GaugeMonitor(0, gauges.table), GaugeMonitor(1, gauges.relative)
 
 

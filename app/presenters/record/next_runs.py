@@ -16,7 +16,7 @@ from app.presenters.record.state import LoadedPlan, PlanState, RunChoices, RunFo
 from app.presenters.results import sentence
 from app.runs.errors import ConditionError, MetadataError
 from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 from messages.message import MessageError, message
 
 REPEATS_DEFAULT = 3
@@ -38,8 +38,6 @@ CompletedRuns = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class NextRuns:
-    """Choices for the next runs, the series plan and its progress."""
-
     choices: RunChoices
     plan: PlanState = field(default_factory=PlanState)
     tests: NextTests = field(default_factory=NextTests)
@@ -54,7 +52,6 @@ class NextRuns:
     undecided_path: str = ""
     """Run that waits for a decision, and does not count until then; empty without one."""
     suggested_operator: str = ""
-    """Operator in the settings."""
 
     @classmethod
     def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
@@ -203,11 +200,8 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
             raise PlanError("{part!r}: repeat a series 1 to {most} times", part=part, most=REPEATS_MAX)
         matching = [series for series in all_series if fnmatchcase(series, pattern)]
         if not matching:
-            raise PlanError(
-                "{pattern} is no series of this stand: write one like {example}, or 1FF*",
-                pattern=pattern,
-                example=all_series[0],
-            )
+            template = N_("{pattern} is no series of this stand: write one like {example}, or 1FF*")
+            raise PlanError(template, pattern=pattern, example=all_series[0])
         for series in matching:
             if series in planned and "*" not in pattern and "?" not in pattern:
                 raise PlanError("{series} is planned twice: give it one number of repeats", series=series)
@@ -241,7 +235,6 @@ def run_text(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
 
 
 def form_summary(form: RunForm) -> str:
-    """Write the filled-in fields of a form on one line."""
     count = form.count.strip()
     parts = (
         form.operator.strip(),

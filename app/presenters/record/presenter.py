@@ -1,6 +1,7 @@
 """Presenter of the Record screen: dispatches events to the reducer, carries out effects, shows the state."""
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from app.acquisition.guidance import guidance_for
@@ -10,25 +11,10 @@ from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
 from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.navigator import StandContext
+from app.presenters.record import state
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
-from app.presenters.record.state import (
-    Action,
-    ClockTicked,
-    Cue,
-    GuidanceState,
-    KeepRun,
-    MoveToTrash,
-    Notification,
-    PullbackTarget,
-    RecordEvent,
-    RecordState,
-    RecordTask,
-    RestoreFromTrash,
-    SavePlan,
-    Step,
-    StepStatus,
-)
+from app.presenters.record.state import Action, Cue
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
@@ -59,7 +45,7 @@ _CUES = {
 _TARGET_SHOWN = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
-class RecordPresenter(Presenter[RecordState]):
+class RecordPresenter(Presenter[state.RecordState]):
     """Leads the operator through one pullback test after another.
 
     `files` carries out tasks with run files, and is closed by `close`. `author` decides about runs.
@@ -73,31 +59,31 @@ class RecordPresenter(Presenter[RecordState]):
         super().__init__(record_state(self._model))
         self._connection = connection
         self._files = files
-        self._unfinished: list[RecordTask] = []
+        self._unfinished: list[state.RecordTask] = []
 
     @property
     def is_recording(self) -> bool:
         session = self._model.session
         return session.is_recording or session.engine is PullbackState.CLOSING
 
-    def dispatch(self, event: RecordEvent) -> None:
+    def dispatch(self, event: state.RecordEvent) -> None:
         before = self._model
         self._model, effects = reduce(before, event)
         for effect in effects:
             self._execute(effect)
         is_drawn_only = self._model.live.read_s == before.live.read_s
-        if isinstance(event, ClockTicked | RingRows) and is_drawn_only:
+        if isinstance(event, state.ClockTicked | RingRows) and is_drawn_only:
             self._update(status_bar=self._model.status_bar, traces=self._model.live.traces)
         else:
             self._set_state(record_state(self._model))
 
     def enter(self) -> None:
-        self.dispatch(Notification.SCREEN_ENTERED)
+        self.dispatch(state.Notification.SCREEN_ENTERED)
 
     def tick(self) -> None:
         """Take answers of the worker and new samples; to be called some 60 times a second."""
         self._files.poll()
-        self.dispatch(ClockTicked(self._model.stand.clock()))
+        self.dispatch(state.ClockTicked(self._model.stand.clock()))
         rows = self._connection.new_rows()
         if rows is not None and len(rows):
             self.dispatch(rows)
@@ -117,7 +103,7 @@ class RecordPresenter(Presenter[RecordState]):
         if isinstance(effect, Command):
             self._connection.send(effect)
             return
-        if isinstance(effect, KeepRun | MoveToTrash | RestoreFromTrash | SavePlan):
+        if isinstance(effect, state.KeepRun | state.MoveToTrash | state.RestoreFromTrash | state.SavePlan):
             self._unfinished.append(effect)
         self._files.submit(
             tasks.execute,
@@ -132,11 +118,11 @@ class RecordPresenter(Presenter[RecordState]):
         self.dispatch(event)
 
 
-def record_state(model: RecordModel) -> RecordState:
+def record_state(model: RecordModel) -> state.RecordState:
     """Derive what the screen shows."""
     session, ended, decisions, allowed = model.session, model.ended, model.decisions, model.allowed
     primary = Action.ARM if ended is None else Action.NEXT
-    return RecordState(
+    return state.RecordState(
         guidance=_guidance(model),
         cue=_cue(model) if model.sounds else None,
         choices=model.next_runs.choices,
@@ -156,46 +142,43 @@ def record_state(model: RecordModel) -> RecordState:
     )
 
 
-def _guidance(model: RecordModel) -> GuidanceState:
+def _guidance(model: RecordModel) -> state.GuidanceState:
     session, ended = model.session, model.ended
-    steps = _steps(model)
+    guide = partial(state.GuidanceState, steps=_steps(model))
     if ended is not None and ended.is_awaited:
         detail = gettext("The run is stored and is being compared with its simulation.")
-        return GuidanceState(gettext("Finding friction"), detail, steps=steps)
+        return guide(gettext("Finding friction"), detail)
     if ended is not None:
-        return GuidanceState(gettext("Done"), steps=steps)
+        return guide(gettext("Done"))
     if session.engine is None:
-        detail = gettext("Nothing is connected.")
-        return GuidanceState(gettext("Connect an amplifier"), detail, steps=steps)
+        return guide(gettext("Connect an amplifier"), gettext("Nothing is connected."))
     situation = model.situation(session.engine)
     if session.engine is PullbackState.CONNECTING and session.waiting_for and not situation.is_device_lost:
-        return GuidanceState(gettext("One moment"), sentence(session.waiting_for), steps=steps)
+        return guide(gettext("One moment"), sentence(session.waiting_for))
     guidance = guidance_for(situation)
     tone = Tone.BAD if situation.is_device_lost else Tone.WARN if guidance.is_warning else Tone.PLAIN
     target = None if situation.is_device_lost else _target(model)
-    instruction = translate(guidance.instruction)
-    return GuidanceState(instruction, sentence(guidance.detail), tone, target, steps)
+    return guide(translate(guidance.instruction), sentence(guidance.detail), tone, target)
 
 
-def _target(model: RecordModel) -> PullbackTarget | None:
+def _target(model: RecordModel) -> state.PullbackTarget | None:
     situation = model.situation(model.session.engine or PullbackState.IDLE)
     position, pulled_m = situation.position, situation.pulled_m
     if situation.state not in _TARGET_SHOWN or position.pullback_m is None or not pulled_m >= 0.0:
         return None
-    return PullbackTarget(1e3 * position.pullback_m, 1e3 * pulled_m, 1e3 * position.tolerance_m)
+    return state.PullbackTarget(1e3 * position.pullback_m, 1e3 * pulled_m, 1e3 * position.tolerance_m)
 
 
-def _steps(model: RecordModel) -> tuple[Step, ...]:
-    names = [gettext(name) for name, _ in _STEPS]
-    if model.ended is not None and not model.ended.is_awaited:
-        return tuple(Step(name, StepStatus.DONE) for name in names)
-    now = next((i for i, (_, states) in enumerate(_STEPS) if model.session.engine in states), None)
-    if model.ended is not None:
-        now = len(_STEPS) - 1
-    if now is None:
-        return tuple(Step(name) for name in names)
-    statuses = [StepStatus.DONE] * now + [StepStatus.NOW] + [StepStatus.AHEAD] * (len(names) - now - 1)
-    return tuple(Step(name, status) for name, status in zip(names, statuses, strict=True))
+def _steps(model: RecordModel) -> tuple[state.Step, ...]:
+    engine, ended = model.session.engine, model.ended
+    now = next((number for number, (_, states) in enumerate(_STEPS) if engine in states), -1)
+    if ended is not None:
+        now = len(_STEPS) - (1 if ended.is_awaited else 0)
+    steps = []
+    for number, (name, _) in enumerate(_STEPS):
+        status = state.StepStatus.DONE if number < now else state.StepStatus.AHEAD
+        steps.append(state.Step(gettext(name), state.StepStatus.NOW if number == now else status))
+    return tuple(steps)
 
 
 def _cue(model: RecordModel) -> Cue | None:

@@ -4,36 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.acquisition.messages import (
-    Arm,
-    Command,
-    Connected,
-    Event,
-    Health,
-    LiveResult,
-    PullbackState,
-    Reconnected,
-    Reconnecting,
-    RunEnded,
-    RunStarted,
-    StandPosition,
-    StateChanged,
-    Stop,
-)
+from app.acquisition import messages as engine
+from app.acquisition.messages import PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
-from app.presenters.record.live import (
-    PIXELS_MIN,
-    device_chip,
-    disk_chip,
-    live_estimate,
-    lost_samples_chip,
-    rate_text,
-    tare_chip,
-)
+from app.presenters.record import live, state
 from app.presenters.record.model import (
     RECORDING_STATES,
     ArmedRun,
@@ -44,43 +22,24 @@ from app.presenters.record.model import (
     monitors_of,
 )
 from app.presenters.record.next_runs import NextRuns
-from app.presenters.record.state import (
-    Action,
-    ClockTicked,
-    Connecting,
-    CountCompletedRuns,
-    KeepRun,
-    LiveEstimate,
-    LoadPlan,
-    MoveToTrash,
-    NoteEdited,
-    Notification,
-    PlanEdited,
-    PlotResized,
-    RecordEvent,
-    RecordTask,
-    RestoreFromTrash,
-    RunForm,
-    SeriesChosen,
-    StatusBar,
-)
+from app.presenters.record.state import Action
 from app.presenters.results import Result, sentence
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
 from messages.message import Message
 
-Effect = Command | RecordTask
+Effect = engine.Command | state.RecordTask
 """A command for the engine, or a task for the worker."""
 
 _NEW_MOTION = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
 """States that end the live estimate: it was of another run, or of a table that was let down."""
 
 
-def reduce(model: RecordModel, event: RecordEvent) -> tuple[RecordModel, tuple[Effect, ...]]:
+def reduce(model: RecordModel, event: state.RecordEvent) -> tuple[RecordModel, tuple[Effect, ...]]:
     """Apply an event: return the new model, and what the presenter has to send."""
     reduction = _Reduction(model)
     reduction.apply(event)
-    if not isinstance(event, ClockTicked | RingRows):
+    if not isinstance(event, state.ClockTicked | RingRows):
         reduction.finish()
     return reduction.model, tuple(reduction.effects)
 
@@ -92,43 +51,43 @@ class _Reduction:
         self.model = model
         self.effects: list[Effect] = []
 
-    def apply(self, event: RecordEvent) -> None:
+    def apply(self, event: state.RecordEvent) -> None:
         model = self.model
         match event:
             case RingRows():
                 self._on_samples(event)
-            case ClockTicked(now_s):
+            case state.ClockTicked(now_s):
                 self._on_clock(now_s)
             case Action():
                 self._on_action(event)
-            case Notification.SCREEN_ENTERED:
+            case state.Notification.SCREEN_ENTERED:
                 self._load_plan()
-            case SeriesChosen(series):
+            case state.SeriesChosen(series):
                 self._choose_series(series)
-            case RunForm():
+            case state.RunForm():
                 if model.next_runs.choices.editable:
                     self._save(model.next_runs.with_form(event))
-            case PlanEdited(text):
+            case state.PlanEdited(text):
                 self._set(next_runs=model.next_runs.with_plan(text))
                 if not self.model.next_runs.plan.error:
                     self._save(self.model.next_runs)
-            case NoteEdited(note):
+            case state.NoteEdited(note):
                 if (pending := model.decisions.pending) is not None:
                     self._set_decisions(pending=replace(pending, edited_note=note))
-            case PlotResized(width_px):
-                self._set(live=replace(model.live, width_px=max(width_px, PIXELS_MIN)))
+            case state.PlotResized(width_px):
+                self._set(live=replace(model.live, width_px=max(width_px, live.PIXELS_MIN)))
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
             case AnalysedRun() | TaskFailed(str()) | TaskProgress():
                 self._on_identification(event)
             case TaskFailed(task, message):
                 self._on_task_failed(task, message)
-            case Connecting(device, waiting_for):
+            case state.Connecting(device, waiting_for):
                 self._close_ended()
                 self._set_session(true_friction=None, waiting_for=waiting_for)
                 self._load_plan()
                 self._start_over(PullbackState.CONNECTING, device)
-            case Notification.DISCONNECTED:
+            case state.Notification.DISCONNECTED:
                 self._set_session(simulated=False)
                 self._set(next_runs=model.next_runs.with_fixed_series("", ""))
                 self._start_over(None, "")
@@ -141,7 +100,7 @@ class _Reduction:
                 self._set(sounds=event.sounds, next_runs=next_runs)
             case Gauges():
                 self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
-            case Notification.RUNS_CHANGED:
+            case state.Notification.RUNS_CHANGED:
                 self._count_completed()
             case _:
                 self._on_engine(event)
@@ -169,12 +128,12 @@ class _Reduction:
                 tared = model.live.tared()
                 self._set(live=tared or model.live)
                 self._forget_last()
-                self._set_decisions(message=tare_chip(tared))
+                self._set_decisions(message=live.tare_chip(tared))
             case Action.ARM:
                 self._arm()
             case Action.STOP:
                 self._set_session(is_command_pending=True)
-                self.effects.append(Stop())
+                self.effects.append(engine.Stop())
             case Action.NEXT:
                 self._close_ended()
             case Action.REPEAT if model.ended is not None:
@@ -203,7 +162,7 @@ class _Reduction:
         run, count = next_runs.run_settings(self.model.stand.directory), count or next_runs.run_count
         armed = ArmedRun(run.series or "", note=run.note)
         self._set_session(is_command_pending=True, remaining_runs=count - 1, run=armed)
-        self.effects.append(Arm(run, count))
+        self.effects.append(engine.Arm(run, count))
 
     # --- decisions about runs ---
 
@@ -216,14 +175,14 @@ class _Reduction:
     def _keep(self, run: RecordedRun) -> None:
         storing = {**self.model.decisions.storing, run.path: run}
         self._set_decisions(storing=storing, message=run.storing_message)
-        self.effects.append(KeepRun(run.path, self.model.author, run.note_to_store, run.has_results))
+        self.effects.append(state.KeepRun(run.path, self.model.author, run.note_to_store, run.has_results))
 
     def _move_to_trash(self) -> None:
         run = self._decide()
         if run is not None:
             message = Chip(gettext("Moving {name} to the trash", name=run.name))
             self._set_decisions(is_moving=True, message=message)
-            self.effects.append(MoveToTrash(run.path, self.model.author, run.note_to_store))
+            self.effects.append(state.MoveToTrash(run.path, self.model.author, run.note_to_store))
         if self.model.ended is not None and self.model.ended.result is not None:
             self._set(next_runs=self.model.next_runs.with_run(self.model.ended.result.path))
 
@@ -243,7 +202,7 @@ class _Reduction:
         if run is not None and run.has_results:
             next_runs = next_runs.with_run(run.path, ended.run.series).with_next_series()
         self._set(next_runs=next_runs, live=self.model.live.restarted(), ended=None)
-        self._set_session(live_estimate=LiveEstimate())
+        self._set_session(live_estimate=state.LiveEstimate())
 
     def _undo(self) -> None:
         decisions = self.model.decisions
@@ -253,7 +212,7 @@ class _Reduction:
             return
         if trash_path:
             self._set_decisions(restoring=run)
-            self.effects.append(RestoreFromTrash(trash_path))
+            self.effects.append(state.RestoreFromTrash(trash_path))
             return
         self._ask_again(run)
 
@@ -270,20 +229,20 @@ class _Reduction:
 
     # --- answers of the worker ---
 
-    def _on_task_done(self, task: RecordTask, answer: Any) -> None:
+    def _on_task_done(self, task: state.RecordTask, answer: Any) -> None:
         model = self.model
         match task:
-            case LoadPlan():
+            case state.LoadPlan():
                 self._save(model.next_runs.with_loaded_plan(answer))
-            case CountCompletedRuns():
+            case state.CountCompletedRuns():
                 self._set(next_runs=model.next_runs.with_completed(answer).with_next_series())
-            case KeepRun(path):
+            case state.KeepRun(path):
                 self._on_kept(path)
-            case MoveToTrash(path):
+            case state.MoveToTrash(path):
                 self._on_moved(path, answer)
-            case RestoreFromTrash():
+            case state.RestoreFromTrash():
                 self._on_restored(answer)
-        if isinstance(task, KeepRun | MoveToTrash | RestoreFromTrash):
+        if isinstance(task, state.KeepRun | state.MoveToTrash | state.RestoreFromTrash):
             self._count_completed()
 
     def _on_kept(self, path: str) -> None:
@@ -315,17 +274,17 @@ class _Reduction:
             text = gettext("Brought back {name}", name=run.name)
         self._set_decisions(message=Chip(text, Tone.OK))
 
-    def _on_task_failed(self, task: RecordTask, message: Message) -> None:
+    def _on_task_failed(self, task: state.RecordTask, message: Message) -> None:
         """Show why a task failed; the files are as they were."""
-        is_moving = self.model.decisions.is_moving and not isinstance(task, MoveToTrash)
+        is_moving = self.model.decisions.is_moving and not isinstance(task, state.MoveToTrash)
         self._set_decisions(is_moving=is_moving, message=Chip(sentence(message), Tone.BAD))
-        if isinstance(task, LoadPlan):  # the stored plan cannot be read; the runs can
+        if isinstance(task, state.LoadPlan):  # the stored plan cannot be read; the runs can
             self._count_completed()
 
     def _load_plan(self) -> None:
         if not self.model.next_runs.is_requested:
             self._set(next_runs=replace(self.model.next_runs, is_requested=True))
-            self.effects.append(LoadPlan(str(self.model.stand.directory)))
+            self.effects.append(state.LoadPlan(str(self.model.stand.directory)))
 
     def _save(self, next_runs: NextRuns) -> None:
         next_runs, task = next_runs.to_save(str(self.model.stand.directory))
@@ -334,7 +293,7 @@ class _Reduction:
             self.effects.append(task)
 
     def _count_completed(self) -> None:
-        self.effects.append(CountCompletedRuns(str(self.model.stand.directory)))
+        self.effects.append(state.CountCompletedRuns(str(self.model.stand.directory)))
 
     # --- identification of the run ---
 
@@ -371,41 +330,43 @@ class _Reduction:
 
     # --- engine and connection ---
 
-    def _start_over(self, engine: PullbackState | None, device: str) -> None:
+    def _start_over(self, reported: PullbackState | None, device: str) -> None:
         """Another engine reports from now on, or none; the result of the last run stays."""
         model = self.model
-        self._set_session(engine=engine, device=device, position=StandPosition(), note="", loss_reason="")
-        self._set_session(is_command_pending=False, remaining_runs=0)
-        bar = StatusBar(device_chip(device), run=model.status_bar.run) if device else StatusBar()
+        self._set_session(engine=reported, position=engine.StandPosition(), note="", loss_reason="")
+        self._set_session(device=device, is_command_pending=False, remaining_runs=0)
+        bar = state.StatusBar()
+        if device:
+            bar = state.StatusBar(live.device_chip(device), run=model.status_bar.run)
         gauges = model.stand.gauges
         self._set(status_bar=bar, monitors=monitors_of(gauges), live=model.live.reconnected(gauges))
         if model.ended is None:
             self._set(live=self.model.live.cleared(model.pullback_m))
-            self._set_session(live_estimate=LiveEstimate())
+            self._set_session(live_estimate=state.LiveEstimate())
 
-    def _on_engine(self, event: Event) -> None:
+    def _on_engine(self, event: engine.Event) -> None:
         self._set_session(heard_s=self.model.stand.clock())
         match event:
-            case StateChanged():
+            case engine.StateChanged():
                 self._on_state(event)
-            case Connected(device, _, rate_hz):
+            case engine.Connected(device, _, rate_hz):
                 self._set_session(device=device)
-                self._set_bar(device=device_chip(device), rate=rate_text(rate_hz))
-            case Reconnecting(message):
+                self._set_bar(device=live.device_chip(device), rate=live.rate_text(rate_hz))
+            case engine.Reconnecting(message):
                 self._set_loss(sentence(message))
-            case Reconnected():
+            case engine.Reconnected():
                 self._set_loss("")
-            case Health():
-                disk = disk_chip(event.free_disk_bytes, event.bytes_per_s)
-                self._set_bar(rate=rate_text(event.rate_hz), lost_samples=lost_samples_chip(event), disk=disk)
-            case LiveResult():
-                self._set_session(live_estimate=live_estimate(event))
-            case RunStarted(path):
+            case engine.Health():
+                lost, disk = live.lost_samples_chip(event), live.disk_chip(event)
+                self._set_bar(rate=live.rate_text(event.rate_hz), lost_samples=lost, disk=disk)
+            case engine.LiveResult():
+                self._set_session(live_estimate=live.live_estimate(event))
+            case engine.RunStarted(path):
                 self._set_session(run=replace(self.model.session.run, name=Path(path).stem))
-            case RunEnded():
+            case engine.RunEnded():
                 self._on_run_ended(event)
 
-    def _on_state(self, event: StateChanged) -> None:
+    def _on_state(self, event: engine.StateChanged) -> None:
         if event.state in RECORDING_STATES:
             self._close_ended()
         session = self.model.session
@@ -417,9 +378,9 @@ class _Reduction:
         self._set_session(engine=event.state, position=event.position, note=event.note)
         self._set_session(remaining_runs=remaining, is_command_pending=False, waiting_for="")
         if event.state in _NEW_MOTION:
-            self._set_session(live_estimate=LiveEstimate())
+            self._set_session(live_estimate=state.LiveEstimate())
 
-    def _on_run_ended(self, event: RunEnded) -> None:
+    def _on_run_ended(self, event: engine.RunEnded) -> None:
         session = self.model.session
         self._set_session(is_command_pending=False, remaining_runs=event.remaining)
         ended = EndedRun(event, session.run)
@@ -434,7 +395,7 @@ class _Reduction:
 
     def _set_loss(self, reason: str) -> None:
         self._set_session(loss_reason=reason)
-        self._set_bar(device=device_chip(self.model.session.device, reason))
+        self._set_bar(device=live.device_chip(self.model.session.device, reason))
 
     # --- time and samples ---
 
@@ -442,7 +403,7 @@ class _Reduction:
         session = self.model.session
         if session.engine in (None, PullbackState.CONNECTING) or session.loss_reason:
             return
-        self._set_bar(device=device_chip(session.device, silent_s=now_s - session.heard_s))
+        self._set_bar(device=live.device_chip(session.device, silent_s=now_s - session.heard_s))
 
     def _on_samples(self, rows: RingRows) -> None:
         model, today = self.model, self.model.stand.today()

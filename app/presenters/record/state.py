@@ -22,8 +22,6 @@ _DOTS_MAX = 6
 
 @dataclass(frozen=True, slots=True)
 class StatusBar:
-    """Status of device, stream, gauges, disk and run; always visible."""
-
     device: Chip = _NO_DEVICE
     rate: str = ""
     lost_samples: Chip = EMPTY_CHIP
@@ -46,7 +44,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class PullbackTarget:
-    """Nominal and current pullback (mm, both positive)."""
+    """Nominal and current pullback, both positive."""
 
     target_mm: float
     now_mm: float
@@ -107,8 +105,6 @@ class Traces:
 
 @dataclass(frozen=True, slots=True)
 class LiveReadings:
-    """Current readings of both gauges as text (mm), and the zero that they refer to."""
-
     table: str = "–"
     relative: str = "–"
     origin: str = ""
@@ -116,8 +112,6 @@ class LiveReadings:
 
 @dataclass(frozen=True, slots=True)
 class LiveEstimate:
-    """Live identification during the decay: rows as in a result, and a note on its progress."""
-
     rows: tuple[ResultRow, ...] = ()
     note: str = ""
 
@@ -128,7 +122,6 @@ class RunForm:
 
     operator: str = ""
     note: str = ""
-    """Of the next run only."""
     count: str = "1"
     temperature_c: str = ""
     humidity_percent: str = ""
@@ -140,23 +133,18 @@ class RunForm:
 
 @dataclass(frozen=True, slots=True)
 class RunChoices:
-    """Series and form of the next runs."""
-
     series: str
     all_series: tuple[str, ...]
     series_hint: str = ""
     series_fixed: bool = False
     form: RunForm = RunForm()
     summary: str = ""
-    """The form on one line."""
     form_error: str = ""
     editable: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class SeriesProgress:
-    """Completed and planned runs of a series."""
-
     series: str
     done: int
     planned: int
@@ -176,18 +164,12 @@ class SeriesProgress:
     @property
     def description(self) -> str:
         """Sentence for tool tips and screen readers."""
-        return gettext(
-            "{series}: {done} of {planned} runs are there",
-            series=self.series,
-            done=self.done,
-            planned=self.planned,
-        )
+        template = N_("{series}: {done} of {planned} runs are there")
+        return gettext(template, series=self.series, done=self.done, planned=self.planned)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanState:
-    """Series plan: progress of each series, and the plan as text."""
-
     progress: tuple[SeriesProgress, ...] = ()
     text: str = ""
     error: str = ""
@@ -218,8 +200,6 @@ class Action(StrEnum):
 
 
 class Cue(StrEnum):
-    """Sound for a state of the pullback test."""
-
     PULL = "pull"
     HOLD = "hold"
     LET_GO = "let-go"
@@ -244,7 +224,6 @@ class RecordState:
     progress: Progress | None = None
     plan: PlanState = field(default_factory=PlanState)
     status_message: Chip = EMPTY_CHIP
-    """Outcome of the last action, and notes of the engine while nothing is recorded."""
     undo: str = ""
     """What `Action.UNDO` takes back; empty where nothing can be."""
     cue: Cue | None = None
@@ -262,8 +241,6 @@ class LoadPlan:
 
 @dataclass(frozen=True, slots=True)
 class LoadedPlan:
-    """Answer to `LoadPlan`."""
-
     tests: NextTests
     completed: tuple[tuple[str, str], ...] = ()
     """Path and series of each completed run."""
@@ -303,8 +280,6 @@ class MoveToTrash:
 
 @dataclass(frozen=True, slots=True)
 class RestoreFromTrash:
-    """Move a run out of the trash; the answer is its path."""
-
     path: str
 
 
@@ -337,8 +312,6 @@ class NoteEdited:
 
 @dataclass(frozen=True, slots=True)
 class PlotResized:
-    """The plots have another width (pixels)."""
-
     width_px: int
 
 
@@ -352,8 +325,6 @@ class Connecting:
 
 @dataclass(frozen=True, slots=True)
 class ClockTicked:
-    """Time has passed; `now_s` on the clock of `StandContext`."""
-
     now_s: float
 
 

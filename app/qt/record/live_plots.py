@@ -27,8 +27,6 @@ _DENSE_STROKES = 100.0
 
 
 class LivePlots(QWidget):
-    """Shows `Traces`; parts that have not changed are not touched."""
-
     resized = Signal(int)
 
     def __init__(self, theme: Theme) -> None:
@@ -101,8 +99,6 @@ def _limits(traces: Traces) -> tuple[float, float]:
 
 
 class _PlotMarks:
-    """Marks of one plot: spans and lines."""
-
     def __init__(self, plot: Plot, *, is_first: bool) -> None:
         self._is_first = is_first
         self._before = shaded_region(plot)

@@ -18,7 +18,6 @@ from app.qt.widgets.text import ValueLabel, break_path, label, padded, set_text_
 from messages.i18n import N_, gettext
 
 _ESTIMATES_MAX = 3
-"""T, n1 and f_d."""
 _RESULT_ROWS_MAX = 4
 _WARNINGS_MAX = 6
 _BAR_HEIGHT = 40
@@ -26,8 +25,6 @@ _BAR_RADIUS = 6.0
 
 
 class GuidancePanel(QWidget):
-    """Stepper, instruction, target bar, live estimate and current readings."""
-
     def __init__(self, theme: Theme, connect_device: Callable[[], object]) -> None:
         super().__init__()
         self._connect = make_button(gettext("Connect"), connect_device)
@@ -114,8 +111,6 @@ def _reserve_height(target: QLabel, lines_min: int) -> None:
 
 
 class Stepper(QWidget):
-    """Steps of a pullback test: the current one is filled, completed ones carry a tick."""
-
     def __init__(self) -> None:
         super().__init__()
         self._steps: tuple[record.Step, ...] = ()
@@ -285,7 +280,6 @@ class _EnterButton(QPushButton):
     """Button that Enter presses while it has the focus, even if Enter is a shortcut of the screen."""
 
     def event(self, event: QEvent) -> bool:
-        """Handle Enter before the shortcuts."""
         is_enter = isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         if is_enter and event.type() == QEvent.Type.ShortcutOverride:
             event.accept()

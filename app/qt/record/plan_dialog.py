@@ -20,8 +20,6 @@ _COLUMNS = 4
 
 
 class PlanDialog(QDialog):
-    """Edits the series plan and shows its progress."""
-
     def __init__(self, presenter: RecordPresenter, parent: QWidget) -> None:
         super().__init__(parent)
         self._presenter = presenter

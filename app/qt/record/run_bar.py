@@ -44,7 +44,6 @@ _FORM_FIELDS = {
     "count": (N_("Runs in a row"), "1"),
     "note": (N_("Note"), N_("kept with the next run")),
 }
-"""Title and placeholder of each field of `RunForm`."""
 _FORM_COLUMNS = 5
 _WIDE = {"note": 2}
 
@@ -249,8 +248,6 @@ class PlanStrip(QWidget):
 
 
 class RunFormFields(QWidget):
-    """Fields of a `RunForm`."""
-
     def __init__(self, edit: Callable[[RunForm], None], leave: Callable[[], None]) -> None:
         super().__init__()
         self._edit = edit

@@ -44,7 +44,6 @@ class CuePlayer:
             QApplication.beep()
 
     def _file(self, cue: Cue) -> Path:
-        """File of a cue, written once by each start of the program, since cues may change."""
         path = self._folder / f"{cue.value}.wav"
         if cue not in self._written:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -54,7 +53,6 @@ class CuePlayer:
 
 
 def cue_wav(cue: Cue) -> bytes:
-    """WAV file of a cue."""
     made = io.BytesIO()
     with wave.open(made, "wb") as file:
         file.setnchannels(1)

@@ -73,7 +73,6 @@ class ProgressBar(QProgressBar):
 
 
 def make_button(text: str, act: Callable[[], object], hint: str = "") -> QPushButton:
-    """Make a button that calls `act`."""
     button = QPushButton(text)
     button.setToolTip(hint)
     button.clicked.connect(lambda _checked: act())

@@ -191,7 +191,6 @@ def shaded_region(plot: Plot, orientation: str = "vertical") -> Any:
 
 
 def vertical_line(plot: Plot) -> Any:
-    """Add a vertical line; `setValue` places it."""
     return plot.add(pg.InfiniteLine(angle=90, movable=False))
 
 

@@ -69,10 +69,8 @@ def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
     presenter.start_simulation()
     presenter.set_form(ConnectForm("COM7", "csv"))
     presenter.connect()
-    presenter.open_run("/recordings/a.h5")
-    presenter.open_run("")
     presenter.navigator.close_connection()
-    assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "/recordings/a.h5", "closed"]
+    assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "closed"]
 
 
 def test_nothing_is_opened_twice_while_something_is_awaited(

@@ -105,7 +105,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
 
 
 def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
-    desk.window.start.open_run("/recordings/a.h5")
+    desk.window.open_run("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
     desk.analysis("/recordings/a.h5").done(analysed(path="/recordings/a.h5"))
     assert desk.window.identify.state.title == "a.h5"
