@@ -20,10 +20,10 @@ _NUMBERS = ("temperature_c", "humidity_percent")
 
 
 def parse_conditions(
-    form: object, other: Mapping[str, str], names: Sequence[str] = CONDITION_FIELDS
+    form: Mapping[str, str], other: Mapping[str, str], names: Sequence[str] = CONDITION_FIELDS
 ) -> Conditions:
     """Parse fields of `form` by these names, and add `other` conditions. Raises MetadataError."""
-    texts = {name: getattr(form, name).strip() for name in names}
+    texts = {name: form[name].strip() for name in names}
     texts |= {name: number_text.normalize_number(texts[name]) for name in _NUMBERS if name in texts}
     known = Conditions.parse({name: text for name, text in texts.items() if text})
     return known.replace(other=dict(other))

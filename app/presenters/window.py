@@ -28,7 +28,7 @@ from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
-from app.presenters.worker import EventWorker, LazyModule, Worker, WorkerPool
+from app.presenters.worker import LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
@@ -86,10 +86,10 @@ class WindowPresenter(Presenter[WindowState]):
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
-        runs, batch = EventWorker(pool.make_worker()), EventWorker(pool.make_worker())
+        runs, batch = pool.make_worker(), pool.make_worker()
         self.start = StartPresenter(context.start, self, context.list_ports)
         self.record = RecordPresenter(connection, stand, pool.make_worker(), author)
-        self.identify = IdentifyPresenter(analysis, analysis.poll)
+        self.identify = IdentifyPresenter(analysis)
         self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(

@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -139,7 +139,7 @@ class NextRuns:
         if not self.is_loaded or self.choices.form_error:
             return self, None
         form = self.choices.form
-        conditions = parse_conditions(form, self.tests.conditions.other)
+        conditions = parse_conditions(asdict(form), self.tests.conditions.other)
         operator = form.operator.strip()
         tests = self.tests.replace(series=self.series, operator=operator, conditions=conditions)
         if tests == self.saved:
@@ -154,7 +154,7 @@ class NextRuns:
             series=self.series,
             operator=form.operator.strip(),
             note=form.note.strip(),
-            conditions=parse_conditions(form, self.tests.conditions.other),
+            conditions=parse_conditions(asdict(form), self.tests.conditions.other),
         )
 
     @property
@@ -257,7 +257,7 @@ def _labelled(name: str, text: str, unit: str = "") -> str:
 def _form_error(form: RunForm) -> str:
     """What is wrong with a form, as a sentence; empty if nothing is."""
     try:
-        parse_conditions(form, {})
+        parse_conditions(asdict(form), {})
         _parse_count(form)
     except ConditionError as error:
         return sentence(

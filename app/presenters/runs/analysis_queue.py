@@ -1,13 +1,21 @@
 """Queue of analyses of the Runs screen, executed by a worker of their own."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.presenters.base import Progress, batch_progress, run_count_text
-from app.presenters.events import TaskFailed, TaskProgress, WorkerEvent
-from app.presenters.runs.tasks import ANALYSE_RUNS, ANALYSING, AnalyseRuns, RunAnalysed
-from app.presenters.worker import EventWorker
+from app.presenters.events import TaskFailure
+from app.presenters.runs.state import ANALYSING, RunAnalysed
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext, ngettext
+
+if TYPE_CHECKING:
+    from app.presenters.runs import tasks
+else:
+    tasks = LazyModule("app.presenters.runs.tasks")
 
 
 @dataclass(slots=True)
@@ -38,72 +46,74 @@ class AnalysisSummary:
                 count,
                 runs=run_count_text(self.up_to_date),
             )
-        said = [gettext("Analysed {runs}", runs=run_count_text(self.analysed))]
+        parts = [gettext("Analysed {runs}", runs=run_count_text(self.analysed))]
         if count:
-            said.append(ngettext("{count} was up to date", "{count} were up to date", count))
+            parts.append(ngettext("{count} was up to date", "{count} were up to date", count))
         if self.cancelled:
-            said.append(gettext("then given up"))
-        return ", ".join(said)
+            parts.append(gettext("then given up"))
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Batch:
+    paths: tuple[str, ...]
+    reanalyse: bool
 
 
 class AnalysisQueue:
-    """Submits analyses to a worker of their own, and collects their outcome until all are done."""
+    """Submits analyses to `worker`; `on_ended` gets their summary once all are done, or were cancelled."""
 
-    def __init__(self, worker: EventWorker) -> None:
+    def __init__(self, worker: Worker, on_ended: Callable[[AnalysisSummary], object]) -> None:
         self._worker = worker
-        self._pending: list[AnalyseRuns] = []
+        self._on_ended = on_ended
+        self._pending: list[_Batch] = []
         self._summary = AnalysisSummary()
         self.progress: Progress | None = None
 
     def submit(self, paths: tuple[str, ...], *, reanalyse: bool) -> None:
         """Submit runs, apart from those that are queued already."""
-        waiting = {path for task in self._pending if task.reanalyse or not reanalyse for path in task.paths}
-        new = tuple(path for path in paths if path not in waiting)
-        if not new:
+        same = [batch for batch in self._pending if batch.reanalyse or not reanalyse]
+        waiting = {path for batch in same for path in batch.paths}
+        batch = _Batch(tuple(path for path in paths if path not in waiting), reanalyse)
+        if not batch.paths:
             return
         if not self._pending:
             self._summary = AnalysisSummary()
-            batch_progress(self._set_progress, ANALYSING, new)(0.0, "")
-        task = AnalyseRuns(new, reanalyse)
-        self._pending.append(task)
-        self._worker.submit(ANALYSE_RUNS, task)
+            batch_progress(self._on_progress, ANALYSING, batch.paths)(0.0, "")
+        self._pending.append(batch)
+        self._worker.submit(
+            tasks.analyse_runs,
+            batch.paths,
+            reanalyse,
+            done=lambda _: self._end(batch),
+            failed=partial(self._on_failed, batch),
+            progress=self._on_progress,
+        )
 
-    def poll(self) -> AnalysisSummary | None:
-        """Process the events of the worker; the summary once all analyses are done, else None."""
-        ended = [self._on_event(event) for event in self._worker.poll() if event.argument in self._pending]
-        return self._ended() if any(ended) and not self._pending else None
-
-    def cancel(self) -> AnalysisSummary:
-        self.poll()
-        self._summary.cancelled = bool(self._pending)
+    def cancel(self) -> None:
+        self._worker.poll()
+        if not self._pending:
+            return
+        self._summary.cancelled = True
         self._pending.clear()
         self._worker.cancel()
-        self._worker.poll()  # discards the event of the cancellation
-        return self._ended()
+        self._end()
 
-    def close(self) -> None:
-        self._worker.close()
+    def _on_progress(self, progress: Progress | RunAnalysed) -> None:
+        if isinstance(progress, RunAnalysed):
+            self._summary.add(progress)
+        else:
+            self.progress = progress
 
-    def _on_event(self, event: WorkerEvent) -> bool:
-        if isinstance(event, TaskProgress):
-            if isinstance(event.progress, RunAnalysed):
-                self._summary.add(event.progress)
-            else:
-                self._set_progress(event.progress)
-            return False
-        self._pending.remove(event.argument)
-        if isinstance(event, TaskFailed):
-            first = Path(event.argument.paths[0]).name
-            self._summary.faults.append(f"{first}: {event.message}" if _is_one(event) else str(event.message))
-        return True
+    def _on_failed(self, batch: _Batch, failure: TaskFailure) -> None:
+        if batch in self._pending:  # not after `cancel`
+            name = f"{Path(batch.paths[0]).name}: " if len(batch.paths) == 1 else ""
+            self._summary.faults.append(f"{name}{failure.message}")
+            self._end(batch)
 
-    def _set_progress(self, progress: Progress) -> None:
-        self.progress = progress
-
-    def _ended(self) -> AnalysisSummary:
-        self.progress = None
-        return self._summary
-
-
-def _is_one(event: TaskFailed) -> bool:
-    return len(event.argument.paths) == 1
+    def _end(self, batch: _Batch | None = None) -> None:
+        if batch is not None:
+            self._pending.remove(batch)
+        if not self._pending:
+            self.progress = None
+            self._on_ended(self._summary)

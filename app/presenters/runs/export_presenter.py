@@ -1,14 +1,22 @@
 """Presenter of the export dialog: format, content and target, with a preview."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.events import TaskFailure
 from app.presenters.results import sentence
-from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
+from app.presenters.runs.state import BatchOutcome
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import N_, gettext, ngettext
-from messages.message import Message, message, replace_options
+from messages.message import message, replace_options
+
+if TYPE_CHECKING:
+    from app.presenters.runs import tasks
+else:
+    tasks = LazyModule("app.presenters.runs.tasks")
 
 FORMATS = {
     "csv": N_("CSV, for anything"),
@@ -26,7 +34,8 @@ CONTENTS = {
 }
 _SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
 _LABELS = {"-o": message("place")}
-_ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
+_CONTENTS_OF = {"uff58": ("samples",), "latex": ("coefficients",)}
+"""Contents of the formats that do not support all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +56,11 @@ class ExportState:
 
 
 class ExportPresenter(Presenter[ExportState]):
-    """Exports runs; results of `submit` come to `on_preview`, `on_done` or `on_failed`."""
+    """Exports runs by `worker`, which the Runs screen polls and closes."""
 
-    def __init__(self, submit: Callable[[PreviewExport | ExportRuns], None]) -> None:
+    def __init__(self, worker: Worker) -> None:
         super().__init__(ExportState())
-        self._submit = submit
+        self._worker = worker
         self._folder = Path()
         self._is_output_typed = False
 
@@ -63,12 +72,7 @@ class ExportPresenter(Presenter[ExportState]):
 
     def set_format(self, name: str) -> None:
         """Choose one of `FORMATS`; contents that it does not support are not offered."""
-        contents = tuple(
-            content
-            for content in CONTENTS
-            if not (name in _ONLY_SAMPLES and content != "samples")
-            and not (name in _ONLY_COEFFICIENTS and content != "coefficients")
-        )
+        contents = _CONTENTS_OF.get(name, tuple(CONTENTS))
         content = self.state.content if self.state.content in contents else contents[0]
         self._update(format=name, contents=contents, content=content, message=EMPTY_CHIP)
         self._propose()
@@ -95,30 +99,34 @@ class ExportPresenter(Presenter[ExportState]):
             )
             self._update(message=Chip(missing, Tone.BAD))
         elif state.progress is None:
-            output = str(Path(state.output.strip()).expanduser())
             self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
-            self._submit(ExportRuns(state.runs, output, state.format, state.content, state.replace))
+            self._worker.submit(
+                tasks.export_files,
+                state.runs,
+                str(Path(state.output.strip()).expanduser()),
+                {"format": state.format, "content": state.content, "replace": state.replace},
+                done=self._on_done,
+                failed=self._on_failed,
+                progress=lambda progress: self._update(progress=progress),
+            )
 
-    def on_progress(self, progress: Progress) -> None:
-        self._update(progress=progress)
+    def _on_preview(self, run: str, choice: dict[str, str], preview: str) -> None:
+        state = self.state
+        if (run, choice) == (state.runs[0], {"format": state.format, "content": state.content}):
+            self._update(preview=preview)
 
-    def on_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
-        if task == self._preview_task():
-            self._update(preview=preview.text)
-
-    def on_done(self, outcome: BatchOutcome) -> None:
-        files = dict.fromkeys(outcome.done)
-        text = (
-            gettext("Wrote {files}", files=_files(list(files))) if files else gettext("Nothing was written")
-        )
+    def _on_done(self, outcome: BatchOutcome) -> None:
+        files = tuple(dict.fromkeys(outcome.done))
+        text = gettext("Wrote {files}", files=_files(files)) if files else gettext("Nothing was written")
         if outcome.faults:
             failed, all_runs = len(outcome.faults), len(self.state.runs)
             text += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
 
-    def on_failed(self, fault: Message) -> None:
-        self._update(progress=None, message=Chip(sentence(replace_options(fault, _LABELS)), Tone.BAD))
+    def _on_failed(self, failure: TaskFailure) -> None:
+        words = sentence(replace_options(failure.message, _LABELS))
+        self._update(progress=None, message=Chip(words, Tone.BAD))
 
     def _propose(self) -> None:
         """Propose a target, and request a preview."""
@@ -134,17 +142,18 @@ class ExportPresenter(Presenter[ExportState]):
             self._is_output_typed = False
             self._update(output=str(self._folder / name))
         self._update(is_folder=is_folder, preview="")
-        self._submit(self._preview_task())
-
-    def _preview_task(self) -> PreviewExport:
-        return PreviewExport(self.state.runs[0], self.state.format, self.state.content)
-
-
-def _files(files: list[str]) -> str:
-    return (
-        files[0]
-        if len(files) == 1
-        else ngettext(
-            "{count} file to {folder}", "{count} files to {folder}", len(files), folder=Path(files[0]).parent
+        run, choice = state.runs[0], {"format": state.format, "content": state.content}
+        self._worker.submit(
+            tasks.preview_export,
+            run,
+            choice,
+            done=partial(self._on_preview, run, choice),
+            failed=self._on_failed,
         )
-    )
+
+
+def _files(files: tuple[str, ...]) -> str:
+    if len(files) == 1:
+        return files[0]
+    folder = Path(files[0]).parent
+    return ngettext("{count} file to {folder}", "{count} files to {folder}", len(files), folder=folder)

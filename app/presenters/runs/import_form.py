@@ -1,109 +1,167 @@
-"""Form of the import dialog, and its validation."""
+"""Fields of the import dialog: one table of titles, choices, options of the command line, and rules."""
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import PurePath
 
 from app.presenters import number_text
-from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
+from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES, parse_conditions
 from app.runs.errors import ConditionError, MetadataError
 from messages.i18n import N_, gettext, translate
 
 GAIN = "gain"
 """Choice of `unit` for a gain instead."""
+Form = Mapping[str, str]
+"""Texts as typed, or chosen values, by name of the field."""
 
 
 @dataclass(frozen=True, slots=True)
-class TextFormat:
-    """Format of a text file, as typed; empty fields are detected."""
+class NumberRule:
+    """Which numbers a field takes."""
 
-    delimiter: str = ""
-    decimal: str = ""
-    skip: str = ""
-    header: str = ""
-    """`yes` or `no`."""
+    fault: str
+    """Message about another text, with the field `{text}`."""
+    is_valid: Callable[[float], bool] = lambda _: True
+    convert: Callable[[float], float] = float
 
 
 @dataclass(frozen=True, slots=True)
-class ImportForm:
-    """Fields of the dialog, as typed. Columns are named as in `FilePreview.columns`."""
+class Field:
+    """A field: a line of text, or a choice."""
 
-    text_format: TextFormat = TextFormat()
-    time: str = ""
-    table: str = ""
-    second: str = ""
-    measures: str = "relative"
-    time_unit: str = "s"
-    unit: str = "m"
-    gain: str = ""
-    offset: str = ""
-    unit_name: str = ""
-    gain_uncertainty: str = ""
-    quantity: str = "displacement"
-    from_s: str = ""
-    until_s: str = ""
-    segment: str = ""
-    series: str = ""
-    plate_mass_kg: str = ""
-    table_mass_kg: str = ""
-    operator: str = ""
-    note: str = ""
-    temperature_c: str = ""
-    humidity_percent: str = ""
-    plate_id: str = ""
-    contact_id: str = ""
-    surface_preparation: str = ""
-    run_in_number: str = ""
-    other: str = ""
-    """Other conditions, as `name=text; name=text`."""
-    name: str = ""
-    """Name of the run; empty: that of the file."""
+    name: str
+    title: str
+    hint: str = ""
+    """What holds if nothing is typed."""
+    option: str = ""
+    """Option of `slipstand import`, as messages of the importer name it."""
+    choices: Mapping[str, str] | None = None
+    """Titles by value, the first as default; empty for columns of the file, None for a line of text."""
+    rule: NumberRule | None = None
+
+    def parse(self, form: Form) -> float | None:
+        """Read the number of the field in a valid form; None if it is empty."""
+        value = number_text.parse_number(form[self.name])
+        return value if value is None or self.rule is None else self.rule.convert(value)
+
+    def fault(self, form: Form) -> str:
+        """What is wrong with the number; empty if nothing is."""
+        value = number_text.parse_number(form[self.name])
+        if value is None or self.rule is None or (math.isfinite(value) and self.rule.is_valid(value)):
+            return ""
+        return gettext(self.rule.fault, text=form[self.name].strip())
 
 
-PER_FILE_FIELDS = ("note", "run_in_number", "name")
-"""Fields that are cleared for the next file."""
-METADATA_FIELDS = (
-    "series",
-    "plate_mass_kg",
-    "table_mass_kg",
-    "operator",
-    "note",
-    *CONDITION_FIELDS,
-    "other",
-    "name",
+_ANY = NumberRule(N_("{text} is no number. Write one, or leave it empty"))
+_POSITIVE = NumberRule(
+    N_("{text} is no number above 0. Write one in kg, or leave it empty"), lambda value: value > 0.0
 )
-"""Fields that do not affect how a file is read."""
-
-_Number = tuple[str, Callable[[float], bool]]
-_ANY: _Number = (N_("{text} is no number. Write one, or leave it empty"), lambda _: True)
-_POSITIVE: _Number = (
-    N_("{text} is no number above 0. Write one in kg, or leave it empty"),
-    lambda value: value > 0.0,
-)
-_WHOLE: _Number = (
+_WHOLE = NumberRule(
     N_("{text} is no whole number, 0 or above. Write one, or leave it empty"),
     lambda value: value >= 0.0 and value == int(value),
+    int,
 )
-_GAIN: _Number = (
-    N_("{text} is no number other than 0. A negative one turns the gauge"),
-    lambda value: value != 0.0,
+_GAIN = NumberRule(
+    N_("{text} is no number other than 0. A negative one turns the gauge"), lambda value: value != 0.0
 )
-_SHARE: _Number = (
+_SHARE = NumberRule(
     N_("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
     lambda value: value >= 0.0,
 )
-NUMBER_RULES: dict[str, _Number] = {
-    "skip": _WHOLE, "gain": _GAIN, "offset": _ANY, "gain_uncertainty": _SHARE, "from_s": _ANY,
-    "until_s": _ANY, "segment": _WHOLE, "plate_mass_kg": _POSITIVE, "table_mass_kg": _POSITIVE,
+_LENGTH_UNITS = {"m": "m", "mm": "mm", "um": "µm", GAIN: N_("by a gain")}
+_MEASURES = {"relative": N_("plate against table"), "plate": N_("plate against base")}
+_QUANTITIES = {
+    "displacement": N_("displacement"),
+    "velocity": N_("velocity"),
+    "acceleration": N_("acceleration"),
+}
+_DETECT = {"": N_("find out")}
+_DELIMITERS = _DETECT | {
+    ",": N_("comma"), ";": N_("semicolon"), "\t": N_("tab"), " ": N_("blanks"), "|": "|"
 }  # fmt: skip
-"""For each number: message if it is invalid, and its condition."""
-NUMBER_FIELDS = tuple(name for name in NUMBER_RULES if name != "skip")
-"""Numbers of `ImportForm` itself; `skip` belongs to its `TextFormat`."""
-_WITH_GAIN = ("gain", "offset", "unit_name")
+_DECIMALS = _DETECT | {".": N_("point"), ",": N_("comma")}
+_HEADERS = _DETECT | {"yes": N_("yes"), "no": N_("no")}
+_CONDITION_HINTS = {
+    "plate_id": N_("which one"),
+    "contact_id": N_("which pair of surfaces"),
+    "surface_preparation": N_("how prepared"),
+}
+
+_COLUMNS = (
+    Field("time", N_("Time"), choices={}),
+    Field("time_unit", N_("Unit of time"), choices={"s": "s", "ms": "ms", "us": "µs"}),
+    Field("table", N_("Gauge 1, table"), choices={}),
+    Field("second", N_("Gauge 2"), choices={}),
+    Field("measures", N_("Gauge 2 measures"), choices=_MEASURES),
+    Field("quantity", N_("Quantity"), choices=_QUANTITIES),
+    Field("unit", N_("Unit"), option="--unit", choices=_LENGTH_UNITS),
+    Field("gain", N_("Gain"), N_("1, reading of one unit of a cell"), "--gain", rule=_GAIN),
+    Field("offset", N_("Offset"), N_("0, reading at a cell of 0"), "--offset", rule=_ANY),
+    Field("unit_name", N_("Unit of the gain"), N_("m, unless something else: rad, V"), "--unit-name"),
+)
+_TEST = (
+    Field("series", N_("Series"), N_("for example 1FFM0")),
+    Field("plate_mass_kg", N_("Plate mass, kg"), N_("as the series says"), rule=_POSITIVE),
+    Field("table_mass_kg", N_("Table mass, kg"), N_("as of the stand"), rule=_POSITIVE),
+    Field("operator", N_("Operator"), N_("who recorded")),
+    Field("note", N_("Note"), N_("kept with the run")),
+)
+_NAME = Field("name", N_("Name of the run"), N_("as of the file"))
+_CALIBRATION = (
+    Field(
+        "gain_uncertainty", N_("Uncertainty of the gain"), N_("not stated; 0.003 is 0.3 %"),
+        "--gain-uncertainty", rule=_SHARE,
+    ),
+)  # fmt: skip
+_LINES = (
+    Field("delimiter", N_("Between cells"), option="--delimiter", choices=_DELIMITERS),
+    Field("decimal", N_("Decimal sign"), option="--decimal", choices=_DECIMALS),
+    Field("header", N_("Names above"), option="--no-header", choices=_HEADERS),
+    Field("skip", N_("Lines skipped"), "0", "--skip", rule=_WHOLE),
+)
+_PART = (
+    Field("from_s", N_("From, s"), N_("the beginning"), "--from", rule=_ANY),
+    Field("until_s", N_("Until, s"), N_("the end"), "--until", rule=_ANY),
+    Field("segment", N_("Stretch"), N_("from 0, where times go back"), "--segment", rule=_WHOLE),
+)
+_CONDITIONS = (
+    *(
+        Field(name, title, _CONDITION_HINTS.get(name, N_("not known")))
+        for name, title in CONDITION_TITLES.items()
+    ),
+    Field("other", N_("Others"), N_("name=text; name=text")),
+)
+GROUPS = {N_("Columns"): _COLUMNS, N_("Test"): _TEST}
+RARE_GROUPS = {
+    N_("Calibration and name"): (*_CALIBRATION, _NAME),
+    N_("Lines"): _LINES,
+    N_("Part"): _PART,
+    N_("Conditions"): _CONDITIONS,
+}
+"""Groups under a fold."""
+FIELDS = {field.name: field for group in (GROUPS | RARE_GROUPS).values() for field in group}
+COLUMN_FIELDS = ("time", "table", "second")
+"""Names of columns, as in `FilePreview.columns`."""
+GAIN_FIELDS = ("gain", "offset", "unit_name")
+"""Fields that hold only where `unit` is `GAIN`."""
+LINE_FIELDS = tuple(field.name for field in _LINES)
+PER_FILE_FIELDS = ("note", "run_in_number", "name", "delimiter", "decimal", "header")
+"""Fields that are cleared for the next file."""
+_METADATA_FIELDS = {field.name for field in (*_TEST, _NAME, *_CONDITIONS)}
 
 
-def validate(form: ImportForm) -> dict[str, str]:
+def make_form(**texts: str) -> Form:
+    """Make a form of the defaults and some other texts."""
+    return {name: next(iter(field.choices or {}), "") for name, field in FIELDS.items()} | texts
+
+
+def reads_alike(one: Form, other: Form | None) -> bool:
+    """Whether both forms read a file the same way: they differ only in metadata of the run."""
+    return other is not None and all(one[name] == other[name] for name in FIELDS.keys() - _METADATA_FIELDS)
+
+
+def validate(form: Form) -> dict[str, str]:
     """Faults by name of the field; empty if there are none."""
     return dict(_faults(form))
 
@@ -111,46 +169,37 @@ def validate(form: ImportForm) -> dict[str, str]:
 def parse_pairs(text: str) -> Iterator[tuple[str, str]]:
     """Split `name=text; name=text`; name or text is empty where it is missing."""
     for part in filter(str.strip, text.split(";")):
-        name, _, said = part.partition("=")
-        yield name.strip(), said.strip()
+        name, _, value = part.partition("=")
+        yield name.strip(), value.strip()
 
 
-def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
-    typed = {field.name: getattr(form, field.name) for field in fields(form)} | {
-        "skip": form.text_format.skip
-    }
-    for name, (words, is_right) in NUMBER_RULES.items():
-        value = number_text.parse_number(typed[name])
-        if name in _WITH_GAIN and form.unit != GAIN:
-            continue
-        if value is not None and not (math.isfinite(value) and is_right(value)):
-            yield name, gettext(words, text=typed[name].strip())
-    first, last = (number_text.parse_number(text) for text in (form.from_s, form.until_s))
-    if first is not None and last is not None and last <= first:
-        yield (
-            "until_s",
-            gettext("{text} is not after the first second. Write a later one", text=form.until_s.strip()),
-        )
-    if form.name.strip() != PurePath(form.name.strip()).name:
-        yield "name", gettext("{text} is no name of a file. Leave out / and \\", text=form.name.strip())
-    yield from _faults_of_conditions(form)
+def _faults(form: Form) -> Iterator[tuple[str, str]]:
+    for name, field in FIELDS.items():
+        if (fault := field.fault(form)) and (name not in GAIN_FIELDS or form["unit"] == GAIN):
+            yield name, fault
+    first_s, last_s = FIELDS["from_s"].parse(form), FIELDS["until_s"].parse(form)
+    if first_s is not None and last_s is not None and last_s <= first_s:
+        text = form["until_s"].strip()
+        yield "until_s", gettext("{text} is not after the first second. Write a later one", text=text)
+    name = form["name"].strip()
+    if name != PurePath(name).name:
+        yield "name", gettext("{text} is no name of a file. Leave out / and \\", text=name)
+    yield from _condition_faults(form)
 
 
-def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
+def _condition_faults(form: Form) -> Iterator[tuple[str, str]]:
     for name in CONDITION_FIELDS:
         try:
             parse_conditions(form, {}, (name,))
         except ConditionError as error:
             yield name, translate(error.reason)
-    if not all(name and text for name, text in parse_pairs(form.other)):
-        words = gettext(
-            "{text} is no condition. Write name=text, and ; between them", text=form.other.strip()
-        )
-        yield "other", words
-        return
+    other = dict(parse_pairs(form["other"]))
     try:
-        parse_conditions(form, dict(parse_pairs(form.other)), ())
+        parse_conditions(form, other, ())
     except ConditionError as error:
         yield "other", translate(error.reason)
     except MetadataError as error:
         yield "other", translate(error.message)
+    if not all(name and text for name, text in other.items()):
+        text = form["other"].strip()
+        yield "other", gettext("{text} is no condition. Write name=text, and ; between them", text=text)

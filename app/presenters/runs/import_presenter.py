@@ -1,40 +1,38 @@
 """Presenter of the import dialog: columns and units of a foreign file, with a preview."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
+from app.presenters.events import TaskFailure
 from app.presenters.results import sentence
-from app.presenters.runs.import_form import METADATA_FIELDS, PER_FILE_FIELDS, ImportForm, TextFormat, validate
-from app.presenters.runs.state import Overlay
-from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport, SurveyFile
+from app.presenters.runs.import_form import (
+    FIELDS,
+    LINE_FIELDS,
+    PER_FILE_FIELDS,
+    Form,
+    make_form,
+    reads_alike,
+    validate,
+)
+from app.presenters.runs.state import ImportPreview, Overlay
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import N_, gettext, ngettext
 from messages.message import Message, message, options_in, replace_options
 
 if TYPE_CHECKING:
+    from app.presenters.runs import tasks
     from app.runs.exchange.importing import FilePreview
+else:
+    tasks = LazyModule("app.presenters.runs.tasks")
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 """Width of a column of the first rows, in characters."""
-_OPTIONS = {
-    "--delimiter": ("delimiter", message("Between cells")),
-    "--decimal": ("decimal", message("Decimal sign")),
-    "--skip": ("skip", message("Lines skipped")),
-    "--no-header": ("header", message("Names above")),
-    "--segment": ("segment", message("Stretch")),
-    "--gain-uncertainty": ("gain_uncertainty", message("Uncertainty of the gain")),
-    "--gain": ("gain", message("Gain")),
-    "--offset": ("offset", message("Offset")),
-    "--unit-name": ("unit_name", message("Unit of the gain")),
-    "--unit": ("unit", message("Unit")),
-    "--from": ("from_s", message("From")),
-    "--until": ("until_s", message("Until")),
-}
-"""Field and label of each option that a message of the importer may name."""
-_LABELS = {name: message("“{label}”", label=label) for name, (_, label) in _OPTIONS.items()}
+_OPTIONS = {field.option: field for field in FIELDS.values() if field.option}
+_LABELS = {option: message("“{label}”", label=Message(field.title)) for option, field in _OPTIONS.items()}
 _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
 
 
@@ -51,7 +49,7 @@ class ImportState:
     first_rows: str = ""
     is_text: bool = True
     """Whether delimiter and decimal sign apply."""
-    form: ImportForm = field(default_factory=ImportForm)
+    form: Form = field(default_factory=make_form)
     faults: dict[str, str] = field(default_factory=dict)
     """Faults by name of the field."""
     overlay: Overlay | None = None
@@ -65,46 +63,62 @@ class ImportState:
     """Whether the file was read with the current form."""
 
 
-class ImportPresenter(Presenter[ImportState]):
-    """Imports one file after another; results of `submit` come to `on_done` or `on_failed`."""
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """A file that is being read: for its columns and first lines, or as it would be imported."""
 
-    def __init__(self, submit: Callable[[ImportTask], None]) -> None:
+    path: str
+    form: Form
+    is_survey: bool
+
+
+class ImportPresenter(Presenter[ImportState]):
+    """Imports one file after another by `worker`, which the Runs screen polls and closes."""
+
+    def __init__(self, worker: Worker, on_imported: Callable[[str], object]) -> None:
         super().__init__(ImportState())
-        self._submit = submit
+        self._worker = worker
+        self._on_imported = on_imported
         self._folder = ""
         self._files: list[str] = []
-        self._pending_task: ImportTask | None = None
-        self._surveyed: TextFormat | None = None
-        self._previewed: ImportForm | None = None
-        self._stale = False
+        self._reading: _Reading | None = None
+        self._is_stale = False
+        self._surveyed: Form | None = None
+        self._previewed: Form | None = None
 
     def open(self, paths: tuple[str, ...], folder: str, operator: str) -> None:
         self._folder = folder
         self._files += paths
         if not self.state.path:
-            self._update(form=replace(self.state.form, operator=operator), message=EMPTY_CHIP)
+            self._update(form={**self.state.form, "operator": operator}, message=EMPTY_CHIP)
             self._next()
         self._update(pending=len(self._files))
 
-    def set_form(self, form: ImportForm) -> None:
-        before, had_faults, path = self.state.form, self.state.faults, self.state.path
+    def set_form(self, form: Form) -> None:
+        before, had_faults = self.state.form, self.state.faults
         self._update(form=form, faults=validate(form))
-        if not path:
+        if not self.state.path:
             return
         if self.state.faults:
             self._update(can_import=False, message=_correction_chip())
-        elif had_faults and self._pending_task is None and _reads_alike(form, self._previewed):
+        elif had_faults and self._reading is None and reads_alike(form, self._previewed):
             self._update(can_import=not self.state.busy, message=EMPTY_CHIP)
-        elif had_faults or not _reads_alike(form, before):
+        elif had_faults or not reads_alike(form, before):
             self._update(can_import=False, message=EMPTY_CHIP)
-            self._request(
-                PreviewImport(path, form) if form.text_format == self._surveyed else self._survey_task()
-            )
+            self._read(is_survey=_line_texts(form) != self._surveyed)
 
     def import_file(self) -> None:
-        if self.state.can_import and not self.state.busy:
+        state = self.state
+        if state.can_import and not state.busy:
             self._update(busy=gettext("Importing"), message=EMPTY_CHIP, can_import=False)
-            self._submit(ImportFile(self.state.path, self.state.form, self._folder))
+            self._worker.submit(
+                tasks.import_file,
+                state.path,
+                state.form,
+                self._folder,
+                done=self._on_done,
+                failed=self._on_failed,
+            )
 
     def skip_file(self) -> None:
         self._next()
@@ -113,105 +127,95 @@ class ImportPresenter(Presenter[ImportState]):
         self._files.clear()
         self._next()
 
-    def on_done(self, task: ImportTask, answer: Any) -> None:
-        if isinstance(task, ImportFile):
-            self._update(busy="")
-            self._next()
-            self._update(message=Chip(gettext("Imported {name}", name=Path(answer).stem), Tone.OK))
-        elif self._is_current(task):
-            if isinstance(task, SurveyFile):
-                self._show_columns(answer)
-            else:
-                self._show_preview(answer, task.form)
-
-    def on_failed(self, task: ImportTask, fault: Message) -> None:
-        words = sentence(replace_options(fault, _LABELS))
-        faults = dict.fromkeys(_named_field(fault), words)
-        if isinstance(task, ImportFile):
-            self._update(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
-        elif self._is_current(task):
-            self._surveyed = self._surveyed if isinstance(task, PreviewImport) else None
-            self._previewed = None
-            self._update(
-                busy="", overlay=_NOTHING_DRAWN, summary="", faults=faults, message=Chip(words, Tone.BAD),
-                can_import=False,
-            )  # fmt: skip
-
     def _next(self) -> None:
         path = self._files.pop(0) if self._files else ""
-        form = replace(
-            self.state.form,
-            text_format=TextFormat(skip=self.state.form.text_format.skip),
-            **dict.fromkeys(PER_FILE_FIELDS, ""),
-        )
-        self._pending_task = self._surveyed = self._previewed = None
-        self._stale = False
-        self._update(
-            path=path, pending=len(self._files), columns=(), column_labels=(), first_rows="", overlay=None,
-            summary="",
-            busy="", can_import=False, form=form, faults=validate(form), message=EMPTY_CHIP,
-        )  # fmt: skip
+        form = {**self.state.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
+        self._reading = self._surveyed = self._previewed = None
+        self._is_stale = False
+        self._set_state(ImportState(path=path, pending=len(self._files), form=form, faults=validate(form)))
         if path:
-            self._request(self._survey_task())
+            self._read(is_survey=True)
 
-    def _survey_task(self) -> SurveyFile:
-        return SurveyFile(self.state.path, self.state.form.text_format)
-
-    def _request(self, task: ImportTask) -> None:
-        """Submit one task at a time; a request during a task repeats the survey after it."""
-        if self._pending_task is not None:
-            self._stale = True
+    def _read(self, *, is_survey: bool) -> None:
+        """Read the file by the form, once at a time; a request meanwhile repeats the survey after it."""
+        if self._reading is not None:
+            self._is_stale = True
             return
-        self._pending_task = task
-        self._update(busy=gettext("Reading {name}", name=Path(self.state.path).name))
-        self._submit(task)
+        reading = self._reading = _Reading(self.state.path, self.state.form, is_survey)
+        self._update(busy=gettext("Reading {name}", name=Path(reading.path).name))
+        self._worker.submit(
+            tasks.survey_file if is_survey else tasks.preview_import,
+            reading.path,
+            reading.form,
+            done=lambda answer: self._on_read(reading, answer),
+            failed=lambda failure: self._on_reading_failed(reading, failure),
+        )
 
-    def _is_current(self, task: ImportTask) -> bool:
-        """Whether the result of a task is still wanted; if not, request it again."""
-        if task != self._pending_task:
+    def _on_done(self, run: str) -> None:
+        self._on_imported(run)
+        self._next()
+        self._update(message=Chip(gettext("Imported {name}", name=Path(run).stem), Tone.OK))
+
+    def _on_failed(self, failure: TaskFailure) -> None:
+        self._update(busy="", can_import=True)
+        self._show_fault(failure.message)
+
+    def _on_read(self, reading: _Reading, answer: Any) -> None:
+        if self._ends(reading):
+            if reading.is_survey:
+                self._show_columns(answer)
+            else:
+                self._show_preview(answer, reading.form)
+
+    def _on_reading_failed(self, reading: _Reading, failure: TaskFailure) -> None:
+        if self._ends(reading):
+            self._surveyed = None if reading.is_survey else self._surveyed
+            self._previewed = None
+            self._update(busy="", overlay=_NOTHING_DRAWN, summary="", can_import=False)
+            self._show_fault(failure.message)
+
+    def _ends(self, reading: _Reading) -> bool:
+        """Whether the result of a reading is still wanted; if not, read again."""
+        if reading is not self._reading:
             return False
-        self._pending_task = None
-        if self._stale:
-            self._stale = False
-            self._update(busy="")
-            if not self.state.faults:
-                self._request(self._survey_task())
-            return False
-        return True
+        self._reading = None
+        if not self._is_stale:
+            return True
+        self._is_stale = False
+        self._update(busy="")
+        if not self.state.faults:
+            self._read(is_survey=True)
+        return False
+
+    def _show_fault(self, fault: Message) -> None:
+        words = sentence(replace_options(fault, _LABELS))
+        faults = dict.fromkeys(_named_field(fault), words)
+        self._update(faults=faults, message=Chip(words, Tone.BAD))
 
     def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; keep those that were chosen if the file has them."""
-        form, offered = self.state.form, ("", *found.columns)
-        if (
-            not form.time
-            or form.time not in offered
-            or form.table not in offered
-            or form.second not in offered
-        ):
-            form = replace(
-                form, time=found.time, table=found.table, second=found.second, measures=found.measures,
-                time_unit=found.time_unit or form.time_unit, unit=found.unit or form.unit,
-            )  # fmt: skip
-        options = found.options
-        header = "yes" if options.header else "no"
-        text_format = TextFormat(
-            options.delimiter or "", options.decimal or "", form.text_format.skip, header
-        )
-        self._surveyed = text_format
+        form, options = dict(self.state.form), found.options
+        is_known = {form["time"], form["table"], form["second"]} <= {"", *found.columns}
+        if not is_known or not form["time"]:
+            form |= {name: getattr(found, name) for name in ("time", "table", "second", "measures")}
+            form["time_unit"] = found.time_unit or form["time_unit"]
+            form["unit"] = found.unit or form["unit"]
+        form["delimiter"], form["decimal"] = options.delimiter or "", options.decimal or ""
+        form["header"] = "yes" if options.header else "no"
+        self._surveyed = _line_texts(form)
         self._update(
             busy="", columns=found.columns, column_labels=found.titles, first_rows=_format_rows(found),
-            is_text=bool(found.rows),
-            form=replace(form, text_format=text_format),
+            is_text=bool(found.rows), form=form,
         )  # fmt: skip
         if not self.state.faults:
-            self._request(PreviewImport(self.state.path, self.state.form))
+            self._read(is_survey=False)
 
-    def _show_preview(self, preview: ImportPreview, drawn: ImportForm) -> None:
-        self._previewed = drawn
-        is_right = not self.state.faults
+    def _show_preview(self, preview: ImportPreview, form: Form) -> None:
+        self._previewed = form
+        is_valid = not self.state.faults
         self._update(
-            busy="", overlay=preview.overlay, summary=preview.summary, can_import=is_right,
-            message=EMPTY_CHIP if is_right else _correction_chip(),
+            busy="", overlay=preview.overlay, summary=preview.summary, can_import=is_valid,
+            message=EMPTY_CHIP if is_valid else _correction_chip(),
         )  # fmt: skip
 
 
@@ -234,17 +238,13 @@ def _correction_chip() -> Chip:
     return Chip(gettext("Correct what is marked"), Tone.BAD)
 
 
+def _line_texts(form: Form) -> Form:
+    return {name: form[name] for name in LINE_FIELDS}
+
+
 def _named_field(fault: Message) -> tuple[str, ...]:
     """Name of the field that a message names, if it names exactly one."""
-    named = {_OPTIONS[name][0] for name in options_in(fault) if name in _OPTIONS}
+    named = {_OPTIONS[option].name for option in options_in(fault) if option in _OPTIONS}
     if "field" in fault.values:
         named.add(str(fault.values["field"]))
     return tuple(named) if len(named) == 1 else ()
-
-
-def _reads_alike(one: ImportForm, other: ImportForm | None) -> bool:
-    """Whether both forms read a file the same way."""
-    if other is None:
-        return False
-    about = dict.fromkeys(METADATA_FIELDS, "")
-    return replace(one, **about) == replace(other, **about)  # type: ignore[arg-type]  # all of them are texts

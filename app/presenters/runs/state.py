@@ -90,6 +90,34 @@ class Overlay:
     message: str = ""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class ImportPreview:
+    """The record of a file as it would be imported, and its length and rate as text."""
+
+    overlay: Overlay
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class BatchOutcome:
+    """Paths of the runs that were processed, and a line for each that failed."""
+
+    done: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+ANALYSING = N_("Analysing {name}, {number} of {all}")
+
+
+@dataclass(frozen=True, slots=True)
+class RunAnalysed:
+    """A run has been analysed; `fault` says in one line why it failed."""
+
+    path: str
+    is_up_to_date: bool = False
+    fault: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class RunsState:
     """State of the screen."""

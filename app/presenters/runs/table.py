@@ -1,6 +1,5 @@
 """Rows of the table of runs: filtered, sorted and formatted."""
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,21 +121,6 @@ def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
     return MetadataForm(
         **{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed
     )
-
-
-def parse_mass_kg(text: str) -> float:
-    """Parse a plate mass (kg). Raises ValueError that names value and remedy."""
-    try:
-        value_kg = float(text.replace(",", "."))
-    except ValueError:
-        value_kg = math.nan
-    if not (math.isfinite(value_kg) and value_kg > 0.0):
-        raise ValueError(
-            gettext(
-                "Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text
-            )
-        )
-    return value_kg
 
 
 def _cells(known: dict[Column, str]) -> tuple[str, ...]:

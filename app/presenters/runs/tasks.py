@@ -1,173 +1,294 @@
-"""Tasks of the Runs screen and its dialogs; the worker process executes them in `work`."""
+"""Tasks of the Runs screen, executed in its worker processes."""
 
-from dataclasses import dataclass, field
-from typing import Any, Final
+import itertools
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
-from app.presenters.base import Progress
-from app.presenters.runs.import_form import ImportForm, TextFormat
-from app.presenters.runs.state import Overlay
-from app.presenters.worker import LazyFunction
-from messages.i18n import N_
+from msgspec import convert
 
-EXECUTE: Final = LazyFunction("app.presenters.runs.work", "execute")
-ANALYSE_RUNS: Final = LazyFunction("app.presenters.runs.work", "analyse_runs")
-ANALYSING = N_("Analysing {name}, {number} of {all}")
+from analysis.formatting import with_unit
+from analysis.record import AnalysisError
+from app.presenters.base import Progress, ReportProgress, batch_progress
+from app.presenters.conditions import parse_conditions
+from app.presenters.number_text import format_fixed
+from app.presenters.runs.import_form import COLUMN_FIELDS, FIELDS, GAIN, Form, parse_pairs
+from app.presenters.runs.state import ANALYSING, BatchOutcome, ImportPreview, Overlay, RunAnalysed, Trace
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
+from app.runs.blocks import RunBlock
+from app.runs.decimation import DecimatedRun, decimate, open_decimated
+from app.runs.edits import edit_run, series_fields, undo_edit
+from app.runs.errors import RunError
+from app.runs.exchange.exporting import ExportRequest, export_runs
+from app.runs.exchange.importing import (
+    CsvImport,
+    FilePreview,
+    ParseOptions,
+    even_rate_hz,
+    import_csv,
+    preview_file,
+    read_record,
+)
+from app.runs.file_operations import copy_run_into, move_to_trash, restore_from_trash
+from app.runs.listing import list_runs
+from app.runs.reader import open_run
+from app.runs.summary import RunSummary
+from app.runs.validator import shared_validator
+from config.files import load_stand
+from config.schema import ConfigError, SeriesError
+from messages.i18n import gettext, ngettext, translate
+
+MAX_OVERLAID_RUNS = 8
+"""More curves over one another cannot be told apart by eye."""
+_DRAWN_SPANS = 1500
+"""Extremes are kept for so many intervals of time: at least one a pixel of the preview."""
+_BEFORE_RELEASE_S = 1.0
+"""Drawn part of the hold before the release."""
+_TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
+_PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
+"""What fits into the preview of the export dialog."""
 
 
-@dataclass(frozen=True, slots=True)
-class ListRuns:
-    """List the runs of a folder."""
-
-    folder: str
-
-
-@dataclass(frozen=True, slots=True)
-class LoadOverlay:
-    """Read and decimate runs for drawing."""
-
-    paths: tuple[str, ...]
+def list_folder(folder: str, report: ReportProgress) -> tuple[RunSummary, ...]:
+    path = Path(folder)
+    if not path.exists():  # the recordings folder is made by the first run
+        return ()
+    return tuple(
+        list_runs(
+            path, progress=lambda done, count: report(Progress(gettext("Looking at new files"), done / count))
+        )
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class EditRuns:
+def edit_runs(
+    paths: tuple[str, ...], field: str, value: Any, author: str, report: ReportProgress
+) -> BatchOutcome:
     """Set a field of `RunMetadata`; a series also sets its pullback and plate mass."""
 
-    paths: tuple[str, ...]
-    field: str
-    value: Any
-    author: str
+    def edit(path: Path) -> None:
+        fields = {field: value}
+        if field == "series":
+            fields = series_fields(open_run(path).metadata.stand, value)
+        edit_run(path, author, **fields)
+
+    return _each(paths, edit, report, gettext("Editing"))
 
 
-@dataclass(frozen=True, slots=True)
-class UndoEdits:
+def undo_edits(paths: tuple[str, ...], field: str, author: str, report: ReportProgress) -> BatchOutcome:
     """Undo the last edit of a field in each run."""
-
-    paths: tuple[str, ...]
-    author: str
-    field: str
+    return _each(paths, lambda path: undo_edit(path, author, (field,)), report, gettext("Undoing"))
 
 
-@dataclass(frozen=True, slots=True)
-class TrashRuns:
-    """Move runs to the trash."""
-
-    paths: tuple[str, ...]
+def trash_runs(paths: tuple[str, ...], report: ReportProgress) -> BatchOutcome:
+    return _each(paths, move_to_trash, report, gettext("Moving to the trash"))
 
 
-@dataclass(frozen=True, slots=True)
-class RestoreRuns:
-    """Restore runs from the trash."""
-
-    paths: tuple[str, ...]
+def restore_runs(paths: tuple[str, ...], report: ReportProgress) -> BatchOutcome:
+    return _each(paths, restore_from_trash, report, gettext("Bringing back"))
 
 
-@dataclass(frozen=True, slots=True)
-class CopyRuns:
+def copy_runs(paths: tuple[str, ...], folder: str, report: ReportProgress) -> BatchOutcome:
     """Copy run files into a folder, under free names."""
-
-    paths: tuple[str, ...]
-    folder: str
+    return _each(paths, lambda path: copy_run_into(path, Path(folder)), report, gettext("Copying"))
 
 
-@dataclass(frozen=True, slots=True)
-class ExportRuns:
-    """Export runs; fields as in `app.runs.exchange.exporting.ExportRequest`."""
-
-    paths: tuple[str, ...]
-    output: str
-    format: str
-    content: str
-    replace: bool
-
-
-@dataclass(frozen=True, slots=True)
-class PreviewExport:
-    """Preview the export of one run."""
-
-    path: str
-    format: str
-    content: str
+def _each(
+    paths: tuple[str, ...], act: Callable[[Path], object], report: ReportProgress, what: str
+) -> BatchOutcome:
+    """Process every run; one that fails does not stop the rest. `act` returns where a moved run is now."""
+    done, faults = [], []
+    for number, path in enumerate(map(Path, paths)):
+        report(Progress(f"{what} {path.name}", number / len(paths)))
+        try:
+            moved = act(path)
+        except (RunError, AnalysisError, ConfigError, ValueError) as error:
+            faults.append(f"{path.name}: {error}")
+        else:
+            done.append(str(moved if isinstance(moved, Path) else path))
+    return BatchOutcome(tuple(done), tuple(faults))
 
 
-@dataclass(frozen=True, slots=True)
-class ExportPreview:
-    """Names and sizes of the exported files, with the first lines of text files."""
+def export_files(
+    paths: tuple[str, ...], output: str, choice: dict[str, Any], report: ReportProgress
+) -> BatchOutcome:
+    """Export runs; `choice` has the fields of `ExportRequest`."""
+    outcomes = export_runs(
+        [Path(path) for path in paths],
+        Path(output),
+        convert(choice, ExportRequest),
+        progress=lambda done, name: report(
+            Progress(gettext("Exporting {name}", name=name), done / len(paths))
+        ),
+    )
+    return BatchOutcome(
+        tuple(file for outcome in outcomes for file in outcome.files),
+        tuple(f"{Path(outcome.run).name}: {outcome.error}" for outcome in outcomes if outcome.error),
+    )
 
-    text: str
+
+def preview_export(path: str, choice: dict[str, Any]) -> str:
+    """Export a run into a temporary folder; names and sizes of the files, and first lines of text files."""
+    with tempfile.TemporaryDirectory(prefix="slipstand-") as folder:
+        output = f"{Path(folder) / Path(path).stem}.{choice['format']}"
+        outcome = export_files((path,), output, choice, lambda _progress: None)
+        parts = [_first_lines(Path(file)) for file in outcome.done]
+    return "\n\n".join([*parts, *outcome.faults])
 
 
-@dataclass(frozen=True, slots=True)
-class BatchOutcome:
-    """Paths of the runs that were processed, and a line for each that failed."""
+def _first_lines(path: Path) -> str:
+    size = f"{path.stat().st_size / 1e3:,.0f} kB"
+    if path.suffix not in _TEXT_SUFFIXES:
+        return f"{path.name}, {size}"
+    with path.open(encoding="utf-8", errors="replace") as file:
+        lines = [line.rstrip("\n")[:_PREVIEW_WIDTH] for line in itertools.islice(file, _PREVIEW_LINES)]
+    return "\n".join([f"{path.name}, {size}", *lines])
 
-    done: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
+
+def load_overlay(paths: tuple[str, ...]) -> Overlay:
+    """Read and decimate runs, aligned at their releases; say which could not be read."""
+    overviews, faults = [], []
+    for path in paths[:MAX_OVERLAID_RUNS]:
+        try:
+            overviews.append(
+                open_decimated(
+                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, validator=shared_validator()
+                )
+            )
+        except RunError as error:
+            faults.append(str(error))
+    if len(paths) > MAX_OVERLAID_RUNS:
+        faults.append(
+            gettext(
+                "The first {shown} of {all} selected runs are drawn", shown=MAX_OVERLAID_RUNS, all=len(paths)
+            )
+        )
+    units = {overview.unit for overview in overviews}
+    unit = units.pop() if len(units) == 1 else gettext("mixed units")
+    aligned = all(overview.release_s is not None for overview in overviews)
+    return Overlay(
+        traces=tuple(_run_trace(overview) for overview in overviews),
+        time_label=gettext("time from release, s") if aligned else gettext("time, s"),
+        unit="mm" if unit == "m" else unit,
+        message=". ".join(faults),
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class SurveyFile:
+def _run_trace(overview: DecimatedRun) -> Trace:
+    scale = 1e3 if overview.unit == "m" else 1.0
+    table, *others = (scale * readings for readings in overview.readings)
+    time_s = overview.time_s - (overview.release_s or 0.0)
+    return Trace(overview.path.stem, time_s, table, others[0] if others else None)
+
+
+def preview_import(path: str, form: Form) -> ImportPreview:
+    """Read a file as it would be imported; `form` is valid, also below."""
+    plan = csv_import(form)
+    _, _, block = read_record(Path(path), plan)
+    rate_hz = even_rate_hz(block.time_s)
+    rate = gettext("uneven times") if rate_hz is None else with_unit(f"{rate_hz:.6g}", "Hz")
+    length = with_unit(format_fixed(float(block.time_s[-1]), 3), "s")
+    summary = ngettext("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
+    unit, scale = form["unit_name"].strip() or "m", 1.0
+    if unit == "m" and form["quantity"] == "displacement":
+        unit, scale = "mm", 1e3
+    trace = _imported_trace(Path(path).stem, block, plan.measures, scale)
+    return ImportPreview(Overlay((trace,), gettext("time, s"), unit), summary)
+
+
+def _imported_trace(name: str, block: RunBlock, measures: str, scale: float) -> Trace:
+    table = scale * block.readings[:, 0]
+    columns = [block.time_s, table]
+    if block.readings.shape[1] > 1:
+        second = scale * block.readings[:, 1]
+        columns.append(second - table if measures == "plate" else second)
+    time_s, *traces = decimate(tuple(columns), _DRAWN_SPANS)
+    return Trace(name, time_s, traces[0], traces[1] if len(traces) > 1 else None)
+
+
+def import_file(path: str, form: Form, folder: str) -> str:
+    """Import a file as a run, under a free name in the folder; its path."""
+    target = _free_path(Path(folder), form["name"].strip().removesuffix(".h5") or Path(path).stem)
+    metadata: dict[str, Any] = {
+        "series": form["series"].strip() or None,
+        "plate_mass_kg": FIELDS["plate_mass_kg"].parse(form),
+        "table_mass_kg": FIELDS["table_mass_kg"].parse(form),
+        "operator": form["operator"].strip(),
+        "note": form["note"].strip(),
+        "conditions": parse_conditions(form, dict(parse_pairs(form["other"]))),
+    }
+    try:
+        return str(import_csv(Path(path), csv_import(form), target, load_stand(), **metadata).path)
+    except SeriesError as error:
+        raise RunError("{reason}", reason=error, field="series") from None
+
+
+def _free_path(folder: Path, stem: str) -> Path:
+    path, number = folder / f"{stem}.h5", 1
+    while path.exists():
+        number += 1
+        path = folder / f"{stem}-{number}.h5"
+    return path
+
+
+def survey_file(path: str, form: Form) -> FilePreview:
     """Read the columns and first lines of a file."""
-
-    path: str
-    text_format: TextFormat = field(default_factory=TextFormat)
-
-
-@dataclass(frozen=True, slots=True)
-class PreviewImport:
-    """Read a file as it would be imported."""
-
-    path: str
-    form: ImportForm
+    options = {name: form[name] or None for name in ("delimiter", "decimal")}
+    return preview_file(Path(path), convert(options | _lines(form), ParseOptions))
 
 
-@dataclass(frozen=True, slots=True)
-class ImportFile:
-    """Import a file as a run, under a free name in the folder; the answer is its path."""
-
-    path: str
-    form: ImportForm
-    folder: str
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ImportPreview:
-    """The record for drawing, and its length and rate as text."""
-
-    overlay: Overlay
-    summary: str
-
-
-ImportTask = SurveyFile | PreviewImport | ImportFile
-
-
-RunsTask = (
-    ListRuns
-    | LoadOverlay
-    | EditRuns
-    | UndoEdits
-    | TrashRuns
-    | RestoreRuns
-    | CopyRuns
-    | ExportRuns
-    | PreviewExport
-    | SurveyFile
-    | PreviewImport
-    | ImportFile
-)
+def csv_import(form: Form) -> CsvImport:
+    """Request for the import, as `slipstand import` makes it."""
+    number = {name: field.parse(form) for name, field in FIELDS.items() if field.rule}
+    unit: dict[str, Any] = {"unit": form["unit"]}
+    if form["unit"] == GAIN:
+        unit = {
+            "gain": number["gain"] or 1.0,
+            "offset": number["offset"] or 0.0,
+            "unit_name": form["unit_name"].strip() or None,
+        }
+    columns = {name: form[name] or None for name in COLUMN_FIELDS}
+    lines = _lines(form)
+    layout = {
+        **columns,
+        "delimiter": form["delimiter"] or None,
+        "decimal": form["decimal"] or ".",
+        "skip": lines["skip"],
+        "header": lines["header"] is not False,
+    }
+    request = {
+        "layout": layout,
+        **unit,
+        **{name: form[name] for name in ("measures", "time_unit", "quantity")},
+        **{name: number[name] for name in ("gain_uncertainty", "from_s", "until_s", "segment")},
+    }
+    return convert(request, CsvImport)
 
 
-@dataclass(frozen=True, slots=True)
-class AnalyseRuns:
-    """Analyse runs and save the results; with `reanalyse`, also those that are up to date."""
+def _lines(form: Form) -> dict[str, Any]:
+    return {
+        "skip": FIELDS["skip"].parse(form) or 0,
+        "header": {"yes": True, "no": False}.get(form["header"]),
+    }
 
-    paths: tuple[str, ...]
-    reanalyse: bool = False
+
+def analyse_runs(paths: tuple[str, ...], reanalyse: bool, report: Callable[[Any], None]) -> None:
+    """Analyse runs in parallel and save the results; report each as `RunAnalysed` when it is done.
+
+    With `reanalyse` also those that are up to date.
+    """
+    on_progress = batch_progress(report, ANALYSING, paths)
+    on_progress(0.0, "")
+    tasks = [AnalysisTask(path, save=True, force=reanalyse) for path in paths]
+    with open_executor(ExecutorOptions(), len(tasks)) as executor:
+        for path, outcome in zip(paths, analyze_runs(tasks, executor, on_progress), strict=True):
+            report(RunAnalysed(path, outcome.up_to_date, _analysis_fault(path, outcome)))
 
 
-@dataclass(frozen=True, slots=True)
-class RunAnalysed(Progress):
-    """Progress of `AnalyseRuns`: one run is done; `fault` says in one line why it failed."""
-
-    path: str = ""
-    is_up_to_date: bool = False
-    fault: str = ""
+def _analysis_fault(path: str, outcome: AnalysisOutcome) -> str:
+    if outcome.document is not None:
+        return ""
+    name = Path(path).name
+    said = translate(outcome.error).replace(outcome.run, name)
+    return said if name in said else f"{name}: {said}"

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from app.presenters.base import Progress
-from app.presenters.runs.tasks import AnalyseRuns, RunAnalysed
-from app.presenters.runs.work import analyse_runs
+from app.presenters.runs.state import RunAnalysed
+from app.presenters.runs.tasks import analyse_runs
 from app.presenters.worker import Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
@@ -32,18 +32,18 @@ def worker() -> Iterator[Worker]:
     made.close()
 
 
-def came(task: AnalyseRuns) -> list[RunAnalysed]:
-    said: list[Progress] = []
-    analyse_runs(task, said.append)
+def came(*paths: str, reanalyse: bool = False) -> list[RunAnalysed]:
+    said: list[Any] = []
+    analyse_runs(paths, reanalyse, said.append)
     return [progress for progress in said if isinstance(progress, RunAnalysed)]
 
 
 def test_a_second_pass_leaves_out_what_is_up_to_date_as_the_command_line_does(folder: Path) -> None:
     paths = tuple(sorted(str(path) for path in folder.iterdir()))
-    assert [one.is_up_to_date for one in came(AnalyseRuns(paths))] == [False, False]
+    assert [one.is_up_to_date for one in came(*paths)] == [False, False]
     edit_run(Path(paths[1]), "Ada", table_mass_kg=140.0)
-    assert [one.is_up_to_date for one in came(AnalyseRuns(paths))] == [True, False]
-    assert [one.is_up_to_date for one in came(AnalyseRuns(paths[:1], reanalyse=True))] == [False]
+    assert [one.is_up_to_date for one in came(*paths)] == [True, False]
+    assert [one.is_up_to_date for one in came(paths[0], reanalyse=True)] == [False]
     assert [len(open_run(path).analyses) for path in paths] == [2, 2]
 
 
@@ -51,16 +51,16 @@ def test_runs_that_fail_are_named_and_the_rest_is_done(folder: Path) -> None:
     (folder / "torn.h5").write_text("no run")
     (good, *_) = (path for path in folder.iterdir() if path.name != "torn.h5")
     torn, lost = folder / "torn.h5", folder / "lost.h5"
-    first, second, third = came(AnalyseRuns((str(torn), str(lost), str(good))))
+    first, second, third = came(str(torn), str(lost), str(good))
     assert first.fault.startswith("torn.h5 is not an HDF5 file")
     assert second.fault.startswith("lost.h5: there is no such file")
-    assert third == RunAnalysed("", None, str(good))
+    assert third == RunAnalysed(str(good))
 
 
 def test_it_is_told_which_run_is_waited_for(folder: Path) -> None:
     paths = tuple(str(folder / name) for name in ("none.h5", "neither.h5"))
     said: list[Any] = []
-    analyse_runs(AnalyseRuns(paths), said.append)
+    analyse_runs(paths, False, said.append)
     assert said[0] == Progress("Analysing none, 1 of 2", 0.0)
     assert Progress("Analysing neither, 2 of 2", 0.5) in said
 
@@ -70,7 +70,7 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
 ) -> None:
     paths = tuple(str(shutil.copy(short_runs[0], tmp_path / f"run_{number:02d}.h5")) for number in range(12))
     said: list[Any] = []
-    worker.submit(analyse_runs, AnalyseRuns(paths), progress=said.append)
+    worker.submit(analyse_runs, paths, False, progress=said.append)
     done: list[RunAnalysed] = []
     deadline = time.monotonic() + 120.0
     while not done and time.monotonic() < deadline:

@@ -3,12 +3,13 @@
 from pathlib import Path
 
 import pytest
+from stage import Call, FakeWorker
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.base import Progress, Tone
 from app.presenters.runs.export_presenter import ExportPresenter
-from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
-from app.presenters.runs.work import execute
+from app.presenters.runs.state import BatchOutcome
+from app.presenters.runs.tasks import export_files, preview_export
 from app.runs.simulated import write_simulated_run
 
 RUNS = ("/runs/a.h5", "/runs/b.h5")
@@ -16,9 +17,13 @@ RUNS = ("/runs/a.h5", "/runs/b.h5")
 
 class Desk:
     def __init__(self, *runs: str) -> None:
-        self.asked: list[PreviewExport | ExportRuns] = []
-        self.export = ExportPresenter(self.asked.append)
+        self.worker = FakeWorker()
+        self.export = ExportPresenter(self.worker)  # type: ignore[arg-type]
         self.export.open(runs, "/runs")
+
+    @property
+    def exports(self) -> list[Call]:
+        return [call for call in self.worker.calls if call.name == "export_files"]
 
     @property
     def output(self) -> str:
@@ -56,11 +61,11 @@ def test_only_what_a_format_can_hold_is_offered(name: str, contents: tuple[str, 
 
 def test_a_late_preview_is_not_shown() -> None:
     desk = Desk(RUNS[0])
-    first = desk.asked[-1]
+    first = desk.worker.calls[-1]
     desk.export.set_format("json")
-    desk.export.on_preview(first, ExportPreview("csv"))  # type: ignore[arg-type]
+    first.done("csv")
     assert desk.export.state.preview == ""
-    desk.export.on_preview(desk.asked[-1], ExportPreview("json"))  # type: ignore[arg-type]
+    desk.worker.calls[-1].done("json")
     assert desk.export.state.preview == "json"
 
 
@@ -68,12 +73,9 @@ def test_one_export_at_a_time_and_its_outcome_in_words() -> None:
     desk = Desk(*RUNS)
     desk.export.export()
     desk.export.export()
-    asked = [task for task in desk.asked if isinstance(task, ExportRuns)]
-    assert len(asked) == 1
-    desk.export.on_progress(Progress("Exporting a.h5", 0.0))
-    desk.export.on_done(
-        BatchOutcome(("/runs/exported/a.csv", "/runs/exported/b.csv"), ("b.h5: it is damaged",))
-    )
+    (export,) = desk.exports
+    export.progress(Progress("Exporting a.h5", 0.0))
+    export.done(BatchOutcome(("/runs/exported/a.csv", "/runs/exported/b.csv"), ("b.h5: it is damaged",)))
     state = desk.export.state
     assert state.message.tone is Tone.BAD
     assert state.message.text.startswith("Wrote 2 files to")
@@ -86,7 +88,7 @@ def test_without_a_place_nothing_is_exported() -> None:
     desk.export.set_output("  ")
     desk.export.export()
     assert "Choose the file" in desk.export.state.message.text
-    assert not any(isinstance(task, ExportRuns) for task in desk.asked)
+    assert desk.exports == []
 
 
 def test_the_preview_of_a_real_run_shows_what_would_be_written(tmp_path: Path) -> None:
@@ -99,11 +101,10 @@ def test_the_preview_of_a_real_run_shows_what_would_be_written(tmp_path: Path) -
         pullback_m=0.012,
     )
     path = str(write_simulated_run(tmp_path / "run.h5", parameters.simulate(9.0), parameters).path)
-    text = execute(PreviewExport(path, "csv", "both"), lambda _: None).text
+    text = preview_export(path, {"format": "csv", "content": "both"})
     assert "time_s,table_displacement_m,relative_displacement_m,status" in text
     assert "run.coefficients.csv" in text
-    outcome = execute(
-        ExportRuns((path,), str(tmp_path / "x.mat"), "mat", "samples", replace=False), lambda _: None
-    )
+    choice = {"format": "mat", "content": "samples", "replace": False}
+    outcome = export_files((path,), str(tmp_path / "x.mat"), choice, lambda _: None)
     assert [Path(file).name for file in outcome.done] == ["x.mat"]
     assert (tmp_path / "x.mat").stat().st_size > 10_000

@@ -1,30 +1,22 @@
 """The import dialog as values: columns offered, one look at a time, file after file, faults in its words."""
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from stage import Call, FakeWorker
 
 from app.cli.commands import SlipstandGroup
 from app.presenters.base import Tone
-from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat, validate
+from app.presenters.events import TaskFailure
+from app.presenters.runs.import_form import FIELDS, GAIN, Form, make_form, validate
 from app.presenters.runs.import_presenter import ImportPresenter, pending_text
-from app.presenters.runs.state import Overlay
-from app.presenters.runs.tasks import (
-    ImportFile,
-    ImportPreview,
-    ImportTask,
-    PreviewImport,
-    SurveyFile,
-)
-from app.presenters.runs.work import csv_import
-from app.presenters.runs.work import execute as execute_task
+from app.presenters.runs.state import ImportPreview, Overlay
+from app.presenters.runs.tasks import csv_import, import_file, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
 from app.runs.exchange.importing import FilePreview, ParseOptions
 from app.runs.reader import open_run
-from messages.message import message, option
+from messages.message import Message, message, option
 
 FOUND = FilePreview(
     ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1",
@@ -36,35 +28,48 @@ PREVIEW = ImportPreview(Overlay(), "3 samples")
 
 class Desk:
     def __init__(self, *files: str) -> None:
-        self.asked: list[ImportTask] = []
-        self.presenter = ImportPresenter(self.asked.append)
+        self.worker = FakeWorker()
+        self.imported: list[str] = []
+        self.presenter = ImportPresenter(self.worker, self.imported.append)  # type: ignore[arg-type]
         self.presenter.open(files or ("/a.csv",), "/runs", "Anna")
 
     @property
-    def form(self) -> ImportForm:
+    def form(self) -> Form:
         return self.presenter.state.form
 
+    @property
+    def asked(self) -> list[Call]:
+        return self.worker.calls
+
+    @property
+    def last(self) -> tuple[str, str, Form]:
+        name, (path, form, *_) = self.asked[-1].name, self.asked[-1].arguments
+        return name, path, form
+
+    def set_form(self, **texts: str) -> None:
+        self.presenter.set_form({**self.form, **texts})
+
     def answer(self, answer: object) -> None:
-        self.presenter.on_done(self.asked[-1], answer)
+        self.asked[-1].done(answer)
+
+    def fail(self, fault: Message) -> None:
+        self.asked[-1].failed(TaskFailure(fault))
 
     def make_ready(self) -> None:
         self.answer(FOUND)
         self.answer(PREVIEW)
 
 
-def execute(task: ImportTask) -> Any:
-    return execute_task(task, lambda _progress: None)
-
-
 def test_columns_are_offered_and_the_record_is_previewed() -> None:
     desk = Desk()
-    assert desk.asked == [SurveyFile("/a.csv")]
+    assert desk.last == ("survey_file", "/a.csv", make_form(operator="Anna"))
     desk.answer(FOUND)
     form = desk.form
-    assert (form.time, form.table, form.second, form.measures) == ("t", "u1", "u2", "plate")
-    assert (form.time_unit, form.unit, form.operator) == ("ms", "mm", "Anna")
-    assert form.text_format == TextFormat(";", ",", "", "yes")
-    assert desk.asked[-1] == PreviewImport("/a.csv", form)
+    assert form == make_form(
+        time="t", table="u1", second="u2", measures="plate", time_unit="ms", unit="mm", operator="Anna",
+        delimiter=";", decimal=",", header="yes",
+    )  # fmt: skip
+    assert desk.last == ("preview_import", "/a.csv", form)
     assert not desk.presenter.state.can_import
     desk.answer(PREVIEW)
     state = desk.presenter.state
@@ -77,21 +82,21 @@ def test_one_look_at_a_time_and_only_the_latest_counts() -> None:
     desk = Desk()
     desk.make_ready()
     for table in ("u2", "t", "u1"):
-        desk.presenter.set_form(replace(desk.form, table=table, time="t"))
+        desk.set_form(table=table, time="t")
     asked = len(desk.asked)
-    assert desk.asked[-1].form.table == "u2"  # type: ignore[union-attr]
+    assert desk.last[2]["table"] == "u2"
     desk.answer(PREVIEW)
     assert not desk.presenter.state.can_import, "that was not the latest"
     assert len(desk.asked) == asked + 1
     desk.answer(FOUND)
-    assert desk.asked[-1].form.table == "u1"  # type: ignore[union-attr]
+    assert desk.last[2]["table"] == "u1"
 
 
 def test_what_is_said_about_the_test_reads_nothing_anew() -> None:
     desk = Desk()
     desk.make_ready()
     asked = len(desk.asked)
-    desk.presenter.set_form(replace(desk.form, note="wet", series="1FFM0"))
+    desk.set_form(note="wet", series="1FFM0")
     assert len(desk.asked) == asked
     assert desk.presenter.state.can_import
 
@@ -100,17 +105,19 @@ def test_files_come_one_after_another_with_the_same_columns() -> None:
     desk = Desk("/a.csv", "/b.csv", "/c.csv")
     assert pending_text(desk.presenter.state) == "2 more files"
     desk.make_ready()
-    desk.presenter.set_form(replace(desk.form, second="", note="first"))
+    desk.set_form(second="", note="first")
     desk.answer(PREVIEW)
     desk.presenter.import_file()
-    assert desk.asked[-1] == ImportFile("/a.csv", desk.form, "/runs")
+    assert desk.last == ("import_file", "/a.csv", desk.form)
+    asked = len(desk.asked)
     desk.presenter.import_file()
-    assert desk.asked.count(desk.asked[-1]) == 1, "once is enough"
+    assert len(desk.asked) == asked, "once is enough"
     desk.answer("/runs/a.h5")
+    assert desk.imported == ["/runs/a.h5"]
     state = desk.presenter.state
     assert (state.path, state.pending, state.message.text) == ("/b.csv", 1, "Imported a")
     desk.answer(FOUND)
-    assert (desk.form.second, desk.form.note) == ("", ""), "columns stay, the note does not"
+    assert (desk.form["second"], desk.form["note"]) == ("", ""), "columns stay, the note does not"
     desk.presenter.skip_file()
     assert desk.presenter.state.path == "/c.csv"
     desk.presenter.close()
@@ -121,20 +128,20 @@ def test_faults_name_the_fields_of_the_dialog() -> None:
     desk = Desk()
     names = {name: option(f"--{name}") for name in ("skip", "delimiter", "decimal")}
     template = "no columns. Check {skip}, {delimiter} and {decimal}"
-    desk.presenter.on_failed(desk.asked[-1], message(template, **names))
+    desk.fail(message(template, **names))
     shown = desk.presenter.state.message
     assert shown.text == "No columns. Check “Lines skipped”, “Between cells” and “Decimal sign”"
     assert shown.tone is Tone.BAD
     assert not desk.presenter.state.can_import
-    desk.presenter.set_form(replace(desk.form, text_format=TextFormat(skip="3")))
-    assert desk.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="3"))
+    desk.set_form(skip="3")
+    assert desk.last == ("survey_file", "/a.csv", desk.form)
 
 
 def test_a_run_that_cannot_be_stored_can_be_tried_again() -> None:
     desk = Desk()
     desk.make_ready()
     desk.presenter.import_file()
-    desk.presenter.on_failed(desk.asked[-1], message("series '9X' is not one of this stand", field="series"))
+    desk.fail(message("series '9X' is not one of this stand", field="series"))
     assert desk.presenter.state.can_import
     assert desk.presenter.state.message.tone is Tone.BAD
 
@@ -151,21 +158,21 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def filled(path: Path, **changes: str) -> ImportForm:
+def filled(path: Path, **changes: str) -> Form:
     desk = Desk(str(path))
-    desk.answer(execute(SurveyFile(str(path))))
-    return replace(desk.form, **changes)  # type: ignore[arg-type]
+    desk.answer(survey_file(str(path), make_form()))
+    return {**desk.form, **changes}
 
 
 def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     form = filled(path, series="1FFM0", plate_mass_kg="23,5", note="from the logger")
-    preview = execute(PreviewImport(str(path), form))
+    preview = preview_import(str(path), form)
     assert preview.summary == "10 samples, 0.009\u202fs, 1000\u202fHz"
     (trace,) = preview.overlay.traces
     assert trace.table == pytest.approx(12.5 - np.arange(10))
     assert trace.relative == pytest.approx(np.arange(10) + 0.25 - trace.table), "plate against table"
     folder = str(path.parent)
-    stored = [execute(ImportFile(str(path), form, folder)) for _ in range(2)]
+    stored = [import_file(str(path), form, folder) for _ in range(2)]
     assert [Path(run).name for run in stored] == ["logger.h5", "logger-2.h5"]
     run = open_run(stored[0], trusted=True)
     assert run.table_reading == pytest.approx((12.5 - np.arange(10)) * 1e-3)
@@ -175,7 +182,7 @@ def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
 
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:
     form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.004")
-    preview = execute(PreviewImport(str(path), form))
+    preview = preview_import(str(path), form)
     assert preview.overlay.unit == "V"
     assert preview.overlay.traces[0].table == pytest.approx(2.0 * (12.5 - np.arange(2, 5)) + 0.5)
 
@@ -189,8 +196,7 @@ def test_all_that_the_command_line_can_is_in_the_form() -> None:
         "table_mass": "table_mass_kg", "temperature": "temperature_c", "humidity": "humidity_percent",
         "surface": "surface_preparation", "run_in": "run_in_number", "condition": "other",
     }  # fmt: skip
-    fields = {*ImportForm.__slots__, *TextFormat.__slots__}
-    assert {renamed.get(str(name), name) for name in options - elsewhere} <= fields
+    assert {renamed.get(str(name), name) for name in options - elsewhere} <= FIELDS.keys()
 
 
 def test_the_facts_of_a_test_are_stored_as_by_the_command_line(path: Path) -> None:
@@ -200,7 +206,7 @@ def test_the_facts_of_a_test_are_stored_as_by_the_command_line(path: Path) -> No
         table_mass_kg="130", name="old test",
     )  # fmt: skip
     assert validate(form) == {}
-    stored = execute(ImportFile(str(path), form, str(path.parent)))
+    stored = import_file(str(path), form, str(path.parent))
     assert Path(stored).name == "old test.h5"
     metadata = open_run(stored, trusted=True).metadata
     assert metadata.gauges.table.gain_relative_standard_uncertainty == 0.003
@@ -235,7 +241,7 @@ def test_what_is_left_empty_is_not_stated(path: Path) -> None:
         ({"from_s": "5", "until_s": "5,0"}, "until_s", LATE),
         ({"segment": "1.5"}, "segment", f"1.5 {WHOLE}"),
         ({"plate_mass_kg": "-3"}, "plate_mass_kg", f"-3 {POSITIVE}"),
-        ({"text_format": TextFormat(skip="-1")}, "skip", f"-1 {WHOLE}"),
+        ({"skip": "-1"}, "skip", f"-1 {WHOLE}"),
         (
             {"gain_uncertainty": "-1"}, "gain_uncertainty",
             "-1 is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %",
@@ -255,11 +261,11 @@ def test_what_is_left_empty_is_not_stated(path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_said_at_its_field(changes: dict[str, str], field: str, said: str) -> None:
-    assert validate(replace(ImportForm(), **changes)) == {field: said}  # type: ignore[arg-type]
+    assert validate(make_form(**changes)) == {field: said}
 
 
 def test_without_a_gain_what_belongs_to_it_does_not_matter() -> None:
-    assert validate(ImportForm(unit="mm", gain="x", offset="y")) == {}
+    assert validate(make_form(unit="mm", gain="x", offset="y")) == {}
 
 
 def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
@@ -267,7 +273,7 @@ def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
     desk.make_ready()
     asked, drawn = len(desk.asked), desk.presenter.state.overlay
     before = desk.form
-    desk.presenter.set_form(replace(before, from_s="x", text_format=replace(before.text_format, skip="y")))
+    desk.set_form(from_s="x", skip="y")
     state = desk.presenter.state
     assert (set(state.faults), state.can_import) == ({"from_s", "skip"}, False)
     assert (len(desk.asked), state.overlay, state.summary) == (asked, drawn, "3 samples")
@@ -281,31 +287,31 @@ def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
 def test_a_fault_typed_while_the_file_is_read_keeps_it_from_being_imported() -> None:
     desk = Desk()
     desk.answer(FOUND)
-    desk.presenter.set_form(replace(desk.form, temperature_c="warm"))
+    desk.set_form(temperature_c="warm")
     desk.answer(PREVIEW)
     assert not desk.presenter.state.can_import
     assert (desk.presenter.state.summary, desk.presenter.state.busy) == ("3 samples", "")
     other = Desk()
-    other.presenter.set_form(replace(other.form, text_format=TextFormat(skip="x")))
+    other.set_form(skip="x")
     other.answer(FOUND)
     assert other.presenter.state.busy == ""
-    other.presenter.set_form(replace(other.form, text_format=TextFormat(skip="2")))
-    assert other.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="2"))
+    other.set_form(skip="2")
+    assert other.last == ("survey_file", "/a.csv", other.form)
 
 
 def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
     desk = Desk()
     desk.make_ready()
-    desk.presenter.set_form(replace(desk.form, segment="9"))
+    desk.set_form(segment="9")
     fault = message("time goes back. Pick one stretch with {option} N", option=option("--segment"))
-    desk.presenter.on_failed(desk.asked[-1], message("a.csv: {fault}", fault=fault))
+    desk.fail(message("a.csv: {fault}", fault=fault))
     assert set(desk.presenter.state.faults) == {"segment"}
     assert "“Stretch”" in desk.presenter.state.faults["segment"]
-    desk.presenter.set_form(replace(desk.form, segment=""))
+    desk.set_form(segment="")
     assert desk.presenter.state.faults == {}
     desk.answer(PREVIEW)
     desk.presenter.import_file()
-    desk.presenter.on_failed(desk.asked[-1], message("series '9X' is not one of this stand", field="series"))
+    desk.fail(message("series '9X' is not one of this stand", field="series"))
     assert set(desk.presenter.state.faults) == {"series"}
     assert desk.presenter.state.overlay is not None
 
@@ -313,11 +319,11 @@ def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
 def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
     desk = Desk("/a.csv", "/b.csv")
     desk.make_ready()
-    desk.presenter.set_form(replace(desk.form, name="x", run_in_number="3", note="wet", plate_id="P1"))
+    desk.set_form(name="x", run_in_number="3", note="wet", plate_id="P1")
     desk.presenter.import_file()
     desk.answer("/runs/x.h5")
     form = desk.form
-    assert (form.name, form.run_in_number, form.note, form.plate_id) == ("", "", "", "P1")
+    assert [form[name] for name in ("name", "run_in_number", "note", "plate_id")] == ["", "", "", "P1"]
 
 
 @pytest.mark.parametrize(
@@ -329,4 +335,4 @@ def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
 )
 def test_what_the_file_or_the_stand_lacks_is_said(path: Path, changes: dict[str, str], said: str) -> None:
     with pytest.raises((RunError, ImportFileError, ValueError), match=said):
-        execute(ImportFile(str(path), filled(path, **changes), str(path.parent)))
+        import_file(str(path), filled(path, **changes), str(path.parent))

@@ -3,16 +3,20 @@
 import pytest
 
 from app.presenters.base import Chip, Tone
+from app.presenters.runs.changes import Change, copy, edit, outcome_chip, parse_field, trash
 from app.presenters.runs.state import Column, RunFilter
 from app.presenters.runs.table import RunList
-from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits
-from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
-from app.presenters.runs.work import MAX_OVERLAID_RUNS, load_overlay
+from app.presenters.runs.tasks import MAX_OVERLAID_RUNS, load_overlay
 from app.runs.summary import RunSummary
 from messages.message import message
 
 TWO = ("/runs/a.h5", "/runs/b.h5")
-EDIT = EditRuns(TWO, "plate_mass_kg", 22.5, "me")
+EDIT, TRASH, COPY = edit(TWO, "plate_mass_kg", 22.5, "me"), trash(TWO), copy(TWO, "/runs")
+
+
+def undo(change: Change, *paths: str) -> Change:
+    assert change.undo is not None
+    return change.undo(paths)
 
 
 @pytest.mark.parametrize(
@@ -36,37 +40,23 @@ def test_what_cannot_be_is_refused(field: str, text: str, words: str) -> None:
     ("change", "words"),
     [
         (EDIT, "Changed the plate mass of 2 runs"),
-        (UndoEdits(TWO, "me", "note"), "Undone in 2 runs"),
-        (TrashRuns(TWO), "Moved 2 runs to the trash"),
-        (RestoreRuns(TWO), "Brought back 2 runs"),
-        (CopyRuns(TWO, "/runs"), "Copied 2 runs into this folder"),
+        (undo(EDIT, *TWO), "Undone in 2 runs"),
+        (TRASH, "Moved 2 runs to the trash"),
+        (undo(TRASH, *TWO), "Brought back 2 runs"),
+        (COPY, "Copied 2 runs into this folder"),
     ],
 )
-def test_each_change_is_said(change, words: str) -> None:
-    assert change_text(change, BatchOutcome(TWO)) == words
+def test_each_change_is_said(change: Change, words: str) -> None:
+    assert change.text("2 runs") == words
 
 
 def test_the_way_back_leads_to_where_the_runs_are_now() -> None:
-    trashed = ("/runs/.trash/a.h5",)
-    undo = undo_action(TrashRuns(TWO), BatchOutcome(trashed, ("b.h5: is locked",)), "me")
-    assert undo is not None
-    assert undo.task == RestoreRuns(trashed)
-    assert undo_action(EDIT, BatchOutcome(TWO), "another").task == UndoEdits(TWO, "another", "plate_mass_kg")  # type: ignore[union-attr]
-    assert undo_action(EDIT, BatchOutcome(), "me") is None, "nothing was changed"
-    assert undo_action(CopyRuns(TWO, "/runs"), BatchOutcome(TWO), "me") is None
-
-
-def test_the_last_change_is_taken_back_first() -> None:
-    undos = UndoStack()
-    assert (undos.text, undos.pop()) == ("", None)
-    for change in (EDIT, TrashRuns(TWO)):
-        undos.push(undo_action(change, BatchOutcome(TWO), "me"))
-    undos.push(None)
-    assert undos.text == "move of 2 runs to the trash"
-    assert undos.pop() == RestoreRuns(TWO)
-    assert undos.text == "change of plate mass"
-    undos.clear()
-    assert undos.text == ""
+    restore = undo(TRASH, "/runs/.trash/a.h5", "/runs/.trash/b.h5")
+    assert restore.arguments == (("/runs/.trash/a.h5", "/runs/.trash/b.h5"),)
+    assert restore.undone_text == "move of 2 runs to the trash"
+    assert undo(EDIT, *TWO).arguments == (TWO, "plate_mass_kg", "me")
+    assert undo(EDIT, *TWO).undone_text == "change of plate mass"
+    assert COPY.undo is None
 
 
 @pytest.mark.parametrize(

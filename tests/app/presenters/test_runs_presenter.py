@@ -1,31 +1,15 @@
 """The Runs screen as values: what is listed, in which order, and what becomes of work on runs."""
 
 import datetime
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 from stage import FakeWorker
 
 from app.presenters.base import Progress, Tone
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import Column, Overlay, RunFilter, StatusFilter
-from app.presenters.runs.tasks import (
-    AnalyseRuns,
-    BatchOutcome,
-    CopyRuns,
-    EditRuns,
-    ImportFile,
-    ListRuns,
-    LoadOverlay,
-    RestoreRuns,
-    RunAnalysed,
-    RunsTask,
-    SurveyFile,
-    TrashRuns,
-    UndoEdits,
-)
-from app.presenters.worker import CANCELLED
+from app.presenters.runs.state import BatchOutcome, Column, Overlay, RunAnalysed, RunFilter, StatusFilter
 from app.runs.summary import RunSummary
 from messages.message import message
 
@@ -56,10 +40,11 @@ C = run("c", 3, series="2SSM1", plate_mass_kg=42.0)
 D = run("d", 4, analyses=1, friction_dynamic=0.2, friction_dynamic_uncertainty=0.01, adequate=False)
 BAD = RunSummary(path="/runs/bad.h5", fault=message("/runs/bad.h5 is not an HDF5 file. Give a run file"))
 ALL = (A, B, C, D, BAD)
+LIST = ("list_folder", "/runs")
 
 
 class Desk:
-    """The presenter and its worker, whose tasks a test does."""
+    """The presenter and its workers, whose calls a test answers."""
 
     def __init__(self) -> None:
         self.worker, self.analyst = FakeWorker(), FakeWorker()
@@ -73,32 +58,29 @@ class Desk:
             self.opened.append,
         )
         self.runs.refresh()
-        self.answer(ListRuns("/runs"), ALL)
+        self.worker.calls[-1].done(ALL)
 
     @property
     def names(self) -> str:
         return "".join(row.cells[0][0] for row in self.runs.state.rows)
 
     @property
-    def tasks(self) -> list[RunsTask]:
-        """What was asked of the worker since the last look."""
-        asked = [argument for _, argument in self.worker.submitted]
+    def tasks(self) -> list[tuple[Any, ...]]:
+        """Names and arguments of the calls since the last look."""
+        asked = [(call.name, *call.arguments) for call in self.worker.calls]
         self.worker.calls.clear()
         return asked
 
-    def hear(self, *news: object) -> None:
-        self.worker.news = list(news)
+    def answer(self, name: str, answer: object) -> None:
+        """Answer the last call of a task."""
+        [call for call in self.worker.calls if call.name == name][-1].done(answer)
+
+    def analysed(self, run: RunSummary, number: int = -1, **facts: Any) -> None:
+        self.analyst.calls[number].progress(RunAnalysed(run.path, **facts))
         self.runs.tick()
 
-    def answer(self, task: RunsTask, answer: object) -> None:
-        self.hear(TaskDone(task, answer))
-
-    def analyst_says(self, *news: object) -> None:
-        self.analyst.news = list(news)
-        self.runs.tick()
-
-    def analysed(self, task: AnalyseRuns, run: RunSummary, **facts: object) -> None:
-        self.analyst_says(TaskProgress(task, RunAnalysed("", None, run.path, **facts)))  # type: ignore[arg-type]
+    def end_analysis(self, number: int = -1) -> None:
+        self.analyst.calls[number].done(None)
 
     def select(self, *runs: RunSummary) -> None:
         self.runs.select(tuple(one.path for one in runs))
@@ -107,7 +89,7 @@ class Desk:
 @pytest.fixture
 def desk() -> Desk:
     made = Desk()
-    assert made.tasks == [ListRuns("/runs")]
+    assert made.tasks == [LIST]
     return made
 
 
@@ -122,7 +104,8 @@ def test_newest_first_and_what_cannot_be_read_last(desk: Desk) -> None:
 
 
 def test_a_run_that_is_left_out_says_so_and_why(desk: Desk) -> None:
-    desk.answer(ListRuns("/runs"), (replace(A, excluded="gauge 2 was touched"),))
+    desk.runs.refresh()
+    desk.answer("list_folder", (replace(A, excluded="gauge 2 was touched"),))
     (row,) = desk.runs.state.rows
     assert dict(zip(Column, row.cells, strict=True))[Column.VERDICT] == "✓ fits, left out"
     assert row.hint == "It does not count on Campaign: gauge 2 was touched"
@@ -164,15 +147,18 @@ def test_what_is_no_longer_shown_is_no_longer_selected(desk: Desk) -> None:
 
 def test_selected_runs_are_previewed_and_their_common_facts_shown(desk: Desk) -> None:
     desk.select(A, C)
-    assert desk.tasks == [LoadOverlay((A.path, C.path))]
+    (call,) = desk.worker.calls
+    assert (call.name, call.arguments) == ("load_overlay", ((A.path, C.path),))
     facts = desk.runs.state.metadata
     assert facts is not None
     assert (facts.series, facts.operator, facts.plate_mass_kg) == ("", "A. Berger", "")
     assert facts.mixed == {"series", "plate_mass_kg"}
     drawn = Overlay(message="two")
-    desk.answer(LoadOverlay((A.path,)), Overlay(message="late"))
+    desk.select(A)
+    call.done(Overlay(message="late"))
     assert desk.runs.state.overlay is None, "another selection's picture is not shown"
-    desk.answer(LoadOverlay((A.path, C.path)), drawn)
+    desk.select(A, C)
+    call.done(drawn)
     assert desk.runs.state.overlay is drawn
 
 
@@ -187,15 +173,18 @@ def test_a_file_that_cannot_be_read_says_why_and_cannot_be_edited(desk: Desk) ->
 def test_an_edit_can_be_undone(desk: Desk) -> None:
     desk.select(A, B)
     desk.runs.edit("plate_mass_kg", "22,5")
-    task = EditRuns((A.path, B.path), "plate_mass_kg", 22.5, "me")
-    assert task in desk.tasks
-    desk.answer(task, BatchOutcome((A.path, B.path)))
+    both = (A.path, B.path)
+    (call,) = [call for call in desk.worker.calls if call.name == "edit_runs"]
+    assert call.arguments == (both, "plate_mass_kg", 22.5, "me")
+    desk.worker.calls.clear()
+    call.done(BatchOutcome(both))
     assert desk.runs.state.message.text == "Changed the plate mass of 2 runs"
     assert desk.runs.state.undo_text == "change of plate mass"
-    assert desk.tasks == [ListRuns("/runs")]
+    assert desk.tasks == [LIST]
     desk.runs.undo()
-    assert desk.tasks == [UndoEdits((A.path, B.path), "me", "plate_mass_kg")]
-    desk.answer(UndoEdits((A.path, B.path), "me", "plate_mass_kg"), BatchOutcome((A.path, B.path)))
+    (undo,) = desk.worker.calls
+    assert (undo.name, *undo.arguments) == ("undo_edits", both, "plate_mass_kg", "me")
+    undo.done(BatchOutcome(both))
     assert desk.runs.state.undo_text == ""
 
 
@@ -212,7 +201,7 @@ def test_what_cannot_be_is_said_and_the_old_text_comes_back(
     desk.select(A)
     before = desk.runs.state.metadata
     desk.runs.edit(field, text)
-    assert desk.tasks == [LoadOverlay((A.path,))]
+    assert desk.tasks == [("load_overlay", (A.path,))]
     assert said in desk.runs.state.message.text
     assert desk.runs.state.metadata == before
 
@@ -220,50 +209,51 @@ def test_what_cannot_be_is_said_and_the_old_text_comes_back(
 def test_leaving_a_field_as_it_was_edits_nothing(desk: Desk) -> None:
     desk.select(A)
     desk.runs.edit("operator", "A. Berger")
-    assert desk.tasks == [LoadOverlay((A.path,))]
+    assert desk.tasks == [("load_overlay", (A.path,))]
 
 
 def test_the_trash_gives_back(desk: Desk) -> None:
     desk.select(A)
     desk.runs.trash()
-    desk.answer(TrashRuns((A.path,)), BatchOutcome(("/runs/.trash/a.h5",)))
-    desk.answer(ListRuns("/runs"), (B, C, D, BAD))
+    desk.answer("trash_runs", BatchOutcome(("/runs/.trash/a.h5",)))
+    desk.answer("list_folder", (B, C, D, BAD))
     assert desk.runs.state.selected == ()
     assert desk.names == "dcbb"
     desk.runs.undo()
-    assert RestoreRuns(("/runs/.trash/a.h5",)) in desk.tasks
+    assert ("restore_runs", ("/runs/.trash/a.h5",)) in desk.tasks
 
 
 def test_many_are_analysed_by_a_worker_of_their_own_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
     desk.select(A, B, C, D, BAD)
     desk.runs.analyse()
-    task = AnalyseRuns((A.path, B.path, C.path, D.path))
-    assert [argument for _, argument in desk.analyst.submitted] == [task]
-    assert desk.tasks == [LoadOverlay(task.paths)]
+    (call,) = desk.analyst.calls
+    paths = (A.path, B.path, C.path, D.path)
+    assert (call.name, *call.arguments) == ("analyse_runs", paths, False)
+    assert desk.tasks == [("load_overlay", paths)]
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 4", 0.0)
-    desk.analysed(task, A)
-    desk.analyst_says(TaskProgress(task, Progress("Analysing b, 2 of 4", 0.25)))
+    desk.analysed(A)
+    call.progress(Progress("Analysing b, 2 of 4", 0.25))
+    desk.runs.tick()
     assert desk.runs.state.progress == Progress("Analysing b, 2 of 4", 0.25)
-    desk.analysed(task, B, fault="b.h5: the record holds no free decay")
-    desk.analysed(task, C, fault="c.h5: its worker failed")
-    desk.analysed(task, D, is_up_to_date=True)
-    desk.analyst_says(TaskDone(task, None))
+    desk.analysed(B, fault="b.h5: the record holds no free decay")
+    desk.analysed(C, fault="c.h5: its worker failed")
+    desk.analysed(D, is_up_to_date=True)
+    desk.end_analysis()
     assert desk.runs.state.progress is None
     assert desk.runs.state.message.text == "Analysed a, 1 was up to date. 2 runs failed: see details"
     assert desk.runs.state.details == ("b.h5: the record holds no free decay", "c.h5: its worker failed")
-    assert desk.tasks == [ListRuns("/runs")]
+    assert desk.tasks == [LIST]
 
 
 def test_what_is_up_to_date_is_said_with_the_key_that_analyses_it_anew(desk: Desk) -> None:
     desk.select(A, D)
     desk.runs.analyse()
-    task = AnalyseRuns((A.path, D.path))
-    desk.analysed(task, A, is_up_to_date=True)
-    desk.analysed(task, D, is_up_to_date=True)
-    desk.analyst_says(TaskDone(task, None))
+    desk.analysed(A, is_up_to_date=True)
+    desk.analysed(D, is_up_to_date=True)
+    desk.end_analysis()
     assert desk.runs.state.message.text == "2 runs were up to date. Shift+R analyses them anew"
     desk.runs.analyse(reanalyse=True)
-    assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), reanalyse=True)
+    assert desk.analyst.calls[-1].arguments == ((A.path, D.path), True)
 
 
 def test_what_waits_for_an_analysis_is_not_asked_for_twice_and_told_together(desk: Desk) -> None:
@@ -271,23 +261,25 @@ def test_what_waits_for_an_analysis_is_not_asked_for_twice_and_told_together(des
     desk.runs.analyse()
     desk.select(B, C)
     desk.runs.analyse()
-    first, second = (argument for _, argument in desk.analyst.submitted)
-    assert (first, second) == (AnalyseRuns((A.path, B.path)), AnalyseRuns((C.path,)))
+    first, second = desk.analyst.calls
+    assert (first.arguments, second.arguments) == (((A.path, B.path), False), ((C.path,), False))
     for run in (A, B):
-        desk.analysed(first, run)
-    desk.analyst_says(TaskDone(first, None))
+        desk.analysed(run, 0)
+    desk.end_analysis(0)
     assert desk.runs.state.progress is not None
-    desk.analyst_says(TaskFailed(second, "the process died"))
+    second.fail("the process died")
     assert desk.runs.state.message.text == "Analysed 2 runs. c.h5: the process died"
 
 
 def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
     desk.select(A)
     desk.runs.analyse()
-    desk.hear(TaskProgress(ListRuns("/runs"), Progress("Looking at new files", 0.5)))
+    desk.runs.refresh()
+    desk.worker.calls[-1].progress(Progress("Looking at new files", 0.5))
+    desk.runs.tick()
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.edit("note", "dry")
-    desk.answer(EditRuns((A.path,), "note", "dry", "me"), BatchOutcome((A.path,)))
+    desk.answer("edit_runs", BatchOutcome((A.path,)))
     assert desk.runs.state.message.text == "Changed the note of a"
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.cancel()
@@ -297,15 +289,14 @@ def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
 def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     desk.select(A, B, C)
     desk.runs.analyse()
-    task = AnalyseRuns((A.path, B.path, C.path))
-    desk.analyst.news = [TaskProgress(task, RunAnalysed("", None, A.path))]
+    desk.analysed(A)
     desk.runs.cancel()
     assert desk.analyst.cancelled == 1
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert desk.runs.state.progress is None
-    desk.analyst_says(TaskFailed(task, CANCELLED, is_cancelled=True))
+    desk.analyst.calls[-1].cancel()
     assert desk.runs.state.message.text == "Analysed a, then given up"
-    assert isinstance(desk.tasks[-1], ListRuns)
+    assert desk.tasks[-1] == LIST
 
 
 def test_both_workers_end_with_the_screen(desk: Desk) -> None:
@@ -316,24 +307,26 @@ def test_both_workers_end_with_the_screen(desk: Desk) -> None:
 
 def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk) -> None:
     assert not desk.runs.add_files(("/elsewhere/x.H5",))
-    assert desk.tasks == [CopyRuns(("/elsewhere/x.H5",), "/runs")]
+    assert desk.tasks == [("copy_runs", ("/elsewhere/x.H5",), "/runs")]
     assert desk.runs.add_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
-    assert desk.tasks == [CopyRuns(("/elsewhere/y.h5",), "/runs"), SurveyFile("/elsewhere/x.csv")]
     form = desk.runs.import_dialog.state.form
-    desk.hear(TaskDone(ImportFile("/elsewhere/x.csv", form, "/runs"), "/runs/x.h5"))
-    assert desk.runs.state.message.text == "Imported x"
-    assert isinstance(desk.tasks[-1], ListRuns)
+    assert desk.tasks == [
+        ("copy_runs", ("/elsewhere/y.h5",), "/runs"),
+        ("survey_file", "/elsewhere/x.csv", form),
+    ]
 
 
 def test_a_first_look_tells_how_far_it_is(desk: Desk) -> None:
-    desk.hear(TaskProgress(ListRuns("/runs"), Progress("Looking at new files", 0.25)))
+    desk.runs.refresh()
+    desk.worker.calls[-1].progress(Progress("Looking at new files", 0.25))
+    desk.runs.tick()
     assert desk.runs.state.progress == Progress("Looking at new files", 0.25)
 
 
 def test_a_folder_that_is_gone_is_said(desk: Desk) -> None:
     desk.runs.choose_folder("/gone")
     assert not desk.runs.state.is_listed
-    desk.hear(TaskFailed(ListRuns("/gone"), "/gone: there is no such folder"))
+    desk.worker.calls[-1].fail("/gone: there is no such folder")
     assert desk.runs.state.is_listed
     assert "no such folder" in desk.runs.state.message.text
 

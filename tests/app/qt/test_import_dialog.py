@@ -1,7 +1,6 @@
 """The import dialog: what is filled in reaches the presenter, what becomes of it is drawn, all words fit."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +8,10 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
+from stage import FakeWorker
 
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.state import Overlay, Trace
-from app.presenters.runs.tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
+from app.presenters.runs.state import ImportPreview, Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.exchange.importing import FilePreview, ParseOptions
@@ -28,8 +27,9 @@ PREVIEW = ImportPreview(Overlay((Trace("a", TIME_S, TIME_S, None),), "time, s"),
 class Stage:
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.qtbot = qtbot
-        self.asked: list[ImportTask] = []
-        self.presenter = ImportPresenter(self.asked.append)
+        self.worker = FakeWorker()
+        self.asked = self.worker.calls
+        self.presenter = ImportPresenter(self.worker, lambda _run: None)  # type: ignore[arg-type]
         self.owner = QWidget()
         qtbot.addWidget(self.owner)
         self.dialog = ImportDialog(theme, self.presenter, self.owner)
@@ -40,7 +40,10 @@ class Stage:
         self.answer(PREVIEW)
 
     def answer(self, answer: object) -> None:
-        self.presenter.on_done(self.asked[-1], answer)
+        self.asked[-1].done(answer)
+
+    def set_form(self, **texts: str) -> None:
+        self.presenter.set_form({**self.presenter.state.form, **texts})
 
     def find(self, kind: type, name: str) -> QWidget:
         (found,) = [part for part in self.dialog.findChildren(kind) if part.accessibleName() == name]
@@ -80,8 +83,8 @@ def test_choices_and_fields_are_read_anew(stage: Stage) -> None:
     assert isinstance(second, QComboBox)
     second.setCurrentIndex(3)
     second.activated.emit(3)
-    assert isinstance(stage.asked[-1], PreviewImport)
-    assert stage.asked[-1].form.second == "2"
+    assert stage.asked[-1].name == "preview_import"
+    assert stage.asked[-1].arguments[1]["second"] == "2"
     stage.answer(PREVIEW)
     assert not stage.find(QLineEdit, "Gain").isEnabled()
     stage.choose("Unit", "by a gain")
@@ -90,13 +93,13 @@ def test_choices_and_fields_are_read_anew(stage: Stage) -> None:
     assert field.isEnabled()
     stage.qtbot.keyClicks(field, "2")
     stage.qtbot.keyClick(field, Qt.Key.Key_Return)
-    assert stage.presenter.state.form.gain == "2"
+    assert stage.presenter.state.form["gain"] == "2"
     assert stage.dialog.isVisible(), "Enter in a field is no decision"
 
 
 def test_a_file_is_imported_and_the_next_comes(stage: Stage) -> None:
     stage.qtbot.mouseClick(stage.button("Import"), Qt.MouseButton.LeftButton)
-    assert isinstance(stage.asked[-1], ImportFile)
+    assert stage.asked[-1].name == "import_file"
     assert not stage.button("Import").isEnabled()
     stage.answer("/runs/a.h5")
     assert "Import b.csv" in visible_words(stage.dialog)
@@ -123,7 +126,7 @@ def test_what_is_rare_is_under_a_fold_and_the_preview_stays(stage: Stage) -> Non
     asked = len(stage.asked)
     stage.qtbot.keyClicks(field, "21,5")
     stage.qtbot.keyClick(field, Qt.Key.Key_Return)
-    assert stage.presenter.state.form.temperature_c == "21,5"
+    assert stage.presenter.state.form["temperature_c"] == "21,5"
     assert len(stage.asked) == asked, "the weather is read from no file"
     assert stage.button("Import").isEnabled()
     stage.dialog.resize(900, 600)
@@ -134,16 +137,14 @@ def test_what_is_rare_is_under_a_fold_and_the_preview_stays(stage: Stage) -> Non
 
 
 def test_a_fault_is_said_under_its_field_even_in_the_fold(stage: Stage) -> None:
-    stage.presenter.set_form(
-        replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="none")
-    )
+    stage.set_form(humidity_percent="120", plate_mass_kg="none")
     words = visible_words(stage.dialog)
     assert "120 cannot be. Give 0 to 100, or leave it out" in words
     assert "none is no number above 0" in words
     assert "Correct what is marked" in words
     assert not stage.button("Import").isEnabled()
     assert "50 samples, 1 s" in words, "the preview stays"
-    stage.presenter.set_form(replace(stage.presenter.state.form, humidity_percent="12", plate_mass_kg=""))
+    stage.set_form(humidity_percent="12", plate_mass_kg="")
     assert "cannot be" not in visible_words(stage.dialog)
     assert stage.button("Import").isEnabled()
 
@@ -155,12 +156,12 @@ def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
     note.setFocus()
     stage.qtbot.waitUntil(note.hasFocus)
     stage.qtbot.keyClicks(note, "wet")
-    stage.presenter.set_form(replace(stage.presenter.state.form, table="t"))
+    stage.set_form(table="t")
     stage.answer(PREVIEW)
     assert note.text() == "wet"
     stage.qtbot.keyClick(note, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert isinstance(stage.asked[-1], ImportFile)
-    assert stage.asked[-1].form.note == "wet"
+    assert stage.asked[-1].name == "import_file"
+    assert stage.asked[-1].arguments[1]["note"] == "wet"
     stage.answer("/runs/a.h5")
     assert note.text() == "", "the next file has a note of its own"
 
@@ -170,7 +171,7 @@ def test_longer_words_of_another_language_fit_too(
 ) -> None:
     use_language("ru")
     stage = Stage(theme, qtbot)
-    stage.presenter.set_form(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
+    stage.set_form(humidity_percent="120", plate_mass_kg="-3")
     assert "120 не годится. Задайте от 0 до 100 или оставьте пустым" in visible_words(stage.dialog)
     stage.dialog.resize(900, 600)
     qtbot.wait(1)

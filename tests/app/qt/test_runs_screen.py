@@ -9,25 +9,10 @@ from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QTextDocument
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import FakeWorker
+from stage import Call, FakeWorker
 
-from app.presenters.events import TaskDone
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import Column, Overlay, Trace
-from app.presenters.runs.tasks import (
-    AnalyseRuns,
-    BatchOutcome,
-    CopyRuns,
-    EditRuns,
-    ExportPreview,
-    ExportRuns,
-    ListRuns,
-    LoadOverlay,
-    PreviewExport,
-    RunsTask,
-    SurveyFile,
-    TrashRuns,
-)
+from app.presenters.runs.state import BatchOutcome, Column, Overlay, Trace
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.runs.screen import RunsScreen
 from app.qt.theme import Theme
@@ -81,18 +66,20 @@ class Stage:
         raise NotImplementedError
 
     def list_runs(self) -> None:
-        self.answer(ListRuns("/runs"), RUNS)
+        self.presenter.refresh()
+        self.answer("list_folder", RUNS)
 
-    def answer(self, task: RunsTask, answer: object) -> None:
-        self.worker.news = [TaskDone(task, answer)]
+    def answer(self, name: str, answer: object) -> None:
+        """Answer the last call of a task."""
+        self.calls(name)[-1].done(answer)
         self.presenter.tick()
+
+    def calls(self, name: str) -> list[Call]:
+        return [call for call in self.worker.calls if call.name == name]
 
     def click_row(self, number: int, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         place = self.table.visualRect(self.table.model().index(number, 0)).center()
         self.qtbot.mouseClick(self.table.viewport(), Qt.MouseButton.LeftButton, modifier, place)
-
-    def submitted(self) -> list[RunsTask]:
-        return [argument for _, argument in self.worker.submitted]
 
     def button(self, text: str) -> QPushButton:
         (found,) = [b for b in self.screen.findChildren(QPushButton) if b.text() == text]
@@ -110,7 +97,8 @@ def stage(theme: Theme, qtbot: QtBot) -> Stage:
 
 def test_an_empty_library_says_how_to_fill_it(stage: Stage) -> None:
     assert "Looking into the folder" in visible_words(stage.screen)
-    stage.answer(ListRuns("/runs"), ())
+    stage.presenter.refresh()
+    stage.answer("list_folder", ())
     assert "There are no runs in /runs yet. Record a pullback" in visible_words(stage.screen)
 
 
@@ -166,7 +154,7 @@ def test_selected_runs_are_drawn_over_one_another(stage: Stage) -> None:
     stage.click_row(2, Qt.KeyboardModifier.ControlModifier)
     paths = stage.presenter.state.selected
     assert len(paths) == 2
-    stage.answer(LoadOverlay(paths), Overlay((trace("one"), trace("two", 1.0)), "time from release, s"))
+    stage.answer("load_overlay", Overlay((trace("one"), trace("two", 1.0)), "time from release, s"))
     drawn = [curve for curve in stage.screen._preview._curves[0] if curve.getData()[0] is not None]
     assert len(drawn) == 2
     assert "one" in visible_words(stage.screen)
@@ -188,7 +176,7 @@ def test_keys_in_the_table_open_analyse_and_put_aside(stage: Stage) -> None:
     for key in (Qt.Key.Key_Return, Qt.Key.Key_Delete):
         stage.qtbot.keyClick(stage.table, key)
     assert stage.opened == [path]
-    assert TrashRuns((path,)) in stage.submitted()
+    assert stage.calls("trash_runs")[-1].arguments == ((path,),)
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     assert stage.asked == 1
 
@@ -198,12 +186,13 @@ def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_wor
     stage.click_row(0)
     (path,) = stage.presenter.state.selected
     stage.qtbot.keyClick(stage.table, Qt.Key.Key_R)
-    assert [task for _, task in stage.analyst.submitted] == [AnalyseRuns((path,))]
+    assert [call.arguments for call in stage.analyst.calls] == [((path,), False)]
     stage.presenter.cancel()
     stage.qtbot.keyClick(stage.table, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
-    assert stage.analyst.submitted[-1][1] == AnalyseRuns((path,), reanalyse=True)
+    assert stage.analyst.calls[-1].arguments == ((path,), True)
     assert stage.button("Cancel").isVisible()
-    stage.answer(TrashRuns((path,)), BatchOutcome((path,)))
+    stage.presenter.trash()
+    stage.answer("trash_runs", BatchOutcome((path,)))
     said = visible_words(stage.screen)
     assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
@@ -214,10 +203,10 @@ def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
     stage.field("Note").setFocus()
     stage.qtbot.keyClicks(stage.field("Note"), "dry")
     stage.qtbot.keyClick(stage.field("Note"), Qt.Key.Key_Return)
-    task = EditRuns(stage.presenter.state.selected, "note", "dry", "me")
-    assert stage.submitted().count(task) == 1
+    (edit,) = stage.calls("edit_runs")
+    assert edit.arguments == (stage.presenter.state.selected, "note", "dry", "me")
     assert not stage.button("Undo").isEnabled()
-    stage.answer(task, BatchOutcome(task.paths))
+    edit.done(BatchOutcome(edit.arguments[0]))
     assert stage.button("Undo").isEnabled()
     assert "change of note" in stage.button("Undo").toolTip()
 
@@ -226,9 +215,7 @@ def test_faults_of_many_are_folded_away(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)
     stage.presenter.trash()
-    stage.answer(
-        TrashRuns(("x",)), BatchOutcome((), ("a.h5: no right to move it", "b.h5: it is being recorded"))
-    )
+    stage.answer("trash_runs", BatchOutcome((), ("a.h5: no right to move it", "b.h5: it is being recorded")))
     assert "no right" not in visible_words(stage.screen)
     stage.qtbot.mouseClick(stage.button("Details"), Qt.MouseButton.LeftButton)
     assert "b.h5: it is being recorded" in visible_words(stage.screen)
@@ -245,8 +232,8 @@ def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
         Qt.KeyboardModifier.NoModifier,
     )
     stage.screen.dropEvent(drop)
-    (task,) = [task for task in stage.submitted() if isinstance(task, CopyRuns)]
-    assert [path.replace("\\", "/")[-14:] for path in task.paths] == ["elsewhere/x.h5"]
+    (copy,) = stage.calls("copy_runs")
+    assert [path.replace("\\", "/")[-14:] for path in copy.arguments[0]] == ["elsewhere/x.h5"]
 
 
 def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
@@ -259,15 +246,13 @@ def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
     dialog.show()
     assert "Export 6 runs" in visible_words(dialog)
     stage.presenter.export_dialog.set_format("uff58")
-    task = PreviewExport(RUNS[0].path, "uff58", "samples")
-    assert stage.submitted()[-1] == task
-    stage.answer(task, ExportPreview("a.uff, 12 kB"))
+    preview = stage.calls("preview_export")[-1]
+    assert preview.arguments == (RUNS[0].path, {"format": "uff58", "content": "samples"})
+    preview.done("a.uff, 12 kB")
     assert dialog._preview.toPlainText() == "a.uff, 12 kB"
     stage.qtbot.mouseClick(dialog._export, Qt.MouseButton.LeftButton)
     assert not dialog._export.isEnabled()
-    export = stage.submitted()[-1]
-    assert isinstance(export, ExportRuns)
-    stage.answer(export, BatchOutcome((), ("x.h5: the disk is full",)))
+    stage.answer("export_files", BatchOutcome((), ("x.h5: the disk is full",)))
     assert "Nothing was written" in visible_words(dialog)
     assert "the disk is full" in visible_words(dialog)
     assert clipped_words(dialog) == []
@@ -281,9 +266,7 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
         stage.table.model().index(0, 0),
         QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows,
     )
-    stage.answer(
-        LoadOverlay(stage.presenter.state.selected), Overlay((trace("one"),), "time from release, s")
-    )
+    stage.answer("load_overlay", Overlay((trace("one"),), "time from release, s"))
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
 
@@ -295,4 +278,4 @@ def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: St
     dialog.filesSelected.emit(["/elsewhere/x.csv"])
     dialog.close()
     assert stage.imports == 1
-    assert SurveyFile("/elsewhere/x.csv") in stage.submitted()
+    assert stage.calls("survey_file")[-1].arguments[0] == "/elsewhere/x.csv"
