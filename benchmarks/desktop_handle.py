@@ -26,9 +26,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import analyse_run
-from app.presenters.events import TaskDone
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import IdentifyTask
 from app.presenters.worker import Worker
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -70,16 +68,18 @@ class Stage:
     def __init__(self, app: QApplication, path: Path) -> None:
         self._app = app
         self._worker = Worker()
-        self.presenter = IdentifyPresenter(self._worker, self._listen)
+        self.presenter = IdentifyPresenter(self._worker)
         self.screen = IdentifyScreen(Theme(app), self.presenter, lambda: None)
         self.screen.resize(1208, 800)
         self.presenter.attach(self.screen)
         self.screen.show()
         self._tick = QTimer()
-        self._tick.timeout.connect(self._listen)
+        self._tick.timeout.connect(self._worker.poll)
         self._tick.start(TICK_MS)
         self.presenter.on_opening(str(path))
-        self._worker.submit(analyse_run, str(path))
+        self._worker.submit(
+            analyse_run, str(path), done=self.presenter.on_analysed, progress=lambda _progress: None
+        )
         wait(app, lambda: bool(self.presenter.state.classical), "the run is analysed")
 
     def drag(self, count: int) -> np.ndarray:
@@ -115,13 +115,6 @@ class Stage:
     def _has(self, friction: float) -> bool:
         hand = self.presenter.state.manual_fit
         return hand is not None and hand.friction == friction
-
-    def _listen(self) -> None:
-        for news in self._worker.poll():
-            if isinstance(news.argument, IdentifyTask):
-                self.presenter.on_event(news)
-            elif isinstance(news, TaskDone):
-                self.presenter.on_analysed(news.answer)
 
 
 class Clock:

@@ -61,7 +61,7 @@ def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
     )
 
 
-def cached_analysis(task: AnalysisTask, report: ReportProgress) -> Analysis:
+def cached_analysis(task: AnalysisTask, report: ReportProgress = lambda _progress: None) -> Analysis:
     """Analysis of a run, from the cache if it is there. Raises RunError, AnalysisError."""
     if any(analysed.path != task.path for analysed in _analyses):
         _analyses.clear()

@@ -1,22 +1,15 @@
-"""Plot data of an analysed run: curves, motion, scan of f_d, and the simulation with f_d set by hand."""
+"""Plot data of an analysed run: curves, lines of the fitted motion, and words about f_d set by hand."""
 
 import numpy as np
 
 from analysis.formatting import typeset, with_unit
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
-from app.presenters.identify.state import (
-    ChannelCurves,
-    Curves,
-    DecimatedLine,
-    ManualFit,
-    ManualSimulation,
-    Motion,
-    PlotLine,
-    Scan,
-)
+from app.presenters.identify.state import ChannelCurves, Curves, Floats, Motion, PlotTab, PlottedQuantity
 from messages.i18n import N_, gettext
 
+_TABLE, _PLATE = "u<sub>1</sub>", "u<sub>2</sub>"
+_RELATIVE = f"{_PLATE} − {_TABLE}"
 _NO_RELATIVE = {
     "two-mass": N_("this run has no second gauge"),
     "one-mass": N_("gauge 2 plays no part where one mass moves"),
@@ -50,55 +43,60 @@ def curves(run: AnalysedRun) -> Curves:
     )
 
 
+def measured_lines(shown: Curves) -> tuple[PlottedQuantity, ...]:
+    """Records of the gauges, then the residuals."""
+    both = ((_TABLE, shown.table), (_RELATIVE, shown.relative))
+    gauges = [(symbol, channel) for symbol, channel in both if channel is not None]
+    records = [PlottedQuantity(symbol, "mm", shown.time_s, channel.record_mm) for symbol, channel in gauges]
+    residuals = [
+        PlottedQuantity(gettext("residual {symbol}", symbol=symbol), "µm", shown.time_s, channel.residual_um)
+        for symbol, channel in gauges
+        if channel.residual_um is not None
+    ]
+    return (*records, *residuals)
+
+
 def motion(run: AnalysedRun) -> Motion | None:
-    """Velocities and accelerations; None without a fitted motion."""
+    """Displacements, velocities and accelerations; None without a fitted motion."""
     found = run.kinematics
     if found is None:
         return None
-    return Motion(
-        time_s=found.time_s - time_origin_s(run),
-        table_mm=found.table_m * 1e3,
-        relative_mm=found.relative_m * 1e3,
-        table_mm_per_s=found.table_m_per_s * 1e3,
-        plate_mm_per_s=found.plate_m_per_s * 1e3,
-        relative_mm_per_s=(found.plate_m_per_s - found.table_m_per_s) * 1e3,
-        table_m_per_s2=found.table_m_per_s2,
-        plate_m_per_s2=found.plate_m_per_s2,
-        relative_m_per_s2=found.plate_m_per_s2 - found.table_m_per_s2,
-    )
+    time_s = found.time_s - time_origin_s(run)
+
+    def line(symbol: str, unit: str, values: Floats) -> PlottedQuantity:
+        return PlottedQuantity(symbol, unit, time_s, values if unit == "m/s²" else 1e3 * values)
+
+    velocity = line(f"{_TABLE}′", "mm/s", found.table_m_per_s)
+    relative = line(_RELATIVE, "mm", found.relative_m)
+    relative_velocity = line(f"{_PLATE}′ − {_TABLE}′", "mm/s", found.plate_m_per_s - found.table_m_per_s)
+    return {
+        PlotTab.VELOCITY: (velocity, line(f"{_PLATE}′", "mm/s", found.plate_m_per_s), relative_velocity),
+        PlotTab.ACCELERATION: (
+            line(f"{_TABLE}″", "m/s²", found.table_m_per_s2),
+            line(f"{_PLATE}″", "m/s²", found.plate_m_per_s2),
+        ),
+        PlotTab.RELATIVE: (
+            line(f"{_PLATE}″ − {_TABLE}″", "m/s²", found.plate_m_per_s2 - found.table_m_per_s2),
+            relative,
+        ),
+        PlotTab.PHASE: (line(_TABLE, "mm", found.table_m), velocity, relative, relative_velocity),
+    }
 
 
-def scan(objective: Objective | None) -> Scan | None:
-    """Residual against f_d."""
-    if objective is None:
-        return None
-    return Scan(objective.friction, objective.residual_m * 1e6, objective.fitted, objective.interval_95)
-
-
-def manual_fit(found: ManualSimulation, origin_s: float, objective: Objective) -> ManualFit:
-    """Simulation with f_d set by hand, and its difference from the fit."""
-    off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
-    words = gettext(
+def manual_fit_text(friction: float, objective: Objective) -> str:
+    """Describe f_d set by hand: its difference from the fit, and the residual."""
+    off_percent = 100.0 * (friction / objective.fitted - 1.0)
+    return gettext(
         "By hand: {friction}, {off} from the fit; residual {residual}",
-        friction=number_text.format_fixed(found.friction, 5),
+        friction=number_text.format_fixed(friction, 5),
         off=with_unit(typeset(f"{off_percent:+.2f}"), "%"),
-        residual=results.format_micrometres(objective.residual_at(found.friction)),
-    )
-    return ManualFit(
-        found.friction,
-        words,
-        tuple(_line(line, origin_s, 1e3) for line in found.simulations),
-        tuple(_line(line, origin_s, 1e6) for line in found.residuals),
+        residual=results.format_micrometres(objective.residual_at(friction)),
     )
 
 
 def missing_share(run: AnalysedRun) -> float:
     """Share of missing samples of the table gauge."""
     return float(np.isnan(run.table.record_m).mean())
-
-
-def _line(line: DecimatedLine, origin_s: float, scale: float) -> PlotLine:
-    return PlotLine(line.time_s - origin_s, line.value_m * scale)
 
 
 def _channel(channel: Channel) -> ChannelCurves:

@@ -1,42 +1,36 @@
 """Presenter of the Identify screen: shows an analysed run, and varies f_d by hand."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING
 
 from app.presenters import results
 from app.presenters.analysed_run import AUTO_MODEL, AnalysedRun, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.events import TaskDone, TaskFailed, TaskProgress, WorkerEvent
+from app.presenters.events import TaskFailure
+from app.presenters.identify import cursors as cursor_values
 from app.presenters.identify import plot_data, result_tables
-from app.presenters.identify.cursors import (
-    first_cursors,
-    move_cursor,
-    plotted_quantities,
-    read_cursors,
-    shift_cursors,
-    step_cursor,
-)
 from app.presenters.identify.state import (
-    ClassicalFigures,
+    ClassicalRow,
     Cursor,
     Cursors,
-    EstimateClassical,
     IdentifyState,
-    IdentifyTask,
-    ManualSimulation,
+    ManualFit,
     PlotTab,
-    SimulateFriction,
     Span,
 )
-from app.presenters.worker import LazyFunction, Worker
+from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext, translate
 from messages.message import Message
 
-RUN_ANALYSIS: Final = LazyFunction("app.presenters.analysis_task", "run_analysis")
-SIMULATE_FRICTION: Final = LazyFunction("app.presenters.identify.tasks", "simulate_friction")
-ESTIMATE_CLASSICAL: Final = LazyFunction("app.presenters.identify.tasks", "estimate_classical")
+if TYPE_CHECKING:
+    from app.presenters import analysis_task
+    from app.presenters.identify import tasks
+else:
+    analysis_task = LazyModule("app.presenters.analysis_task")
+    tasks = LazyModule("app.presenters.identify.tasks")
+
 _PIXELS = 1000
 """Width of the curves before the view reports it."""
 
@@ -56,22 +50,20 @@ class _Shown:
 
 
 class IdentifyPresenter(Presenter[IdentifyState]):
-    """Shows one run; `poll_worker` passes the events of the worker, which the window shares and closes."""
+    """Shows one run; `worker` has it loaded, and is shared and closed by the window."""
 
-    def __init__(self, worker: Worker, poll_worker: Callable[[], None]) -> None:
+    def __init__(self, worker: Worker) -> None:
         super().__init__(IdentifyState())
         self._worker = worker
-        self._poll_worker = poll_worker
         self._path = ""
         self._shown: _Shown | None = None
         self._span: tuple[float, float, int] | None = None
-        self._pending: SimulateFriction | None = None
+        self._pending: tuple[float, Span] | None = None
         self._next_friction: float | None = None
-        self._classical: ClassicalFigures | None = None
 
     def on_opening(self, path: str) -> None:
         self._path = path
-        self._shown = self._pending = self._next_friction = self._classical = self._span = None
+        self._shown = self._pending = self._next_friction = self._span = None
         self.state = IdentifyState(tab=self.state.tab)
         self._update(title=Path(path).name, progress=Progress(gettext("Reading the run")))
 
@@ -91,49 +83,27 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if str(run.path) == self._path:
             self._show(_Shown(run, run, AnalysisTask(self._path, kind=run.kind), true_friction))
 
-    def on_event(self, event: WorkerEvent) -> None:
-        task = event.argument
-        if task.path != self._path:
-            return
-        if isinstance(task, SimulateFriction):
-            if not isinstance(event, TaskProgress):
-                self._on_simulated(task, event.answer if isinstance(event, TaskDone) else None)
-        elif isinstance(task, EstimateClassical):
-            if isinstance(event, TaskDone):
-                self._on_classical(task, event.answer)
-        elif isinstance(event, TaskProgress):
-            self.on_progress(task.path, event.progress)
-        elif isinstance(event, TaskFailed):
-            self._on_variant_failed(task, translate(event.message))
-        else:
-            self._on_variant(task, event.answer)
-
     def cancel(self) -> None:
         if self.state.progress is not None:
             self._worker.cancel()
 
-    def set_tab(self, side: PlotTab) -> None:
-        self._update(tab=side, cursors=self._cursors_on_tab(self.state.cursors, side))
+    def set_tab(self, tab: PlotTab) -> None:
+        self._update(tab=tab, cursors=self._cursors_on_tab(self.state.cursors, tab))
 
     def select_model(self, name: str) -> None:
         shown = self._shown
         if shown is None or self.state.progress is not None or name == _model_of(shown.run):
             return
         if name == _model_of(shown.first_analysis):
-            self._show(
-                _Shown(
-                    shown.first_analysis, shown.first_analysis, AnalysisTask(self._path), shown.true_friction
-                )
-            )
+            self._show(replace(shown, run=shown.first_analysis, task=AnalysisTask(self._path)))
         else:
-            self._update(progress=Progress(gettext("Fitting {law}", law=name)))
-            self._submit(RUN_ANALYSIS, AnalysisTask(self._path, name))
+            self._analyse(AnalysisTask(self._path, name), gettext("Fitting {law}", law=name))
 
     def analyse_as_alternative(self) -> None:
         if self.state.alternative_kind is not None and self.state.progress is None:
+            self._update(failure="")
             task = AnalysisTask(self._path, kind=self.state.alternative_kind)
-            self._update(progress=Progress(gettext("Reading the run")), failure="")
-            self._submit(RUN_ANALYSIS, task)
+            self._analyse(task, gettext("Reading the run"))
 
     def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
         self._span = start_s, end_s, pixels
@@ -149,12 +119,18 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if self._pending is not None:
             self._next_friction = friction
             return
-        self._pending = SimulateFriction(self._path, friction, self._drawn_span(shown), shown.task.model)
-        self._submit(SIMULATE_FRICTION, self._pending)
+        pending = self._pending = (friction, self._drawn_span(shown))
+        self._worker.submit(
+            tasks.simulate_friction,
+            shown.task,
+            *pending,
+            done=lambda fit: self._on_simulated(pending, fit),
+            failed=lambda _failure: self._on_simulated(pending, None),
+        )
 
     def poll(self) -> bool:
-        """Process events; True while a simulation is pending."""
-        self._poll_worker()
+        """Process what has come from the worker; True while a simulation is pending."""
+        self._worker.poll()
         return self._pending is not None
 
     def reset_friction(self) -> None:
@@ -165,27 +141,29 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if self._shown is None or self.state.cursors is not None:
             self._update(cursors=None)
         else:
-            self._set_cursors(first_cursors(*(span or plot_data.time_span(self._shown.run))))
+            self._set_cursors(cursor_values.first_cursors(*(span or plot_data.time_span(self._shown.run))))
 
     def move_cursor(self, cursor: Cursor, at_s: float) -> None:
         if self.state.cursors is not None:
-            self._set_cursors(move_cursor(self.state.cursors, cursor, at_s))
+            self._set_cursors(cursor_values.move_cursor(self.state.cursors, cursor, at_s))
 
     def activate_cursor(self, cursor: Cursor) -> None:
         if self.state.cursors is not None:
-            self._set_cursors(move_cursor(self.state.cursors, cursor, self.state.cursors.at(cursor)))
+            self._set_cursors(replace(self.state.cursors, active=cursor))
 
     def step_cursor(self, samples: int) -> None:
-        if self.state.cursors is not None and self.state.curves is not None:
-            self._set_cursors(step_cursor(self.state.cursors, self.state.curves.time_s, samples))
+        cursors, curves = self.state.cursors, self.state.curves
+        if cursors is not None and curves is not None:
+            self._set_cursors(cursor_values.step_cursor(cursors, curves.time_s, samples))
 
-    def _submit(self, function: LazyFunction, task: IdentifyTask) -> None:
+    def _analyse(self, task: AnalysisTask, text: str) -> None:
+        self._update(progress=Progress(text))
         self._worker.submit(
-            function,
+            analysis_task.run_analysis,
             task,
-            done=lambda answer: self.on_event(TaskDone(task, answer)),
-            failed=lambda failure: self.on_event(TaskFailed(task, failure.message, failure.is_cancelled)),
-            progress=lambda progress: self.on_event(TaskProgress(task, progress)),
+            done=partial(self._on_variant, task),
+            failed=partial(self._on_variant_failed, task),
+            progress=partial(self.on_progress, task.path),
         )
 
     def _show(self, shown: _Shown) -> None:
@@ -208,7 +186,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             no_scan_reason=result_tables.no_scan_reason(run),
             tab=self.state.tab if run.kinematics is not None else PlotTab.DISPLACEMENT,
             motion=plot_data.motion(run),
-            scan=plot_data.scan(run.objective),
+            scan=run.objective,
             manual_fit=None,
             cursors=None,
             alternative_kind="one-mass" if run.kind == "two-mass" else "two-mass",
@@ -216,60 +194,55 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             failure="",
         )
         if cursors is not None and before is not None:
-            self._set_cursors(shift_cursors(cursors, before.origin_s - shown.origin_s))
+            self._set_cursors(cursor_values.shift_cursors(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
-            self._submit(ESTIMATE_CLASSICAL, EstimateClassical(self._path, shown.task.model))
+            self._worker.submit(tasks.estimate_classical, shown.task, done=partial(self._on_classical, shown))
 
     def _on_variant(self, task: AnalysisTask, run: AnalysedRun) -> None:
         """Show another law beside those of the first analysis, or another kind of analysis."""
-        if self.state.progress is None:
+        if task.path != self._path or self.state.progress is None:
             return
         before = self._shown
         first = before.first_analysis if before is not None and task.model != AUTO_MODEL else run
         self._show(_Shown(first, run, task, before.true_friction if before is not None else None))
 
-    def _on_variant_failed(self, task: AnalysisTask, message: str) -> None:
+    def _on_variant_failed(self, task: AnalysisTask, failure: TaskFailure) -> None:
         if self._shown is None:
-            self._update(progress=None, failure=message)
-            return
-        what = task.model if task.model != AUTO_MODEL else task.kind
-        words = Chip(gettext("{what}: {reason}", what=what, reason=message), Tone.WARN)
-        self._update(progress=None, model_note=words)
+            self.on_failed(task.path, failure.message)
+        elif task.path == self._path:
+            what = task.model if task.model != AUTO_MODEL else task.kind
+            words = gettext("{what}: {reason}", what=what, reason=translate(failure.message))
+            self._update(progress=None, model_note=Chip(words, Tone.WARN))
 
-    def _on_simulated(self, task: SimulateFriction, hand: ManualSimulation | None) -> None:
-        if task != self._pending or self._shown is None:
+    def _on_simulated(self, pending: tuple[float, Span], fit: ManualFit | None) -> None:
+        if pending is not self._pending:
             return
         self._pending = None
-        objective = self._shown.run.objective
-        if hand is not None and objective is not None:
-            self._update(manual_fit=plot_data.manual_fit(hand, self._shown.origin_s, objective))
+        if fit is not None and self.state.scan is not None:
+            text = plot_data.manual_fit_text(fit.friction, self.state.scan)
+            self._update(manual_fit=fit, manual_fit_text=text)
         following, self._next_friction = self._next_friction, None
         if following is not None:
             self.set_friction(following)
 
-    def _on_classical(self, task: EstimateClassical, found: ClassicalFigures) -> None:
-        shown = self._shown
-        if shown is not None and task.model == shown.task.model and shown.run.kind == "two-mass":
-            self._update(classical=result_tables.classical_rows(shown.run, found))
+    def _on_classical(self, shown: _Shown, rows: tuple[ClassicalRow, ...]) -> None:
+        if shown is self._shown:
+            self._update(classical=rows)
 
     def _drawn_span(self, shown: _Shown) -> Span:
-        """Visible span in times of the record."""
-        time_s, origin_s = shown.run.time_s, shown.origin_s
-        if self._span is None:
-            return Span(float(time_s[0]), float(time_s[-1]), _PIXELS)
-        start_s, end_s, pixels = self._span
-        return Span(start_s + origin_s, end_s + origin_s, pixels)
+        start_s, end_s, pixels = self._span or (*plot_data.time_span(shown.run), _PIXELS)
+        return Span(start_s, end_s, pixels, shown.origin_s)
 
     def _set_cursors(self, cursors: Cursors) -> None:
         self._update(cursors=self._cursors_on_tab(cursors, self.state.tab))
 
-    def _cursors_on_tab(self, cursors: Cursors | None, side: PlotTab) -> Cursors | None:
-        curves, shown = self.state.curves, self._shown
+    def _cursors_on_tab(self, cursors: Cursors | None, tab: PlotTab) -> Cursors | None:
+        curves, shown, motion = self.state.curves, self._shown, self.state.motion
         if cursors is None or curves is None or shown is None:
             return None
         period = shown.run.results.get("period_s")
-        read_here = plotted_quantities(side, curves, self.state.motion)
-        return read_cursors(cursors, curves.time_s, read_here, period.value if period else None)
+        lines = motion[tab] if motion is not None and tab in motion else plot_data.measured_lines(curves)
+        return cursor_values.read_cursors(cursors, curves.time_s, lines, period.value if period else None)
 
 
 def _model_of(run: AnalysedRun) -> str:

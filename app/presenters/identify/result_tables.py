@@ -1,16 +1,22 @@
 """Rows of the results column: models, classical estimates, budget and notes."""
 
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import uncertainty_decimals, with_unit
 from analysis.identification import FittedModel, ModelSelection
+from analysis.quantities import Quantity
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.identify.plot_data import missing_share
-from app.presenters.identify.state import BudgetRow, ClassicalFigures, ClassicalRow, ModelRow
+from app.presenters.identify.state import BudgetRow, ClassicalRow, ModelRow
 from messages.i18n import gettext, translate
+
+if TYPE_CHECKING:
+    from analysis.classical_estimates import ClassicalEstimates
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 """Differences of BIC after Kass and Raftery (1995): below 2 not worth mentioning, above 10 very strong."""
@@ -39,15 +45,17 @@ def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tu
     )
 
 
-def classical_rows(run: AnalysedRun, found: ClassicalFigures) -> tuple[ClassicalRow, ...]:
+def classical_rows(fitted: Mapping[str, Quantity], found: "ClassicalEstimates") -> tuple[ClassicalRow, ...]:
     """Classical estimates beside the fitted values."""
+    damping = found.log_decrement and found.period_s and found.log_decrement / found.period_s
+    by_turning_points = gettext("from turning points of the tail")
     rows = [
-        _check(run, "period_s", found.period_s, gettext("from turning points of the tail")),
-        _check(run, "log_decrement", found.log_decrement, gettext("from turning points of the tail")),
-        _check(run, "damping_n1_per_s", _damping(found), gettext("log decrement over T, both classical")),
-        _of_paper(run, found),
-        _of_residual(run, found),
+        _check(fitted, "period_s", found.period_s, by_turning_points),
+        _check(fitted, "log_decrement", found.log_decrement, by_turning_points),
+        _check(fitted, "damping_n1_per_s", damping, gettext("log decrement over T, both classical")),
     ]
+    if results.FRICTION.name in fitted:
+        rows += [_paper_friction(fitted, found), _residual_friction(fitted, found)]
     return tuple(row for row in rows if row is not None)
 
 
@@ -137,19 +145,12 @@ def _ratio(residual_m: float, noise_m: float) -> str:
     return number_text.format_fixed(ratio, 2 if ratio < 10.0 else 0)
 
 
-def _damping(found: ClassicalFigures) -> float | None:
-    if found.log_decrement is None or found.period_s is None:
-        return None
-    return found.log_decrement / found.period_s
-
-
-def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> ClassicalRow | None:
+def _check(fitted: Mapping[str, Quantity], key: str, value: float | None, hint: str) -> ClassicalRow | None:
     """A row, if both figures are there; the classical one to the last digit that is shown of the fitted."""
-    fitted = run.results.get(key)
-    if value is None or fitted is None:
+    if value is None or key not in fitted:
         return None
     shown = definition(key)
-    row = results.make_row(shown, fitted)
+    row = results.make_row(shown, fitted[key])
     decimals = len(row.value.partition(".")[2])
     classical = number_text.format_fixed(value * shown.unit_at(Place.WINDOW).scale, decimals)
     return ClassicalRow(
@@ -157,33 +158,32 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> Classi
     )
 
 
-def _of_paper(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
+def _paper_friction(fitted: Mapping[str, Quantity], found: "ClassicalEstimates") -> ClassicalRow | None:
     """f_d by the procedure of the paper, to the resolution of its steps."""
-    fitted = run.results.get(results.FRICTION.name)
-    if found.friction_of_paper is None or fitted is None:
+    if found.friction_by_paper_method is None:
         return None
-    by_paper = number_text.format_fixed(found.friction_of_paper, _PAPER_DECIMALS)
-    shown = number_text.format_fixed(fitted.value, _PAPER_DECIMALS)
-    hint = gettext("f_d lowered step by step until the paper's simulation coincides best")
-    return ClassicalRow(results.FRICTION.symbol.html, gettext("by the paper's method"), by_paper, shown, hint)
-
-
-def _of_residual(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
-    """Values of f_d that the residual displacement allows."""
-    if "residual_displacement_m" not in run.results or results.FRICTION.name not in run.results:
-        return None
-    fitted = run.results[results.FRICTION.name].value
-    near = sorted(found.frictions_of_residual, key=lambda value: abs(value - fitted))[:_RESIDUALS_SHOWN]
-    values = ", ".join(number_text.format_fixed(value, 4) for value in sorted(near))
-    count = len(found.frictions_of_residual)
-    if count > _RESIDUALS_SHOWN:
-        values = gettext("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
-    hint = gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
-    words = gettext("from u<sub>s</sub> alone")
     return ClassicalRow(
         results.FRICTION.symbol.html,
-        words,
-        values or gettext("none"),
-        number_text.format_fixed(fitted, 4),
-        hint,
+        gettext("by the paper's method"),
+        number_text.format_fixed(found.friction_by_paper_method, _PAPER_DECIMALS),
+        number_text.format_fixed(fitted[results.FRICTION.name].value, _PAPER_DECIMALS),
+        gettext("f_d lowered step by step until the paper's simulation coincides best"),
+    )
+
+
+def _residual_friction(fitted: Mapping[str, Quantity], found: "ClassicalEstimates") -> ClassicalRow | None:
+    """Values of f_d that the residual displacement allows."""
+    if "residual_displacement_m" not in fitted:
+        return None
+    friction = fitted[results.FRICTION.name].value
+    nearest = sorted(found.friction_candidates, key=lambda value: abs(value - friction))[:_RESIDUALS_SHOWN]
+    values = ", ".join(number_text.format_fixed(value, 4) for value in sorted(nearest))
+    more = len(found.friction_candidates) - len(nearest)
+    return ClassicalRow(
+        results.FRICTION.symbol.html,
+        gettext("from u<sub>s</sub> alone"),
+        (gettext("{values} and {more} more", values=values, more=more) if more else values)
+        or gettext("none"),
+        number_text.format_fixed(friction, 4),
+        gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one"),
     )

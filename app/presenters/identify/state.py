@@ -1,12 +1,13 @@
-"""State of the Identify screen, and its tasks."""
+"""State of the Identify screen."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.analysed_run import AUTO_MODEL, AnalysisKind, AnalysisTask
+from app.presenters.analysed_run import AnalysisKind, Objective
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from app.presenters.results import Result, ResultRow
 from messages.i18n import N_
@@ -25,13 +26,7 @@ class ChannelCurves:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curves:
-    """A run for drawing.
-
-    Attributes
-    ----------
-    no_relative : str
-        Why there is no second gauge; empty if there is one.
-    """
+    """A run for drawing."""
 
     time_s: Floats
     """(n,) float64: from the release; without one, from the start of the record."""
@@ -39,6 +34,7 @@ class Curves:
     table: ChannelCurves
     relative: ChannelCurves | None = None
     no_relative_reason: str = ""
+    """Empty if there is a second gauge."""
     slips: tuple[tuple[float, float], ...] = ()
     """Start and end of each slip, in the times of `time_s`."""
     noise_um: float | None = None
@@ -56,50 +52,33 @@ class PlotTab(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Motion:
-    """Velocities and accelerations of the fitted motion; times as in `Curves`."""
+class PlottedQuantity:
+    """A plotted line that cursors read; times (n,) rise, values (n,) are NaN where missing."""
 
+    symbol: str
+    """As rich text."""
+    unit: str
     time_s: Floats
-    """(n,) float64."""
-    table_mm: Floats
-    """(n,) float64."""
-    relative_mm: Floats
-    table_mm_per_s: Floats
-    plate_mm_per_s: Floats
-    relative_mm_per_s: Floats
-    table_m_per_s2: Floats
-    """(n,) float64."""
-    plate_m_per_s2: Floats
-    relative_m_per_s2: Floats
+    values: Floats
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Scan:
-    """Residual rms (µm) against f_d, all other parameters as fitted. The handle moves along `friction`."""
-
-    friction: Floats
-    residual_um: Floats
-    fitted: float
-    interval_95: tuple[float, float]
+Motion = Mapping[PlotTab, tuple[PlottedQuantity, ...]]
+"""Lines of the fitted motion by tab; on the phase plane each displacement is followed by its velocity."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlotLine:
-    """Points of a line, (n,) each; times as in `Curves`."""
+    """Points of a line, (n,) each, decimated for drawing; times as in `Curves`."""
 
     time_s: Floats
-    value: Floats
+    values: Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ManualFit:
-    """Simulation with f_d set by hand, decimated for drawing.
-
-    `simulations_mm` and `residuals_um` hold the table, then gauge 2 if there is one.
-    """
+    """Simulation with f_d set by hand: lines of the table, then of gauge 2 if there is one."""
 
     friction: float
-    description: str
     simulations_mm: tuple[PlotLine, ...]
     residuals_um: tuple[PlotLine, ...]
 
@@ -182,8 +161,10 @@ class IdentifyState:
     """Why f_d cannot be varied."""
     tab: PlotTab = PlotTab.DISPLACEMENT
     motion: Motion | None = None
-    scan: Scan | None = None
+    scan: Objective | None = None
+    """Residual against f_d, all other parameters as fitted."""
     manual_fit: ManualFit | None = None
+    manual_fit_text: str = ""
     cursors: Cursors | None = None
     alternative_kind: AnalysisKind | None = None
     """The other kind of analysis that is possible."""
@@ -193,59 +174,10 @@ class IdentifyState:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Visible part of a run: times of the record, and width in pixels."""
+    """Drawn part of a run: times as in `Curves`, and width in pixels."""
 
     start_s: float
     end_s: float
     pixels: int
-
-
-@dataclass(frozen=True, slots=True)
-class SimulateFriction:
-    """Simulate a run with another f_d, decimated for a span."""
-
-    path: str
-    friction: float
-    span: Span
-    model: str = AUTO_MODEL
-
-
-@dataclass(frozen=True, slots=True)
-class EstimateClassical:
-    """Estimate the parameters of a run by the methods of the paper."""
-
-    path: str
-    model: str = AUTO_MODEL
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class DecimatedLine:
-    """A line decimated to a few points a pixel, (n,) each; times of the record."""
-
-    time_s: Floats
-    value_m: Floats
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ManualSimulation:
-    """Simulation with an f_d set by hand, and its residual."""
-
-    friction: float
-    simulations: tuple[DecimatedLine, ...]
-    """Table, then relative displacement if there is a second gauge."""
-    residuals: tuple[DecimatedLine, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ClassicalFigures:
-    """Estimates by the methods of the paper; None if a record does not allow one."""
-
-    period_s: float | None
-    log_decrement: float | None
-    log_decrement_uncertainty: float | None
-    cycles: int
-    frictions_of_residual: tuple[float, ...]
-    friction_of_paper: float | None
-
-
-IdentifyTask = SimulateFriction | EstimateClassical | AnalysisTask
+    origin_s: float
+    """Time of the record that is drawn as 0."""

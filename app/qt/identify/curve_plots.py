@@ -1,19 +1,16 @@
 """Record against simulation for both gauges, and what is left over: three plots, one time axis."""
 
-import math
 from typing import Any
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QWidget
 
-from analysis.formatting import with_unit
-from app.presenters import number_text
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine
 from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
+from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import (
     Plot,
     PlotStack,
@@ -68,10 +65,11 @@ class CurvePlots(QWidget):
         self._noise = shaded_region(residual, "horizontal")
         self._noise.setZValue(10)
         self.cursors = CursorLines(self._stack.plots)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._stack)
-        self._connect()
+        make_column(self._stack, of=self)
+        self._stack.hovered.connect(self._show_values)
+        self._stack.resized.connect(lambda _: self._report_span())
+        self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._report_span())
+        theme.changed.connect(self._restyle)
         self._restyle()
 
     def show_curves(self, curves: Curves) -> None:
@@ -83,7 +81,8 @@ class CurvePlots(QWidget):
             _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
         self.show_manual_fit(None)
-        self._set_heights(channels)
+        for plot, lines in zip(self._stack.plots, _lines(curves), strict=True):
+            plot.fit_values(*lines)
         self._set_titles(channels, curves.no_relative_reason)
         for slip in self._slips:
             slip.show_spans(curves.slips)
@@ -104,13 +103,7 @@ class CurvePlots(QWidget):
         """What of the time axis is drawn (s)."""
         return self._stack.time_range()
 
-    def _connect(self) -> None:
-        self._stack.hovered.connect(self._read_out)
-        self._stack.resized.connect(lambda _: self._tell_span())
-        self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._tell_span())
-        self._theme.changed.connect(self._restyle)
-
-    def _tell_span(self) -> None:
+    def _report_span(self) -> None:
         self.span_changed.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
 
     def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
@@ -122,12 +115,6 @@ class CurvePlots(QWidget):
         for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
             self._stack.set_title(row, f"{gettext(name)} &nbsp; {words}")
             self._stack.set_plot_visible(row, shown=shown[row])
-
-    def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
-        drawn = [(c.record_mm,) if c else () for c in channels]
-        residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
-        for plot, arrays in zip(self._stack.plots, (*drawn, residuals), strict=True):
-            plot.set_value_range(*_extent(arrays))
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -148,29 +135,20 @@ class CurvePlots(QWidget):
         if self._curves is not None:
             self._stack.set_time_title(self._curves.time_label)
 
-    def _read_out(self, at_s: float) -> None:
-        for row in range(len(_NAMES)):
-            self._stack.set_readout(row, self._readout(row, at_s))
+    def _show_values(self, at_s: float) -> None:
+        if self._curves is None:
+            return
+        for row, lines in enumerate(_lines(self._curves)):
+            values = [value_at(self._curves.time_s, line, at_s) for line in lines]
+            self._stack.show_values(row, at_s, values, _UNITS[row], 3 if row < 2 else 0)
 
-    def _readout(self, row: int, at_s: float) -> str:
-        if self._curves is None or math.isnan(at_s):
-            return ""
-        values = [value_at(self._curves.time_s, line, at_s) for line in self._lines(self._curves, row)]
-        shown = [
-            number_text.format_fixed(v, 3 if row < 2 else 0) if math.isfinite(v) else "–" for v in values
-        ]
-        if not shown:
-            return ""
-        at = with_unit(number_text.format_fixed(at_s, 3), "s")
-        return f"{at}   {with_unit(' | '.join(shown), _UNITS[row])}"
 
-    def _lines(self, curves: Curves, row: int) -> list[Floats]:
-        if row == 2:
-            channels = (curves.table, curves.relative)
-            return [c.residual_um for c in channels if c is not None and c.residual_um is not None]
-        channel = (curves.table, curves.relative)[row]
-        lines = () if channel is None else (channel.record_mm, channel.simulation_mm)
-        return [line for line in lines if line is not None]
+def _lines(curves: Curves) -> tuple[list[Floats], ...]:
+    """Lines of each plot: record and simulation of each gauge, and the residuals."""
+    channels = (curves.table, curves.relative)
+    gauges = [(c.record_mm, c.simulation_mm) if c is not None else () for c in channels]
+    residuals = [c.residual_um for c in channels if c is not None]
+    return tuple([line for line in lines if line is not None] for lines in (*gauges, residuals))
 
 
 def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:
@@ -201,23 +179,14 @@ def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
 def _set_line(curve: Any, line: PlotLine | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
-        curve.setData(line.time_s, line.value, connect="finite")
+        curve.setData(line.time_s, line.values, connect="finite")
 
 
 def _mixed(token: str, ground: str) -> str:
     """Half of a colour on a ground: as light as a transparent line, and drawn in a quarter of the time."""
-    one, other = QColor(token), QColor(ground)
-    halves = ((a + b) // 2 for a, b in zip(_parts(one), _parts(other), strict=True))
-    return QColor(*halves).name()
-
-
-def _parts(colour: QColor) -> tuple[int, int, int]:
-    return colour.red(), colour.green(), colour.blue()
-
-
-def _extent(arrays: Any) -> tuple[float, float]:
-    present = [array[np.isfinite(array)] for array in arrays]
-    low = min((float(a.min()) for a in present if len(a)), default=-1.0)
-    high = max((float(a.max()) for a in present if len(a)), default=1.0)
-    margin = 0.06 * (high - low) or 1.0
-    return low - margin, high + margin
+    line, behind = QColor(token), QColor(ground)
+    return QColor(
+        (line.red() + behind.red()) // 2,
+        (line.green() + behind.green()) // 2,
+        (line.blue() + behind.blue()) // 2,
+    ).name()

@@ -1,4 +1,4 @@
-"""What is left over against f_d, with a handle: drawn along, the simulation follows."""
+"""Residual against f_d, with a handle that sets f_d of the simulation by hand."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,8 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy
 
-from app.presenters.identify.state import ManualFit, Scan
+from app.presenters.analysed_run import Objective
+from app.presenters.identify.state import ManualFit
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
@@ -19,12 +20,12 @@ _STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
 """Of the range of the scan, by an arrow key, and by one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
 _WORDS = N_("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
-_LOOK_MS = 1
-"""How often an answer is looked for while one is awaited: the window's own tick would be too late."""
+_POLL_MS = 1
+"""Interval of `poll` while a result is awaited: that of the window is too long."""
 
 
 class ScanPlot(QFrame):
-    """Draws a `Scan` with a handle for f_d; `poll` processes results and says whether more are awaited."""
+    """Draws an `Objective` with a handle; `poll` processes results, and tells whether one is awaited."""
 
     friction_set = Signal(float)
     reset_requested = Signal()
@@ -32,8 +33,8 @@ class ScanPlot(QFrame):
     def __init__(self, theme: Theme, poll: Callable[[], bool]) -> None:
         super().__init__()
         self._theme = theme
-        self._look = poll
-        self._scan: Scan | None = None
+        self._poll = poll
+        self._scan: Objective | None = None
         self._stack = PlotStack(
             theme, ((gettext("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
         )
@@ -57,34 +58,33 @@ class ScanPlot(QFrame):
         self._lay_out()
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.setInterval(_LOOK_MS)
-        self._timer.timeout.connect(self._look_again)
+        self._timer.setInterval(_POLL_MS)
+        self._timer.timeout.connect(self._poll_again)
         self._handle.sigDragged.connect(self._tell)
         self._back.clicked.connect(self.reset_requested)
         theme.changed.connect(self._restyle)
         self._restyle()
 
-    def show_scan(self, scan: Scan | None) -> None:
+    def show_scan(self, scan: Objective | None) -> None:
         self._scan = scan
         self._timer.stop()
         self.setVisible(scan is not None)
         if scan is None:
             return
-        self._curve.setData(scan.friction, scan.residual_um)
+        residual_um = 1e6 * scan.residual_m
+        self._curve.setData(scan.friction, residual_um)
         self._interval.setRegion(scan.interval_95)
         self._interval.show()
         self._fitted.setValue(scan.fitted)
-        low, high = float(scan.residual_um.min()), float(scan.residual_um.max())
-        (plot,) = self._stack.plots
-        plot.set_value_range(low - 0.08 * (high - low), high + 0.08 * (high - low))
+        self._stack.plots[0].fit_values(residual_um)
         self._stack.set_time_range(float(scan.friction[0]), float(scan.friction[-1]))
         self._handle.setBounds((float(scan.friction[0]), float(scan.friction[-1])))
-        self.show_manual_fit(None)
+        self.show_manual_fit(None, "")
 
-    def show_manual_fit(self, hand: ManualFit | None) -> None:
+    def show_manual_fit(self, hand: ManualFit | None, text: str) -> None:
         if self._scan is None:
             return
-        self._words.setText(gettext(_WORDS) if hand is None else hand.description)
+        self._words.setText(text or gettext(_WORDS))
         self._back.setEnabled(hand is not None)
         if not self._handle.moving:
             self._handle.setValue(self._scan.fitted if hand is None else hand.friction)
@@ -105,8 +105,8 @@ class ScanPlot(QFrame):
         self.friction_set.emit(float(self._handle.value()))
         self._timer.start()
 
-    def _look_again(self) -> None:
-        if not self._look():
+    def _poll_again(self) -> None:
+        if not self._poll():
             self._timer.stop()
 
     def _restyle(self) -> None:

@@ -81,7 +81,7 @@ class IdentifyScreen(QWidget):
             self._show_run(state)
         elif state.manual_fit is not old.manual_fit:
             self._sides.curves.show_manual_fit(state.manual_fit)
-            self._scan.show_manual_fit(state.manual_fit)
+            self._scan.show_manual_fit(state.manual_fit, state.manual_fit_text)
         elif state.model_note != old.model_note:
             self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
         elif state.classical != old.classical:
@@ -100,7 +100,7 @@ class IdentifyScreen(QWidget):
             self._tabs.setTabToolTip(index, "" if state.motion is not None else gettext(_NO_MOTION))
         self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
-            self._sides.motions.show_motion(state.motion, state.curves.slips)
+            self._sides.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
         set_text_or_hide(self._no_scan, state.no_scan_reason)
         self._column.setWidget(ResultsPanel(state, self._presenter.select_model))

@@ -6,8 +6,6 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from analysis.formatting import with_unit
-from app.presenters import number_text
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.layouts import make_column
@@ -20,6 +18,8 @@ _TITLES = (
     (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
 )
 _MOST = 8
+_MOST_VALUES = 3
+"""More values do not fit beside a title."""
 _DASHES: tuple[tuple[float, ...], ...] = ((), (6.0, 3.0), (2.0, 3.0))
 """Curves are told apart by more than their colour."""
 
@@ -34,7 +34,7 @@ class RunsPreview(QWidget):
         self._stack = PlotStack(
             theme, [(gettext(words), token) for words, token in _TITLES], interactive=True
         )
-        self._stack.hovered.connect(self._read_out)
+        self._stack.hovered.connect(self._show_values)
         self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
         self._names = label(role=TextRole.LABEL, wrap=True)
         self._words = label(muted=True, wrap=True)
@@ -79,12 +79,7 @@ class RunsPreview(QWidget):
         if starts:
             self._stack.set_time_range(min(starts), max(ends))
         for row, plot in enumerate(self._stack.plots):
-            drawn = [line for trace in traces if (line := _lines(trace)[row]) is not None and len(line)]
-            with np.errstate(invalid="ignore"):
-                low = min((float(np.nanmin(line)) for line in drawn), default=-1.0)
-                high = max((float(np.nanmax(line)) for line in drawn), default=1.0)
-            margin = 0.06 * (high - low) or 1.0
-            plot.set_value_range(low - margin, high + margin)
+            plot.fit_values(*(line for trace in traces if (line := _lines(trace)[row]) is not None))
 
     def _restyle(self) -> None:
         self._stack.restyle()
@@ -109,21 +104,16 @@ class RunsPreview(QWidget):
             for number, trace in enumerate(traces)
         )
 
-    def _read_out(self, at_s: float) -> None:
+    def _show_values(self, at_s: float) -> None:
         for row in range(len(_TITLES)):
             values = [
                 value_at(trace.time_s, line, at_s)
                 for trace in self._overlay.traces
                 if (line := _lines(trace)[row]) is not None
             ]
-            self._stack.set_readout(row, "" if math.isnan(at_s) else _readout(at_s, values))
+            values = [value for value in values if math.isfinite(value)]
+            self._stack.show_values(row, at_s, values if len(values) <= _MOST_VALUES else (), "mm")
 
 
 def _lines(trace: Trace | None) -> tuple[np.ndarray | None, np.ndarray | None]:
     return (None, None) if trace is None else (trace.table, trace.relative)
-
-
-def _readout(at_s: float, values_mm: list[float]) -> str:
-    at = with_unit(number_text.format_fixed(at_s, 3), "s")
-    shown = [number_text.format_fixed(value, 3) for value in values_mm if math.isfinite(value)]
-    return f"{at}   {with_unit(' | '.join(shown), 'mm')}" if shown and len(shown) <= 3 else at

@@ -11,7 +11,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QBrush, QPainter, QPixmapCache, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
-from analysis.formatting import typeset
+from analysis.formatting import typeset, with_unit
+from app.presenters.number_text import format_fixed
 from app.qt.theme import TextRole, Theme, Tokens, colour, font
 from app.qt.widgets.layouts import make_column
 
@@ -55,6 +56,10 @@ class Plot:
 
     def set_value_range(self, low: float, high: float) -> None:
         self.view.setYRange(low, high, padding=0.0)
+
+    def fit_values(self, *lines: Floats) -> None:
+        """Show all values of lines, with a margin."""
+        self.set_value_range(*value_extent(*lines))
 
     def restyle(self, tokens: Tokens) -> None:
         for axis in (self.left, self.bottom):
@@ -136,6 +141,14 @@ class PlotStack(QWidget):
     def set_readout(self, row: int, text: str) -> None:
         _write(self.plots[row].readout, text, self._theme.tokens.text)
 
+    def show_values(
+        self, row: int, at_s: float, values: Sequence[float], unit: str, decimals: int = 3
+    ) -> None:
+        """Show a time (nothing if NaN) and the values of a plot there (a dash if NaN) as its readout."""
+        texts = [format_fixed(value, decimals) if math.isfinite(value) else "–" for value in values]
+        at = "" if math.isnan(at_s) else with_unit(format_fixed(at_s, 3), "s")
+        self.set_readout(row, f"{at}   {with_unit(' | '.join(texts), unit)}" if at and texts else at)
+
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
         self.resized.emit(max(64, self.width() - AXIS_WIDTH - 20))
@@ -180,6 +193,15 @@ def value_at(time_s: Floats, values: Floats, at_s: float) -> float:
     if not len(time_s) or not time_s[0] <= at_s <= time_s[-1]:
         return math.nan
     return float(values[min(int(np.searchsorted(time_s, at_s)), len(values) - 1)])
+
+
+def value_extent(*lines: Floats) -> tuple[float, float]:
+    """Lowest and highest value of lines, with a margin; -1 and 1 without any."""
+    values = [line[np.isfinite(line)] for line in lines]
+    low = min((float(line.min()) for line in values if len(line)), default=-1.0)
+    high = max((float(line.max()) for line in values if len(line)), default=1.0)
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
 
 
 def shaded_region(plot: Plot, orientation: str = "vertical") -> Any:

@@ -5,27 +5,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stage import FakeWorker, analysed
+from stage import Call, FakeWorker, analysed
 
+from analysis.classical_estimates import ClassicalEstimates
 from analysis.identification import Events
 from analysis.quantities import ResultWarning
 from app.presenters.analysed_run import AnalysisTask, Channel, Objective
 from app.presenters.base import Progress, Tone
-from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import (
-    ClassicalFigures,
-    Cursor,
-    DecimatedLine,
-    EstimateClassical,
-    ManualSimulation,
-    SimulateFriction,
-)
+from app.presenters.identify.result_tables import classical_rows
+from app.presenters.identify.state import Cursor, ManualFit, PlotLine, Span
 from messages.message import message
 
 RUN = str(analysed().path)
-LINE = DecimatedLine(np.array([5.0, 6.0]), np.array([0.012, 0.010]))
-CLASSICAL = ClassicalFigures(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002, 0.14), 0.101)
+LINE = PlotLine(np.array([0.0, 1.0]), np.array([12.0, 10.0]))
+FIT = ManualFit(0.101, (LINE,), (LINE,))
+CLASSICAL = ClassicalEstimates(0.3201, 0.0391, 0.0004, 20, np.empty(0), (0.09, 0.1002, 0.14), 0.101)
 
 
 class Stage:
@@ -33,18 +28,14 @@ class Stage:
 
     def __init__(self) -> None:
         self.worker = FakeWorker()
-        self.listened = 0
-        self.presenter = IdentifyPresenter(self.worker, self._listen)
+        self.presenter = IdentifyPresenter(self.worker)  # type: ignore[arg-type]
         self.presenter.on_opening(RUN)
-
-    def _listen(self) -> None:
-        self.listened += 1
 
     def show(self, **changes: Any) -> None:
         self.presenter.on_analysed(analysed(**changes))
 
-    def asked(self, kind: type) -> list[Any]:
-        return [argument for _, argument in self.worker.submitted if isinstance(argument, kind)]
+    def asked(self, name: str) -> list[Call]:
+        return [call for call in self.worker.calls if call.name == name]
 
 
 def with_scan() -> dict[str, Any]:
@@ -106,31 +97,29 @@ def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:
 def test_a_click_shows_another_law_beside_the_same_rows_and_back(stage: Stage) -> None:
     stage.show(**with_scan())
     stage.presenter.select_model("coulomb")
-    (asked,) = stage.asked(AnalysisTask)
-    assert (asked, stage.presenter.state.progress) == (
-        AnalysisTask(RUN, "coulomb"),
-        Progress("Fitting coulomb"),
-    )
+    (asked,) = stage.asked("run_analysis")
+    assert asked.arguments == (AnalysisTask(RUN, "coulomb"),)
+    assert stage.presenter.state.progress == Progress("Fitting coulomb")
     model = analysed().model
     assert model is not None
     plain = replace(model, name="coulomb", adequate=False, tried=model.tried[:1])
-    stage.presenter.on_event(TaskDone(asked, analysed(model=plain, **with_scan())))
+    asked.done(analysed(model=plain, **with_scan()))
     state = stage.presenter.state
     assert [(row.name, row.is_shown) for row in state.models] == [("coulomb+tilt", False), ("coulomb", True)]
     assert state.model_note.text == "Shown: coulomb. The likeliest law is coulomb+tilt."
     assert state.result is not None
     assert state.result.model_status.tone is Tone.BAD
     stage.presenter.set_friction(0.1)
-    assert stage.asked(SimulateFriction)[-1].model == "coulomb"
+    assert stage.asked("simulate_friction")[-1].arguments[0].model == "coulomb"
     stage.presenter.select_model("coulomb+tilt")
     assert stage.presenter.state.model_note.text == ""
-    assert len(stage.asked(AnalysisTask)) == 1
+    assert len(stage.asked("run_analysis")) == 1
 
 
 def test_a_law_that_cannot_be_fitted_leaves_the_screen_and_says_why(stage: Stage) -> None:
     stage.show()
     stage.presenter.select_model("coulomb")
-    stage.presenter.on_event(TaskFailed(AnalysisTask(RUN, "coulomb"), "it cannot be. Choose another"))
+    stage.asked("run_analysis")[0].fail("it cannot be. Choose another")
     state = stage.presenter.state
     assert state.curves is not None
     assert (state.progress, state.failure) == (None, "")
@@ -141,21 +130,21 @@ def test_what_fails_as_two_masses_is_offered_as_one(stage: Stage) -> None:
     stage.presenter.on_failed(RUN, "no second mass")
     assert stage.presenter.state.alternative_kind == "one-mass"
     stage.presenter.analyse_as_alternative()
-    (asked,) = stage.asked(AnalysisTask)
-    assert asked == AnalysisTask(RUN, kind="one-mass")
-    stage.presenter.on_event(TaskDone(asked, analysed(kind="one-mass", relative=None)))
+    (asked,) = stage.asked("run_analysis")
+    assert asked.arguments == (AnalysisTask(RUN, kind="one-mass"),)
+    asked.done(analysed(kind="one-mass", relative=None))
     state = stage.presenter.state
     assert (state.alternative_kind, state.models, state.failure) == ("two-mass", (), "")
     assert state.result is not None
     assert state.result.headline.symbol == "T"
     assert "One mass swings freely" in state.no_scan_reason
-    assert stage.asked(EstimateClassical) == []
+    assert stage.asked("estimate_classical") == []
 
 
 def test_classical_figures_stand_beside_the_fitted_ones(stage: Stage) -> None:
     stage.show(**with_scan())
-    (asked,) = stage.asked(EstimateClassical)
-    stage.presenter.on_event(TaskDone(asked, CLASSICAL))
+    (asked,) = stage.asked("estimate_classical")
+    asked.done(classical_rows(analysed().results, CLASSICAL))
     rows = stage.presenter.state.classical
     assert [(row.name, row.classical, row.fitted) for row in rows] == [
         ("period", "320.100\u202fms", "319.942\u202fms"),
@@ -181,16 +170,14 @@ def test_the_hand_is_simulated_as_finely_as_it_is_drawn_and_anew_when_zoomed(sta
     stage.show(**with_scan())
     stage.presenter.set_visible_span(-1.0, 2.0, 400)
     stage.presenter.set_friction(0.101)
-    (asked,) = stage.asked(SimulateFriction)
-    assert (asked.span.start_s, asked.span.end_s, asked.span.pixels) == (4.0, 7.0, 400)
-    stage.presenter.on_event(TaskDone(asked, ManualSimulation(0.101, (LINE,), (LINE,))))
-    hand = stage.presenter.state.manual_fit
-    assert hand is not None
-    assert hand.description.startswith("By hand: 0.10100, +0.70\u202f% from the fit; residual 31")
-    np.testing.assert_allclose(hand.simulations_mm[0].time_s, [0.0, 1.0])
-    np.testing.assert_allclose(hand.residuals_um[0].value, [12000.0, 10000.0])
+    (asked,) = stage.asked("simulate_friction")
+    assert asked.arguments == (AnalysisTask(RUN), 0.101, Span(-1.0, 2.0, 400, 5.0))
+    asked.done(FIT)
+    assert stage.presenter.state.manual_fit is FIT
+    text = stage.presenter.state.manual_fit_text
+    assert text.startswith("By hand: 0.10100, +0.70\u202f% from the fit; residual 31")
     stage.presenter.set_visible_span(0.0, 1.0, 400)
-    assert [a.span.start_s for a in stage.asked(SimulateFriction)] == [4.0, 5.0]
+    assert [call.arguments[2].start_s for call in stage.asked("simulate_friction")] == [-1.0, 0.0]
 
 
 def test_answers_are_looked_for_as_long_as_one_is_awaited(stage: Stage) -> None:
@@ -198,17 +185,16 @@ def test_answers_are_looked_for_as_long_as_one_is_awaited(stage: Stage) -> None:
     assert stage.presenter.poll() is False
     stage.presenter.set_friction(0.101)
     assert stage.presenter.poll() is True
-    stage.presenter.on_event(TaskFailed(stage.asked(SimulateFriction)[0], "no"))
+    stage.asked("simulate_friction")[0].fail("no")
     assert stage.presenter.poll() is False
-    assert stage.listened == 3
 
 
 def test_an_answer_for_another_run_is_not_shown(stage: Stage) -> None:
     stage.show(**with_scan())
     stage.presenter.set_friction(0.101)
-    (asked,) = stage.asked(SimulateFriction)
+    (asked,) = stage.asked("simulate_friction")
     stage.presenter.on_opening("/recordings/b.h5")
-    stage.presenter.on_event(TaskDone(asked, ManualSimulation(0.101, (LINE,), (LINE,))))
+    asked.done(FIT)
     assert stage.presenter.state.manual_fit is None
 
 

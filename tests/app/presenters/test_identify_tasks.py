@@ -7,7 +7,7 @@ from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysed_run import AnalysisTask
 from app.presenters.analysis_task import analyse_run, run_analysis
 from app.presenters.base import Progress
-from app.presenters.identify.state import EstimateClassical, SimulateFriction, Span
+from app.presenters.identify.state import Span
 from app.presenters.identify.tasks import estimate_classical, simulate_friction
 from app.runs.simulated import write_simulated_run
 
@@ -36,26 +36,27 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_a_run_is_simulated_by_hand_where_and_as_finely_as_it_is_drawn(path: str) -> None:
     run = analyse_run(path, ignore)
     friction = 0.104
-    span = Span(HELD_S + 0.5, HELD_S + 4.5, 300)
-    hand = simulate_friction(SimulateFriction(path, friction, span), ignore)
-    table, relative = hand.simulations
+    span = Span(0.5, 4.5, 300, HELD_S)
+    hand = simulate_friction(AnalysisTask(path), friction, span)
+    table, relative = hand.simulations_mm
     assert len(table.time_s) <= 2.5 * span.pixels
     assert (table.time_s[0], table.time_s[-1]) == pytest.approx((span.start_s, span.end_s), abs=0.02)
     other = TwoMassParameters(
         **{name: getattr(PARAMETERS, name) for name in PARAMETERS.__dataclass_fields__}
         | {"friction_dynamic": friction}
     )
-    truth = other.simulate(DURATION_S).sample(table.time_s - HELD_S)
-    np.testing.assert_allclose(table.value_m, truth.table_displacement_m, atol=2e-6)
-    np.testing.assert_allclose(relative.value_m, truth.relative_displacement_m, atol=2e-5)
-    residual = hand.residuals[1]
+    truth = other.simulate(DURATION_S).sample(table.time_s)
+    np.testing.assert_allclose(1e-3 * table.values, truth.table_displacement_m, atol=2e-6)
+    np.testing.assert_allclose(1e-3 * relative.values, truth.relative_displacement_m, atol=2e-5)
+    residual = hand.residuals_um[1]
     assert len(residual.time_s) <= span.pixels
     assert run.relative is not None
-    rows = (run.time_s >= span.start_s) & (run.time_s <= span.end_s)
-    full = other.simulate(DURATION_S).sample(run.time_s[rows] - HELD_S).relative_displacement_m
+    time_s = run.time_s - HELD_S
+    rows = (time_s >= span.start_s) & (time_s <= span.end_s)
+    full = other.simulate(DURATION_S).sample(time_s[rows]).relative_displacement_m
     left_m = run.relative.record_m[rows] - full
-    assert residual.value_m.max() == pytest.approx(left_m.max(), abs=2e-5)
-    assert residual.value_m.min() == pytest.approx(left_m.min(), abs=2e-5)
+    assert 1e-6 * residual.values.max() == pytest.approx(left_m.max(), abs=2e-5)
+    assert 1e-6 * residual.values.min() == pytest.approx(left_m.min(), abs=2e-5)
 
 
 def test_slips_are_those_of_the_motion(path: str) -> None:
@@ -86,11 +87,11 @@ def test_another_law_and_another_kind_are_analysed_and_kept(path: str) -> None:
 
 def test_classical_figures_agree_with_the_truth(path: str) -> None:
     analyse_run(path, ignore)
-    found = estimate_classical(EstimateClassical(path), ignore)
-    assert found.period_s == pytest.approx(0.32, rel=1e-3)
-    assert found.log_decrement == pytest.approx(0.12 * 0.32, rel=0.01)
-    assert found.friction_of_paper == pytest.approx(0.1, abs=0.002)
-    assert min(abs(value - 0.1) for value in found.frictions_of_residual) < 1e-3
+    rows = {row.name: row.classical for row in estimate_classical(AnalysisTask(path))}
+    assert float(rows["period"].removesuffix("\u202fms")) == pytest.approx(320.0, rel=1e-3)
+    assert float(rows["log decrement"]) == pytest.approx(0.12 * 0.32, rel=0.01)
+    assert float(rows["by the paper's method"]) == pytest.approx(0.1, abs=0.002)
+    assert "0.1000" in rows["from u<sub>s</sub> alone"]
 
 
 def run_rows(time_s: np.ndarray, start_s: float, end_s: float) -> np.ndarray:

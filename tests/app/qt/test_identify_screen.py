@@ -6,23 +6,14 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import FakeWorker, analysed
+from stage import Call, FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import BudgetLine, BudgetSource
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
-from app.presenters.events import TaskDone
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import (
-    ClassicalFigures,
-    Cursor,
-    DecimatedLine,
-    EstimateClassical,
-    ManualSimulation,
-    PlotTab,
-    SimulateFriction,
-)
+from app.presenters.identify.state import ClassicalRow, Cursor, ManualFit, PlotLine, PlotTab
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack
@@ -37,7 +28,7 @@ class Stage:
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.asked = 0
         self.worker = FakeWorker()
-        self.presenter = IdentifyPresenter(self.worker, lambda: None)
+        self.presenter = IdentifyPresenter(self.worker)  # type: ignore[arg-type]
         self.screen = IdentifyScreen(theme, self.presenter, self._ask)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
@@ -46,9 +37,13 @@ class Stage:
         qtbot.waitExposed(self.screen)
         self.curves = self.screen._sides.curves
 
+    def calls(self, name: str) -> list[Call]:
+        return [call for call in self.worker.calls if call.name == name]
+
     @property
-    def asked_for(self) -> list[SimulateFriction]:
-        return [asked for _, asked in self.worker.submitted if isinstance(asked, SimulateFriction)]
+    def frictions(self) -> list[float]:
+        """Simulations that were asked for."""
+        return [call.arguments[1] for call in self.calls("simulate_friction")]
 
     def _ask(self) -> None:
         self.asked += 1
@@ -142,7 +137,7 @@ def test_a_run_without_fit_second_gauge_or_release_is_drawn_too(stage: Stage) ->
 def test_the_pointer_reads_record_and_simulation(stage: Stage) -> None:
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(analysed())
-    stage.curves._read_out(1.0)
+    stage.curves._show_values(1.0)
     texts = [plot.readout.text for plot in stage.curves._stack.plots]
     assert "1.000\u202fs" in texts[0]
     assert texts[0].count("|") == 1
@@ -168,10 +163,9 @@ def with_scan() -> AnalysedRun:
 
 def answer(stage: Stage) -> None:
     """What the worker would say to the latest wish."""
-    asked = stage.asked_for[-1]
-    time_s = np.array([5.0, 6.0, 7.0])
-    line = DecimatedLine(time_s, np.full(3, asked.friction))
-    stage.presenter.on_event(TaskDone(asked, ManualSimulation(asked.friction, (line, line), (line, line))))
+    call, friction = stage.calls("simulate_friction")[-1], stage.frictions[-1]
+    line = PlotLine(np.array([0.0, 1.0, 2.0]), np.full(3, 1e3 * friction))
+    call.done(ManualFit(friction, (line, line), (line, line)))
 
 
 def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(stage: Stage) -> None:
@@ -179,9 +173,9 @@ def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(sta
     stage.presenter.on_analysed(with_scan())
     for friction in (0.1010, 0.1012, 0.1014, 0.2):
         stage.screen._scan.friction_set.emit(friction)
-    assert [asked.friction for asked in stage.asked_for] == [0.1010]
+    assert stage.frictions == [0.1010]
     answer(stage)
-    assert [asked.friction for asked in stage.asked_for] == [0.1010, pytest.approx(0.104)]
+    assert stage.frictions == [0.1010, pytest.approx(0.104)]
     answer(stage)
     assert "By hand: 0.10400" in stage.words()
     time_s, simulated_mm = stage.curves._hand_simulations[0].getData()
@@ -211,11 +205,11 @@ def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     assert "The other tabs" not in stage.words()
     stage.screen._tabs.setCurrentIndex(1)
     assert stage.presenter.state.tab is PlotTab.VELOCITY
-    assert "velocities" in stage.screen._sides.motions.velocities._stack.plots[0].title.text
+    assert "velocities" in stage.screen._sides.motions[PlotTab.VELOCITY]._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(3)
-    assert "relative acceleration" in stage.screen._sides.motions.relative._stack.plots[0].title.text
+    assert "relative acceleration" in stage.screen._sides.motions[PlotTab.RELATIVE]._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(4)
-    assert stage.screen._sides.motions.phase.isVisible()
+    assert stage.screen._sides.motions[PlotTab.PHASE].isVisible()
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
@@ -269,10 +263,8 @@ def test_classical_figures_come_in_beside_the_results(stage: Stage, qtbot: QtBot
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(with_scan())
     assert "Classical figures" not in stage.words()
-    asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, EstimateClassical))
-    stage.presenter.on_event(
-        TaskDone(asked, ClassicalFigures(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101))
-    )
+    (call,) = stage.calls("estimate_classical")
+    call.done((ClassicalRow("f<sub>d</sub>", "by the paper's method", "0.101", "0.100"),))
     qtbot.waitUntil(lambda: "Classical figures" in stage.words())
     assert "by the paper's method" in stage.words()
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
@@ -309,13 +301,13 @@ def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
     at_s = stage.presenter.state.cursors
     assert at_s is not None
     motions = stage.screen._sides.motions
-    pages = (motions.velocities, motions.accelerations, motions.relative)
+    pages = (motions[PlotTab.VELOCITY], motions[PlotTab.ACCELERATION], motions[PlotTab.RELATIVE])
     for index, (page, unit) in enumerate(zip(pages, ("mm/s", "m/s²", "m/s²"), strict=True), start=1):
         stage.screen._tabs.setCurrentIndex(index)
         for line in page.cursors._lines[Cursor.B]:
             assert (line.isVisible(), line.value()) == (True, pytest.approx(at_s.b_s))
         assert f"\u202f{unit}" in stage.words()
-    line = motions.relative.cursors._lines[Cursor.A][1]
+    line = motions[PlotTab.RELATIVE].cursors._lines[Cursor.A][1]
     line.setValue(3.0)
     line.sigDragged.emit(line)
     qtbot.keyClick(stage.screen._sides, Qt.Key.Key_Left)
@@ -335,7 +327,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
     assert cursors is not None
-    points = stage.screen._sides.motions.phase.cursors._points[Cursor.B]
+    points = stage.screen._sides.motions[PlotTab.PHASE].cursors._points[Cursor.B]
     placed = [[float(values[0]) for values in point._mark.getData()] for point in points]
     assert [*placed[0], *placed[1]] == pytest.approx(list(cursors.values[1]))
     assert all(point._letter.isVisible() for point in points)
@@ -384,7 +376,7 @@ def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBo
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
-    stage.screen._sides.motions.velocities._stack.set_time_range(6.0, 8.0)
+    stage.screen._sides.motions[PlotTab.VELOCITY]._stack.set_time_range(6.0, 8.0)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
     assert cursors is not None

@@ -156,7 +156,7 @@ def test_a_splitter_that_was_not_shown_keeps_what_it_had(window: QMainWindow) ->
 
 def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, theme: Theme) -> None:
     def shown(place: WindowLayout) -> tuple[WindowLayout, QSplitter]:
-        presenter = IdentifyPresenter(FakeWorker(), lambda: None)
+        presenter = IdentifyPresenter(FakeWorker())
         screen = IdentifyScreen(theme, presenter, lambda: None)
         presenter.attach(screen)
         window.setCentralWidget(screen)
