@@ -34,9 +34,6 @@ class TaskProgress:
     progress: Progress
 
 
-WorkerEvent = TaskDone[Any] | TaskFailed | TaskProgress
-
-
 @dataclass(frozen=True, slots=True)
 class SimulationStarted:
     """A simulated stand has started and is being connected."""

@@ -16,7 +16,7 @@ from typing import Any, TypeVar, TypeVarTuple, overload
 from app.log import start_log
 from app.presenters.base import ReportProgress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
-from app.presenters.events import TaskDone, TaskFailed, TaskFailure, TaskProgress, WorkerEvent
+from app.presenters.events import TaskFailure
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import language, use_language
 from messages.message import message
@@ -227,31 +227,6 @@ class Worker:
         for task in later:
             self._send(task)
         return partial(failed.failed, TaskFailure(_PROCESS_DIED))
-
-
-class EventWorker:
-    """Worker that returns events with the argument of their task."""
-
-    def __init__(self, worker: Worker) -> None:
-        self._worker = worker
-        self._events: list[WorkerEvent] = []
-        self.cancel, self.close = worker.cancel, worker.close
-
-    def submit(self, task: Callable[..., Any], argument: Any) -> None:
-        add = self._events.append
-        self._worker.submit(
-            task,
-            argument,
-            done=lambda answer: add(TaskDone(argument, answer)),
-            failed=lambda failure: add(TaskFailed(argument, failure.message, failure.is_cancelled)),
-            progress=lambda progress: add(TaskProgress(argument, progress)),
-        )
-
-    def poll(self) -> list[WorkerEvent]:
-        self._worker.poll()
-        events = self._events.copy()
-        self._events.clear()
-        return events
 
 
 class _TaskProcess:

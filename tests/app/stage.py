@@ -324,13 +324,12 @@ class Call:
 
 
 class FakeWorker:
-    """Keeps calls for a test to answer; for an `EventWorker`, a test puts events into `news`."""
+    """Keeps calls for a test to answer."""
 
     is_busy = False
 
     def __init__(self) -> None:
         self.calls: list[Call] = []
-        self.news: list[Any] = []
         self.cancelled = 0
         self.closed = False
 
@@ -342,9 +341,8 @@ class FakeWorker:
     def submit(self, function: Callable[..., Any], *arguments: Any, **callbacks: Any) -> None:
         self.calls.append(Call(function, arguments, **callbacks))
 
-    def poll(self) -> list[Any]:
-        news, self.news = self.news, []
-        return news
+    def poll(self) -> None:
+        """Do nothing: tests call the callbacks."""
 
     def cancel(self) -> None:
         self.cancelled += 1
