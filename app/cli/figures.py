@@ -4,11 +4,9 @@ from pathlib import Path
 
 import msgspec
 
-from analysis.campaign.campaign import Campaign
 from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.option_values import executor_options
 from app.cli.result_options import FiguresOptions
 from app.reports.figures.figure_files import (
     NUMBERS,
@@ -21,21 +19,20 @@ from app.runs.campaign.collect import CollectedRuns
 
 
 def figures(options: FiguresOptions) -> None:
-    numbers, executor = _numbers(options.figure), executor_options(options.jobs)
+    numbers = _numbers(options.figure)
     folder = _folder(options.output, options.format_name, options.force)
     folder.check()
-    gathered, campaign = load_campaign(options.paths, executor)
-    chosen = _chosen(options.paths, options.series or [], gathered, campaign)
-    written, notes = _write(folder, numbers, chosen, gathered, campaign) if gathered.runs else ([], [])
+    runs = load_campaign(options.paths, options.jobs)
+    written, notes = _write(folder, numbers, options, runs) if runs.runs else ([], [])
     if options.as_json:
-        failures = msgspec.to_builtins(gathered.failures)
+        failures = msgspec.to_builtins(runs.failures)
         out.print_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})
     else:
         for one in written:
             out.print_line(f"{one.file}  {one.caption}")
     for note in notes:
         out.print_status(f"note: {note}")
-    exit_with_failures((failure.run, str(failure.reason)) for failure in gathered.failures)
+    exit_with_failures(runs)
 
 
 def _numbers(wanted: list[str] | None) -> list[str]:
@@ -52,22 +49,14 @@ def _folder(output: Path, format_name: str, force: bool) -> FigureFolder:
     return msgspec.convert({"path": str(target), "format": format_name, "replace": force}, FigureFolder)
 
 
-def _chosen(paths: list[Path], series: list[str], gathered: CollectedRuns, campaign: Campaign) -> list[Path]:
-    """Runs given by name, and those that stand for folders."""
-    named = {str(path.expanduser().absolute()) for path in paths if not path.is_dir()}
-    chosen = [Path(run.name) for run in gathered.runs if run.name in named]
-    if series or any(path.is_dir() for path in paths):
-        chosen += representative_runs(campaign, gathered.runs, series) if campaign.rows else []
-    return list(dict.fromkeys(chosen))
-
-
 def _write(
-    folder: FigureFolder,
-    numbers: list[str],
-    chosen: list[Path],
-    gathered: CollectedRuns,
-    campaign: Campaign,
+    folder: FigureFolder, numbers: list[str], options: FiguresOptions, runs: CollectedRuns
 ) -> tuple[list[FigureFile], list[str]]:
-    """Write everything that is wanted; returns what was written, and what there was nothing for."""
+    """Draw runs given by name, and representative ones of folders; return figures and notes."""
+    campaign, names = runs.campaign(), {run.name for run in runs.runs}
+    chosen = [path for path in map(Path.absolute, map(Path.expanduser, options.paths)) if str(path) in names]
+    if campaign.rows and (options.series or any(path.is_dir() for path in options.paths)):
+        chosen += representative_runs(campaign, runs.runs, options.series or [])
+    chosen = list(dict.fromkeys(chosen))
     with out.progress_bar("drawing", total=1.0) as update:
-        return write_figures(folder, numbers, chosen, campaign, gathered.stands.values(), update)
+        return write_figures(folder, numbers, chosen, campaign, runs.stands.values(), update)

@@ -10,29 +10,34 @@ import msgspec
 from analysis.audit import PublishedRow, audit
 from analysis.campaign.campaign import Campaign, compare_with_published
 from app.cli import output as out
-from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
+from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.option_values import executor_options
 from app.cli.result_options import TableOptions
 from app.reports.table.content import PublishedRowComparison, TableContent
-from app.reports.table.files import as_text, write_text, write_workbook
+from app.reports.table.files import as_text, write_table
 from app.reports.table.text import note_sections
-from app.runs.campaign.collect import CollectedRuns
 from config.files import load_stand, published_table
 
-_WIDTH_MIN, _ENDLESS = 40, 1_000_000
+_WIDTH_MIN, _UNLIMITED = 40, 1_000_000
+"""Columns of a narrow terminal, and of a pipe."""
 
 
 def table(options: TableOptions) -> None:
     name = _format(options.format_name, options.output, as_json=options.as_json)
     target = out.output_file(options.output, options.force) if options.output else None
-    executor, excluded = executor_options(options.jobs), excluded_runs(options.paths, options.exclude or [])
-    gathered, campaign = load_campaign(options.paths, executor, save=options.save, excluded=excluded)
-    content = table_content(gathered, campaign, published=options.published)
-    _write_table(content, name, target, with_repeats=options.repeats, replace=options.force)
-    if target or name in ("csv", "latex"):
-        _print_remarks(content)
-    exit_with_failures(content.failures)
+    runs = load_campaign(options.paths, options.jobs, exclude=options.exclude, save=options.save)
+    content = TableContent.of_runs(runs, _published(runs.campaign()) if options.published else None)
+    if target is not None:
+        write_table(content, target, name, with_repeats=options.repeats, replace=options.force)
+        out.print_line(str(target))
+    else:
+        width = max(shutil.get_terminal_size((_UNLIMITED, 0)).columns, _WIDTH_MIN)
+        sys.stdout.write(as_text(content, name, width, with_repeats=options.repeats))
+    if target or name in ("csv", "latex"):  # which do not show the notes; failures are printed at the end
+        for title, sentences in note_sections(replace(content, failures=())):
+            for sentence in sentences:
+                out.print_status(f"{title}: {sentence}")
+    exit_with_failures(runs)
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:
@@ -44,18 +49,8 @@ def _format(name: str, output: Path | None, *, as_json: bool) -> str:
     return name
 
 
-def table_content(gathered: CollectedRuns, campaign: Campaign, *, published: bool = False) -> TableContent:
-    """Put together all that goes into a table, or into a report; beside the paper's where `published`."""
-    return TableContent(
-        campaign,
-        gathered.warnings,
-        tuple((failure.run, str(failure.reason)) for failure in gathered.failures),
-        _published(campaign) if published else None,
-    )
-
-
 def _published(campaign: Campaign) -> dict[str, PublishedRowComparison]:
-    """The paper's rows of the series that were found, with what the audit says of them."""
+    """The paper's rows of the series that were found, with the flags of the audit."""
     stand = load_stand()
     printed = msgspec.convert(published_table(), dict[str, PublishedRow], from_attributes=True)
     beside = compare_with_published(campaign.rows, printed)
@@ -67,31 +62,3 @@ def _published(campaign: Campaign) -> dict[str, PublishedRowComparison]:
     )
     flags = {row.series: tuple(row.flags) for row in audited}
     return {label: PublishedRowComparison(figures, flags[label]) for label, figures in beside.items()}
-
-
-def _write_table(
-    content: TableContent, name: str, target: Path | None, *, with_repeats: bool, replace: bool
-) -> None:
-    if name == "xlsx" and target is not None:
-        write_workbook(content, target, replace=replace)
-    else:
-        text = as_text(content, name, _width(target), with_repeats=with_repeats)
-        if target is None:
-            sys.stdout.write(text)
-            return
-        write_text(text, target, replace=replace)
-    out.print_line(str(target))
-
-
-def _width(target: Path | None) -> int:
-    """Columns of the terminal, or of COLUMNS; a file or a pipe has no end."""
-    if target is not None:
-        return _ENDLESS
-    return max(shutil.get_terminal_size((_ENDLESS, 0)).columns, _WIDTH_MIN)
-
-
-def _print_remarks(content: TableContent) -> None:
-    """Say on stderr what the format itself does not show; runs without a result are told at the end."""
-    for title, sentences in note_sections(replace(content, failures=())):
-        for sentence in sentences:
-            out.print_status(f"{title}: {sentence}")

@@ -12,17 +12,7 @@ from app.runs.disk import free_bytes
 from app.runs.errors import RunError
 from app.runs.journal import unfinished_journals
 from app.runs.paths import journal_fallback_folders, recordings_directory
-from config.files import (
-    checks_path,
-    config_directory,
-    is_checkout,
-    load_checks,
-    load_gauges,
-    load_settings,
-    load_stand,
-    settings_file,
-    settings_path,
-)
+from config import files
 from config.schema import ConfigError, Gauge, GaugeCheck, Settings
 
 _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
@@ -32,9 +22,9 @@ def check_folders() -> Iterator[Finding]:
     """Look at settings, recordings and journals."""
     yield from _settings()
     try:
-        settings = load_settings()
+        settings = files.load_settings()
     except ConfigError as error:
-        yield fail("settings.toml", str(error), f"Correct it, or put {settings_path()} aside")
+        yield fail("settings.toml", str(error), f"Correct it, or put {files.settings_path()} aside")
         settings = Settings()
     recordings = recordings_directory(settings)
     yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
@@ -44,19 +34,19 @@ def check_folders() -> Iterator[Finding]:
 def _why(variable: str, chosen_in: str = "") -> str:
     if os.environ.get(variable):
         return variable
-    return chosen_in or ("checkout" if is_checkout() else "user's")
+    return chosen_in or ("checkout" if files.is_checkout() else "user's")
 
 
 def _settings() -> Iterator[Finding]:
-    yield ok("settings", f"{config_directory()} ({_why('SLIPSTAND_CONFIG')})")
-    for name, load in (("stand.toml", load_stand), ("gauges.toml", load_gauges)):
-        path = settings_file(name)
+    yield ok("settings", f"{files.config_directory()} ({_why('SLIPSTAND_CONFIG')})")
+    for name, load in (("stand.toml", files.load_stand), ("gauges.toml", files.load_gauges)):
+        path = files.settings_file(name)
         try:
             load()
         except ConfigError as error:
             yield fail(name, str(error), f"Correct {path}, or put it aside to take the shipped one")
         else:
-            yield ok(name, f"{path}{'' if path.parent == config_directory() else ' (shipped)'}")
+            yield ok(name, f"{path}{'' if path.parent == files.config_directory() else ' (shipped)'}")
 
 
 def _recordings(folder: Path, chosen_in: str) -> Iterator[Finding]:
@@ -109,16 +99,16 @@ _REMEDY = "Calibrate the gauge: slipstand calibrate"
 def check_gauges() -> Iterator[Finding]:
     """Look at calibrations and checks of both gauges; unreadable settings are told with the folders."""
     try:
-        gauges = load_gauges()
+        gauges = files.load_gauges()
     except ConfigError:
         return
     today = datetime.datetime.now().astimezone().date()
     for name, said in _GAUGES.items():
         yield check_calibration(said, getattr(gauges, name), today)
     try:
-        last = {check.gauge: check for check in load_checks().latest_checks(gauges)}
+        last = {check.gauge: check for check in files.load_checks().latest_checks(gauges)}
     except ConfigError as error:
-        yield fail("gauge checks", str(error), f"Correct {checks_path()}, or put it aside")
+        yield fail("gauge checks", str(error), f"Correct {files.checks_path()}, or put it aside")
         return
     for name, said in _GAUGES.items():
         yield check_last_gauge_check(said, last.get(name))

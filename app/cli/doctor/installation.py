@@ -16,17 +16,8 @@ from app.runs.errors import RunError
 from app.version import __version__
 from drivers.host_time import host_ns
 
-_NEEDED = {
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "numba": "numba",
-    "h5py": "h5py",
-    "pyserial": "serial",
-    "msgspec": "msgspec",
-    "tomlkit": "tomlkit",
-    "matplotlib": "matplotlib",
-    "rich": "rich",
-}
+_NEEDED = {name: name for name in ("numpy", "scipy", "numba", "h5py", "msgspec", "tomlkit", "matplotlib")}
+_NEEDED |= {"rich": "rich", "pyserial": "serial"}
 _OF_WINDOW = {"PySide6-Essentials": "PySide6", "pyqtgraph": "pyqtgraph"}
 _AGAIN = "Install again: pip install --force-reinstall slipstand"
 
@@ -36,7 +27,7 @@ def check_installation() -> Iterator[Finding]:
     yield ok("slipstand", f"{__version__}, Python {platform.python_version()} on {platform.platform()}")
     yield _libraries("libraries", _NEEDED, fail)
     yield _libraries("window", _OF_WINDOW, warn)
-    yield _examiner()
+    yield _validator()
     yield check_compiled_code(Path(analysis.__file__).parent)
 
 
@@ -54,7 +45,7 @@ def _version(name: str) -> str:
         return "of unknown version"
 
 
-def _examiner() -> Finding:
+def _validator() -> Finding:
     try:
         from app.runs.validator import check_validator  # needs h5py, which may be what is missing
 
@@ -66,19 +57,15 @@ def _examiner() -> Finding:
 
 def check_compiled_code(package: Path) -> Finding:
     """Where numba keeps what it compiled: in a given folder, beside the code, or in the user's cache."""
-    subject = "compiled code"
+    subject, given = "compiled code", os.environ.get("NUMBA_CACHE_DIR")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return warn(
-            subject, "NUMBA_DISABLE_JIT is set: analyses take minutes", "Remove it from the environment"
-        )
-    given = os.environ.get("NUMBA_CACHE_DIR")
+        fault = "NUMBA_DISABLE_JIT is set: analyses take minutes"
+        return warn(subject, fault, "Remove it from the environment")
+    if given and _is_writable(Path(given)):
+        return ok(subject, f"kept in {given} (NUMBA_CACHE_DIR)")
     if given:
-        place = Path(given)
-        if _is_writable(place):
-            return ok(subject, f"kept in {place} (NUMBA_CACHE_DIR)")
-        return warn(
-            subject, f"NUMBA_CACHE_DIR {place} cannot be written", "Choose another folder, or unset it"
-        )
+        fault = f"NUMBA_CACHE_DIR {given} cannot be written"
+        return warn(subject, fault, "Choose another folder, or unset it")
     if _is_writable(package / "__pycache__"):
         return ok(subject, f"kept beside the code in {package.parent}")
     return ok(subject, "kept in the user's cache, since the folder of the program is read-only")
@@ -103,28 +90,22 @@ def check_clocks() -> Iterator[Finding]:
 
 def check_resolution(reads_ns: list[int]) -> Finding:
     """Judge consecutive readings of the clock that stamps arrivals."""
+    subject = "clock"
     steps = [after - before for before, after in pairwise(reads_ns)]
-    forward = [step for step in steps if step > 0]
-    if min(steps) < 0 or not forward:
+    finest_ns = min((step for step in steps if step > 0), default=0)
+    if min(steps) < 0 or not finest_ns:
         fault = "goes back" if min(steps) < 0 else "stands still"
-        return warn("clock", f"the clock that stamps samples {fault}", "Check the computer's clock source")
-    finest_ns = min(forward)
+        return warn(subject, f"the clock that stamps samples {fault}", "Check the computer's clock source")
     if finest_ns > _COARSE_NS:
-        return warn(
-            "clock",
-            f"the clock that stamps samples goes in steps of {finest_ns / 1e6:.0f} ms",
-            "Use a newer system; until then the time base is less certain",
-        )
-    return ok("clock", f"steps of {finest_ns} ns or less")
+        fault = f"the clock that stamps samples goes in steps of {finest_ns / 1e6:.0f} ms"
+        return warn(subject, fault, "Use a newer system; until then the time base is less certain")
+    return ok(subject, f"steps of {finest_ns} ns or less")
 
 
 def check_date(now: datetime.datetime, program: datetime.datetime) -> Finding:
     """Judge the date: it cannot be before that of the program's own files."""
-    said = now.isoformat(timespec="seconds")
+    shown = now.isoformat(timespec="seconds")
     if now < program - datetime.timedelta(days=1):
-        return warn(
-            "date",
-            f"{said} is before the program was installed",
-            "Set the computer's date, or runs are misdated",
-        )
-    return ok("date", said)
+        fault = f"{shown} is before the program was installed"
+        return warn("date", fault, "Set the computer's date, or runs are misdated")
+    return ok("date", shown)

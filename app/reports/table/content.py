@@ -10,6 +10,7 @@ from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place, QuantityDefinition, table_columns
 from analysis.formatting import format_concise, format_fixed, format_signed, uncertainty_decimals
 from analysis.quantities import Quantity, ResultWarning
+from app.runs.campaign.collect import CollectedRuns
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,13 @@ class TableContent:
     failures: tuple[tuple[str, str], ...] = ()
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
     """By the labels of the rows; None where not asked for."""
+
+    @classmethod
+    def of_runs(
+        cls, runs: CollectedRuns, published: Mapping[str, PublishedRowComparison] | None = None
+    ) -> "TableContent":
+        failures = tuple((failure.run, str(failure.reason)) for failure in runs.failures)
+        return cls(runs.campaign(), runs.warnings, failures, published)
 
     def all_warnings(self) -> list[ResultWarning]:
         """Warnings of the runs, of the campaign, and of its rows."""

@@ -28,6 +28,8 @@ from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, writ
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
+_UNLIMITED_WIDTH: Final = 1_000_000
+"""Of a text that is not printed on a terminal."""
 
 
 def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:
@@ -42,6 +44,16 @@ def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool 
     if name == "latex":
         return _latex(content)
     return "\n".join(text_lines(content, width, with_repeats=with_repeats)) + "\n"
+
+
+def write_table(
+    content: TableContent, path: Path, name: str, *, with_repeats: bool = False, replace: bool = False
+) -> None:
+    """Write the table in one of `FORMATS`. Raises as `write_workbook`."""
+    if name == "xlsx":
+        write_workbook(content, path, replace=replace)
+    else:
+        write_text(as_text(content, name, _UNLIMITED_WIDTH, with_repeats=with_repeats), path, replace=replace)
 
 
 def write_text(text: str, path: Path, *, replace: bool = False) -> None:
