@@ -2,7 +2,6 @@
 
 import contextlib
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,14 +45,14 @@ def copy_run_into(path: Path, folder: Path) -> Path:
     with Validator.start() as validator:
         validator.validate(path)
     make_folder(folder)
-    for target in _numbered(folder / path.name):
-        try:
-            with atomic_write(target) as temporary:
-                shutil.copyfile(path, temporary)
-        except RunExistsError:
-            continue
-        return target
-    raise _names_taken(folder, path)
+    target = _claim_name(folder / path.name)
+    try:
+        with atomic_write(target, replace=True) as temporary:
+            shutil.copyfile(path, temporary)
+    except BaseException:
+        target.unlink()
+        raise
+    return target
 
 
 def move_to_trash(path: Path) -> Path:
@@ -181,13 +180,6 @@ def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | N
     return aside
 
 
-def _numbered(path: Path) -> Iterator[Path]:
-    """`run.h5`, `run-2.h5`, ..."""
-    yield path
-    for number in range(2, _NAMES_MAX):
-        yield path.with_name(f"{path.stem}-{number}{path.suffix}")
-
-
 def _names_taken(folder: Path, path: Path) -> RunExistsError:
     return RunExistsError(
         "{folder}: all names like {name} are taken. Move some runs elsewhere", folder=folder, name=path.name
@@ -216,7 +208,9 @@ def _move(path: Path, folder: Path) -> Path:
 
 
 def _claim_name(path: Path) -> Path:
-    for target in _numbered(path):
+    """Create an empty file under `run.h5`, `run-2.h5` or the next name that is free."""
+    for number in range(1, _NAMES_MAX):
+        target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
         try:
             target.open("x").close()
         except FileExistsError:

@@ -4,14 +4,14 @@ import contextlib
 import datetime
 import hashlib
 import os
-import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Self
 
 import msgspec
 import platformdirs
 
+from app.runs.disk import atomic_write, make_folder
 from app.runs.errors import DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.lock import RECORDING_SUFFIX
 from app.runs.paths import recordings_directory
@@ -21,80 +21,42 @@ from app.runs.summary import RunSummary
 from app.runs.validator import Validator
 from app.version import __version__
 
-_ENCODER = msgspec.msgpack.Encoder()
-_DECODER = msgspec.msgpack.Decoder(RunSummary)
-_WAIT_S = 5.0
-_TABLE = """
-CREATE TABLE IF NOT EXISTS runs (
-    path TEXT PRIMARY KEY, size INTEGER NOT NULL, changed_ns INTEGER NOT NULL, summary BLOB NOT NULL
-) WITHOUT ROWID
-"""
+Progress = Callable[[int, int], None]
+Stamp = tuple[int, int]
+"""Size of a file, and time of its last change (ns): while they last, so does its summary."""
+Index = dict[str, tuple[Stamp, RunSummary]]
+"""Stamp and summary of each file, by path."""
+
+_SAVE_S = 5.0
+"""So often a listing is remembered while it goes on: an interrupted first one keeps most of its work."""
+_VERSION = "|".join((__version__, *RunSummary.__struct_fields__))
+_INDEX_DECODER = msgspec.msgpack.Decoder(tuple[str, Index])
 
 
-class FileState(msgspec.Struct, frozen=True, gc=False):
-    """What tells that a file has not been changed."""
-
-    size: int
-    changed_ns: int
-
-
-class SummaryCache:
-    """Summaries by path, with the state of the file that each was made from. Use it in a `with` statement.
-
-    A cache that is damaged or of another version is begun anew; one that cannot be written is kept in memory.
-    """
-
-    def __init__(self, path: str) -> None:
-        """Open a database, or make it. Raises sqlite3.DatabaseError, MsgspecError."""
-        self._database = _connect(path)
-        try:
-            self.entries = _states(self._database)
-            """State and summary of each file by path, as they were when the cache was opened."""
-        except BaseException:
-            self.close()
-            raise
-
-    @classmethod
-    def open(cls, folder: Path) -> Self:
-        path = index_path(folder)
-        for _ in range(2):
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                return cls(str(path))
-            except (sqlite3.DatabaseError, msgspec.MsgspecError, OSError):
-                with contextlib.suppress(OSError):
-                    path.unlink()
-        return cls(":memory:")
-
-    def update(self, found: Iterable[tuple[FileState, RunSummary]]) -> None:
-        """Remember summaries. A cache that cannot take them forgets them, which costs time alone."""
-        rows = [
-            (run.path, state.size, state.changed_ns, _ENCODER.encode(run))
-            for state, run in found
-            if _is_text(run.path)
-        ]
-        with contextlib.suppress(sqlite3.DatabaseError), self._database:
-            self._database.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", rows)
-
-    def remove(self, paths: Iterable[str]) -> None:
-        with contextlib.suppress(sqlite3.DatabaseError), self._database:
-            self._database.executemany("DELETE FROM runs WHERE path = ?", [(path,) for path in paths])
-
-    def close(self) -> None:
-        self._database.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+def index_path(folder: Path) -> Path:
+    """Where the index of a folder is kept."""
+    digest = hashlib.blake2b(str(folder.absolute()).encode("utf-8", "surrogateescape"), digest_size=8)
+    cache = Path(platformdirs.user_cache_dir("slipstand", appauthor=False))
+    return cache / "libraries" / f"{digest.hexdigest()}.msgpack"
 
 
-def _states(database: sqlite3.Connection) -> dict[str, tuple[FileState, RunSummary]]:
-    rows = database.execute("SELECT path, size, changed_ns, summary FROM runs")
-    return {
-        path: (FileState(size, changed_ns), _DECODER.decode(data)) for path, size, changed_ns, data in rows
-    }
+def _load_index(folder: Path) -> Index:
+    """The index of a folder; empty where there is none, or one that is damaged or of another version."""
+    try:
+        version, index = _INDEX_DECODER.decode(index_path(folder).read_bytes())
+    except (OSError, msgspec.MsgspecError):
+        return {}
+    return index if version == _VERSION else {}
+
+
+def _save_index(folder: Path, index: Index) -> None:
+    """Remember an index. Where it cannot be written it is forgotten, which costs time alone."""
+    path = index_path(folder)
+    stored = {name: entry for name, entry in index.items() if _is_text(name)}
+    with contextlib.suppress(RunError):
+        make_folder(path.parent)
+        with atomic_write(path, replace=True) as made:
+            made.write_bytes(msgspec.msgpack.encode((_VERSION, stored)))
 
 
 def _is_text(path: str) -> bool:
@@ -104,41 +66,6 @@ def _is_text(path: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def index_path(folder: Path) -> Path:
-    """Where the cache of a folder is kept."""
-    name = hashlib.blake2b(
-        str(folder.absolute()).encode("utf-8", "surrogateescape"), digest_size=8
-    ).hexdigest()
-    return Path(platformdirs.user_cache_dir("slipstand", appauthor=False)) / "libraries" / f"{name}.sqlite"
-
-
-def _connect(path: str) -> sqlite3.Connection:
-    """Open a database that holds the table of this version, empty or not. Raises sqlite3.DatabaseError."""
-    database = sqlite3.connect(path, timeout=_WAIT_S)
-    try:
-        version = _version()
-        if database.execute("PRAGMA user_version").fetchone()[0] != version:
-            with database:
-                database.execute("DROP TABLE IF EXISTS runs")
-                database.execute(_TABLE)
-                database.execute(f"PRAGMA user_version = {version}")
-    except BaseException:
-        database.close()
-        raise
-    return database
-
-
-def _version() -> int:
-    """A number that changes with the program and with what a summary holds."""
-    words = "|".join((__version__, *RunSummary.__struct_fields__))
-    return int.from_bytes(hashlib.blake2b(words.encode(), digest_size=3).digest(), "big")
-
-
-Progress = Callable[[int, int], None]
-_BATCH = 100
-"""Newly examined runs that are remembered together: what an interrupted first listing keeps."""
 
 
 class RunFilter(msgspec.Struct, frozen=True):
@@ -205,12 +132,12 @@ def find_run_files(folder: Path) -> Iterator[Path]:
 
 class _File(msgspec.Struct, frozen=True, gc=False):
     path: str
-    state: FileState
+    stamp: Stamp
     may_be_recorded: bool
 
 
 def _files(folder: Path) -> Iterator[_File]:
-    """Run files, each with its state, without opening any."""
+    """Run files, each with its stamp, without opening any."""
     pending = [str(folder)]
     while pending:
         try:
@@ -222,9 +149,9 @@ def _files(folder: Path) -> Iterator[_File]:
         for entry in entries:
             if entry.name.endswith(SUFFIX) and _is_file(entry):
                 with contextlib.suppress(OSError):  # gone meanwhile
-                    status = entry.stat()
-                    state = FileState(status.st_size, status.st_mtime_ns)
-                    yield _File(entry.path, state, entry.name + RECORDING_SUFFIX in locked)
+                    stat = entry.stat()
+                    stamp = (stat.st_size, stat.st_mtime_ns)
+                    yield _File(entry.path, stamp, entry.name + RECORDING_SUFFIX in locked)
             elif entry.is_dir(follow_symlinks=False):
                 pending.append(entry.path)
 
@@ -237,34 +164,30 @@ def _is_file(entry: os.DirEntry[str]) -> bool:
 
 
 def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
-    found: list[RunSummary] = []
+    known = _load_index(folder)
+    index: Index = {}
     changed: list[_File] = []
-    with SummaryCache.open(folder) as index:
-        known = dict(index.entries)
-        for file in _files(folder):
-            state, summary = known.pop(file.path, (None, None))
-            if summary is not None and state == file.state and not file.may_be_recorded:
-                found.append(summary)
-            else:
-                changed.append(file)
-        index.remove(known)  # what is left lies there no more
-        found.extend(_validate_changed(changed, index, progress))
-    return found
-
-
-def _validate_changed(files: list[_File], index: SummaryCache, progress: Progress) -> Iterator[RunSummary]:
-    fresh: list[tuple[FileState, RunSummary]] = []
+    for file in _files(folder):
+        entry = known.get(file.path)
+        if entry is not None and entry[0] == file.stamp and not file.may_be_recorded:
+            index[file.path] = entry
+        else:
+            changed.append(file)
+    found = [summary for _, summary in index.values()]
+    saved_at = time.monotonic()
     with Validator() as validator:
-        for done, file in enumerate(files):
-            progress(done, len(files))
+        for done, file in enumerate(changed):
+            progress(done, len(changed))
             summary, lasts = _summary(Path(file.path), validator)
-            yield summary
+            found.append(summary)
             if lasts:
-                fresh.append((file.state, summary))
-            if len(fresh) == _BATCH:
-                index.update(fresh)
-                fresh.clear()
-    index.update(fresh)
+                index[file.path] = (file.stamp, summary)
+            if time.monotonic() - saved_at > _SAVE_S:
+                _save_index(folder, index)
+                saved_at = time.monotonic()
+    if changed or len(index) != len(known):
+        _save_index(folder, index)
+    return found
 
 
 def _summary(path: Path, validator: Validator) -> tuple[RunSummary, bool]:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing.synchronize import Lock
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -38,16 +38,27 @@ _POLL_S = 0.2
 """Windows delivers Ctrl-C between two waits only."""
 
 
-class Executor(Protocol):
-    """Runs work, some items at once. Use it in the `with` statement of `open_executor`."""
+class Executor:
+    """Runs work in this process; subclasses run some items at once elsewhere. Use `open_executor`."""
+
+    in_process: ClassVar[bool] = True
 
     @property
-    def workers(self) -> int: ...
+    def workers(self) -> int:
+        """Number of items that are worked on at once."""
+        return 1
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
         """Hand over a picklable item; its future fails with BrokenExecutor where a worker died."""
+        future: Future[Answer] = Future()
+        try:
+            future.set_result(work(item))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
-    def renew(self) -> None: ...
+    def renew(self) -> None:
+        """Replace the workers after one died."""
 
     def close(self, *, now: bool) -> None:
         """End when the work under way is done, or `now`."""
@@ -73,7 +84,16 @@ class FailedItem(Generic[Item]):
 @contextmanager
 def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
     """Open an executor; an error in the block cancels its work. Raises ExtraMissingError, ClusterError."""
-    executor = _choose(options, runs)
+    executor: Executor
+    jobs = options.jobs
+    if jobs is None:
+        may_have_children = not multiprocessing.current_process().daemon
+        jobs = processor_count() if runs > _SERIAL_RUNS and may_have_children else 1
+    jobs = min(jobs, runs)
+    if options.dask:
+        executor = DaskExecutor(options.dask)
+    else:
+        executor = Executor() if jobs <= 1 else ProcessExecutor(jobs, load_analysis)
     try:
         yield executor
     except BaseException:
@@ -97,7 +117,7 @@ def ordered_map(
     """
     source = iter(items)
     queued: deque[tuple[Item, Future[Answer]]] = deque()
-    limit = 1 if isinstance(executor, SerialExecutor) else executor.workers * _QUEUED_PER_WORKER
+    limit = 1 if executor.in_process else executor.workers * _QUEUED_PER_WORKER
     try:
         while True:
             for item in islice(source, limit - len(queued)):
@@ -117,39 +137,24 @@ def ordered_map(
             future.cancel()
 
 
-class SerialExecutor:
-    """Runs work in this process, at once."""
-
-    workers = 1
-
-    def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
-        """Do the work. Its exceptions are in the future, interruptions are raised."""
-        future: Future[Answer] = Future()
-        try:
-            future.set_result(work(item))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def renew(self) -> None:
-        """Nothing can have died."""
-
-    def close(self, *, now: bool) -> None:
-        """Nothing is under way."""
-
-
-class ProcessExecutor:
+class ProcessExecutor(Executor):
     """Worker processes on this computer, started with the first item. None outlives this process.
 
     `prepare` is called by each process before its first item, one process after another: at the very first
     start one compiles, and the others load the result.
     """
 
+    in_process = False
+
     def __init__(self, workers: int, prepare: Callable[[], None]) -> None:
-        self.workers = workers
+        self._workers = workers
         self._prepare = prepare
         self._executor: ProcessPoolExecutor | None = None
         self._lifeline: tuple[PipeEnd, ...] = ()
+
+    @property
+    def workers(self) -> int:
+        return self._workers
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
         """Hand over one item. Raises BrokenProcessPool after a worker died, until `renew`."""
@@ -175,7 +180,7 @@ class ProcessExecutor:
             context = multiprocessing.get_context("spawn")
             self._lifeline = context.Pipe(duplex=False)
             self._executor = ProcessPoolExecutor(
-                self.workers,
+                self._workers,
                 mp_context=context,
                 initializer=_begin,
                 initargs=(self._lifeline[0], context.Lock(), self._prepare),
@@ -183,8 +188,10 @@ class ProcessExecutor:
         return self._executor
 
 
-class DaskExecutor:
+class DaskExecutor(Executor):
     """Workers of a Dask cluster, on computers that see the same run files."""
+
+    in_process = False
 
     def __init__(self, address: str) -> None:
         self._address = address
@@ -250,17 +257,6 @@ def load_analysis() -> None:
     from analysis.identify import warm_up
 
     warm_up()
-
-
-def _choose(options: ExecutorOptions, runs: int) -> Executor:
-    if options.dask:
-        return DaskExecutor(options.dask)
-    jobs = options.jobs
-    if jobs is None:
-        may_have_children = not multiprocessing.current_process().daemon
-        jobs = processor_count() if runs > _SERIAL_RUNS and may_have_children else 1
-    jobs = min(jobs, runs)
-    return SerialExecutor() if jobs <= 1 else ProcessExecutor(jobs, load_analysis)
 
 
 def _submit(executor: Executor, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import h5py
 import msgspec
 
 from app.runs.analyze import Analysis, AnalysisRequest, Progress, analyze_run
-from app.runs.batch.executors import Executor, FailedItem, SerialExecutor, ordered_map
+from app.runs.batch.executors import Executor, FailedItem, ordered_map
 from app.runs.errors import internal_error, one_line
 from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
@@ -54,7 +54,12 @@ def analyze_one(
     """Analyse one run. Never raises: what goes wrong is in the outcome."""
     path = Path(task.path).expanduser().absolute()
     try:
-        return _analyzed(path, task, progress, validator or shared_validator())
+        kept = validate_and_count(path, validator or shared_validator())
+        if kept and task.save and not task.force:
+            wanted = msgspec.to_builtins(task.request)
+            if (outcome := read_file(path, lambda file: _kept(file, path, wanted))) is not None:
+                return outcome
+        return build_outcome(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
     except Exception as error:
         return AnalysisOutcome(str(path), error=error_message(error))
 
@@ -96,18 +101,6 @@ def latest_valid_in_file(
     return None, stale
 
 
-def _analyzed(
-    path: Path, task: AnalysisTask, progress: Progress | None, validator: Validator
-) -> AnalysisOutcome:
-    kept = validate_and_count(path, validator)
-    if kept and task.save and not task.force:
-        wanted = msgspec.to_builtins(task.request)
-        outcome = read_file(path, lambda file: _kept(file, path, wanted))
-        if outcome is not None:
-            return outcome
-    return build_outcome(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
-
-
 def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOutcome | None:
     """The analysis kept in a run that was asked for in the same words, if it still stands."""
     metadata = read_metadata(file)
@@ -120,15 +113,8 @@ def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOut
     )
 
 
-Outcome = TypeVar("Outcome", covariant=True)
-
-
-class _OfRun(Protocol):
-    @property
-    def path(self) -> str: ...
-
-
-Task = TypeVar("Task", bound=_OfRun)
+Task = TypeVar("Task")
+Outcome = TypeVar("Outcome")
 
 
 def analyze_runs(
@@ -155,7 +141,7 @@ def map_runs(
     def within(share: float, what: str) -> None:
         progress((done + share) / len(tasks), what)
 
-    at_hand = (lambda task: work(task, within)) if isinstance(executor, SerialExecutor) else work
+    at_hand = (lambda task: work(task, within)) if executor.in_process else work
     for outcome in ordered_map(executor, at_hand, tasks):
         done += 1
         progress(done / len(tasks), f"{done} of {len(tasks)} runs")

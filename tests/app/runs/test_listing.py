@@ -1,8 +1,8 @@
 import datetime
 import os
-import sqlite3
 from pathlib import Path
 
+import msgspec
 import pytest
 from runs_kit import ANALYSIS, ENDING, block, small_run
 
@@ -128,7 +128,7 @@ def test_the_second_listing_examines_only_what_changed(folder, monkeypatch):
     assert "a.h5" not in _names(again)
 
 
-@pytest.mark.parametrize("harm", ["gone", "rubbish", "another program's", "no folder"])
+@pytest.mark.parametrize("harm", ["gone", "rubbish", "another version", "no folder"])
 def test_the_index_can_be_lost_at_any_time(folder, harm):
     first = list_runs(folder)
     path = index_path(folder)
@@ -136,9 +136,9 @@ def test_the_index_can_be_lost_at_any_time(folder, harm):
         path.unlink()
     elif harm == "rubbish":
         path.write_bytes(b"no database" * 1000)
-    elif harm == "another program's":
-        path.unlink()
-        sqlite3.connect(path).execute("CREATE TABLE runs (x)").connection.close()
+    elif harm == "another version":
+        _, index = msgspec.msgpack.decode(path.read_bytes())
+        path.write_bytes(msgspec.msgpack.encode(("0.0.1", index)))
     else:
         path.unlink()
         path.parent.rmdir()

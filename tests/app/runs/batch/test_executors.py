@@ -9,19 +9,20 @@ import pytest
 from batch_kit import doubled, failing, fatal, nothing, waiting
 
 from app.runs.batch.executors import (
+    Executor,
     ExecutorOptions,
     FailedItem,
     ProcessExecutor,
-    SerialExecutor,
     open_executor,
     ordered_map,
 )
 
 
-class Unhurried:
+class Unhurried(Executor):
     """A crew whose work is done when somebody looks for the answer; counts what is in flight."""
 
     workers = 2
+    in_process = False
 
     def __init__(self):
         self.given = []
@@ -76,13 +77,13 @@ def test_answers_come_in_order_and_few_are_in_flight():
 
 def test_in_this_process_each_is_done_when_it_is_asked_for():
     done = []
-    answers = ordered_map(SerialExecutor(), done.append, range(10))
+    answers = ordered_map(Executor(), done.append, range(10))
     next(answers)
     assert done == [0]
 
 
 def test_work_that_fails_is_told_with_its_item():
-    answers = list(ordered_map(SerialExecutor(), failing, range(5)))
+    answers = list(ordered_map(Executor(), failing, range(5)))
     assert answers[:3] == [0, 1, 2]
     assert answers[3].item == 3
     assert str(answers[3].message) == "its worker failed (ValueError: three is too many)"
@@ -126,7 +127,7 @@ def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
 
 def test_few_runs_are_done_here_and_many_in_processes():
     with open_executor(ExecutorOptions(), 3) as crew:
-        assert isinstance(crew, SerialExecutor)
+        assert crew.in_process
     with open_executor(ExecutorOptions(jobs=2), 3) as crew:
         assert crew.workers == 2
     with open_executor(ExecutorOptions(jobs=64), 3) as crew:
