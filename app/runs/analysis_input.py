@@ -13,6 +13,7 @@ from app.runs.metadata import RunMetadata
 from config.schema import Gauge
 from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
+from messages.i18n import N_
 
 if TYPE_CHECKING:
     from app.runs.reader import Run  # the live identification needs no files
@@ -32,13 +33,11 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
         raise UnsuitableRunError("{path} holds no samples. Record the run again", path=run.path)
     quantity, unit = run.metadata.quantity, run.metadata.unit
     if metres_only and (quantity, unit) != ("displacement", "m"):
-        raise UnsuitableRunError(
+        template = N_(
             "{path} holds a {quantity} in {unit}, but friction needs displacements in m."
-            " Analyse it with --kind one-mass",
-            path=run.path,
-            quantity=quantity,
-            unit=unit,
+            " Analyse it with --kind one-mass"
         )
+        raise UnsuitableRunError(template, path=run.path, quantity=quantity, unit=unit)
     no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_BY_GAUGE)
     relative = run.relative_reading
     record = build_record(

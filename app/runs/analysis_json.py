@@ -95,42 +95,50 @@ def read_warning(document: dict[str, Any]) -> ResultWarning:
     return ResultWarning(document["code"], msgspec.convert(document, Message))
 
 
+def json_values(value: Any) -> Any:
+    """A value as read back from JSON: objects are dicts, and numbers that are not finite None."""
+    return msgspec.json.decode(msgspec.json.encode(value))
+
+
 def budget_documents(budget: Iterable[BudgetLine]) -> list[dict[str, Any]]:
     """Budget lines with the names of their sources; what is not stated is null."""
-    return [
-        {
-            "source": str(line.source),
-            "contribution_to": line.contribution_to,
-            "standard_uncertainty": line.standard_uncertainty
-            if math.isfinite(line.standard_uncertainty)
-            else None,
-        }
-        for line in budget
-    ]
+    documents: list[dict[str, Any]] = json_values(
+        [
+            {
+                "source": str(line.source),
+                "contribution_to": line.contribution_to,
+                "standard_uncertainty": line.standard_uncertainty,
+            }
+            for line in budget
+        ]
+    )
+    return documents
 
 
 def read_budget_line(document: dict[str, Any]) -> BudgetLine:
     """Budget line of a document; NaN where the uncertainty is not stated."""
-    deviation = document["standard_uncertainty"]
     return BudgetLine(
         parse_source(document["source"]),
         sys.intern(document["contribution_to"]),
-        math.nan if deviation is None else float(deviation),
+        _or_nan(document["standard_uncertainty"]),
     )
 
 
 def read_quantity(document: dict[str, Any]) -> Quantity:
     """Quantity of a document; NaN in place of null."""
     low, high = document["interval_95"] or (math.nan, math.nan)
-    deviation = document["standard_uncertainty"]
-    deviation = math.nan if deviation is None else float(deviation)
-    return Quantity(document["value"], deviation, (low, high), document["unit"])
+    uncertainty = _or_nan(document["standard_uncertainty"])
+    return Quantity(document["value"], uncertainty, (low, high), document["unit"])
 
 
 def quantity_document(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as in `results`."""
-    document: dict[str, Any] = msgspec.to_builtins(quantity)
-    return document | {"interval_95": list(quantity.interval_95)}
+    """A quantity as in `results`; an interval that is not finite is null."""
+    document: dict[str, Any] = json_values(quantity)
+    return document | {"interval_95": None if None in document["interval_95"] else document["interval_95"]}
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else float(value)
 
 
 def mass_warnings(metadata: "RunMetadata", given: dict[str, float | None]) -> list[ResultWarning]:

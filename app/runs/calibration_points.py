@@ -12,6 +12,7 @@ from analysis.calibration.calibrate import Calibration
 from analysis.calibration.points import CalibrationPoints
 from app.runs.errors import RunError
 from config.schema import Gauge
+from messages.i18n import N_
 
 _COLUMNS = ("counts", "dial_mm")
 _WAYS = {"up": 1, "down": -1, "+1": 1, "1": 1, "-1": -1, "+": 1, "-": -1}
@@ -85,13 +86,11 @@ def read_points(path: Path) -> CalibrationPoints:
             )
     rows = [(line, dict(zip(names, row, strict=False))) for line, row in enumerate(table[1:], 2) if any(row)]
     counts, dial_mm = (_numbers(path, rows, name, separator) for name in _COLUMNS)
-    dial_m = np.array(dial_mm) * 1e-3
-    if not {"direction", "round"} <= set(names):
-        return CalibrationPoints.from_readings(counts, dial_m)
-    ways = [_way(path, line, row.get("direction", "")) for line, row in rows]
-    return CalibrationPoints.from_readings(
-        counts, dial_m, ways, [int(n) for n in _numbers(path, rows, "round", separator)]
-    )
+    taken: list[list[int]] = []
+    if {"direction", "round"} <= set(names):
+        ways = [_way(path, line, row.get("direction", "")) for line, row in rows]
+        taken = [ways, [int(n) for n in _numbers(path, rows, "round", separator)]]
+    return CalibrationPoints.from_readings(counts, np.array(dial_mm) * 1e-3, *taken)
 
 
 def write_points(path: Path, counts: Sequence[float], dial_m: Sequence[float]) -> None:
@@ -107,13 +106,8 @@ def _numbers(path: Path, rows: list[tuple[int, dict[str, str]]], name: str, sepa
         try:
             values.append(float(text if separator == "," else text.replace(",", ".")))
         except ValueError:
-            raise PointsError(
-                "{path}: line {line}: {name} {text!r} is not a number. Correct it",
-                path=path,
-                line=line,
-                name=name,
-                text=text,
-            ) from None
+            template = N_("{path}: line {line}: {name} {text!r} is not a number. Correct it")
+            raise PointsError(template, path=path, line=line, name=name, text=text) from None
     return values
 
 
@@ -121,9 +115,5 @@ def _way(path: Path, line: int, text: str) -> int:
     try:
         return _WAYS[text.lower()]
     except KeyError:
-        raise PointsError(
-            "{path}: line {line}: direction {text!r} is not known. Use up or down",
-            path=path,
-            line=line,
-            text=text,
-        ) from None
+        template = N_("{path}: line {line}: direction {text!r} is not known. Use up or down")
+        raise PointsError(template, path=path, line=line, text=text) from None

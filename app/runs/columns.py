@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from app.runs import schema
 from app.runs.errors import DamagedRunError
 from app.runs.fields import read_number, read_text, to_python
+from messages.i18n import N_
 
 _ROWS_AT_ONCE = 1 << 20
 """8 MiB of float64: enough for the speed of the disk, little beside the memory of the process."""
@@ -78,8 +79,7 @@ def check_column(dataset: h5py.Dataset, value: int, run: Path | str) -> None:
     """Compare the checksum of a column of the finished `run` with the stored one. Raises DamagedRunError."""
     stored = read_number(dataset.file, schema.checksum_path(dataset.name.lstrip("/")))
     if stored is not None and stored != value:
-        raise DamagedRunError(
-            "{run} is damaged: {column} is not what was stored, by its checksum. Restore a good copy",
-            run=run,
-            column=dataset.name,
+        template = N_(
+            "{run} is damaged: {column} is not what was stored, by its checksum. Restore a good copy"
         )
+        raise DamagedRunError(template, run=run, column=dataset.name)

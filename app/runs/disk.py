@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
+from messages.i18n import N_
 
 MARGIN_BYTES = 1 << 20
 """Claimed beyond the next need of a run, so that its file can still be closed in good order."""
@@ -42,11 +43,8 @@ def check_free_space(folder: Path, more: int) -> None:
     """Make sure that a disk has `more` free bytes. Raises DiskFullError, OSError."""
     free = shutil.disk_usage(folder).free
     if free < more:
-        raise DiskFullError(
-            "{folder}: the disk has only {free:.1f} MB left. Free some space or take another disk",
-            folder=folder,
-            free=free / 1e6,
-        )
+        template = N_("{folder}: the disk has only {free:.1f} MB left. Free some space or take another disk")
+        raise DiskFullError(template, folder=folder, free=free / 1e6)
 
 
 def has_free_space(folder: Path, size: int) -> bool:
@@ -86,11 +84,8 @@ def storage_error(path: Path, error: Exception) -> RunError:
         return DiskFullError(
             "{path}: the disk or its quota is full. Free some space or take another disk", path=path
         )
-    return WriteError(
-        "{path}: cannot be written ({reason}). Check the folder, its rights and its disk",
-        path=path,
-        reason=getattr(error, "strerror", None) or words,
-    )
+    template = N_("{path}: cannot be written ({reason}). Check the folder, its rights and its disk")
+    return WriteError(template, path=path, reason=getattr(error, "strerror", None) or words)
 
 
 def make_folder(folder: Path) -> None:

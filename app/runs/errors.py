@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import cast
 
+from messages.i18n import N_
 from messages.message import Message, MessageError, message
 
 
@@ -115,9 +116,8 @@ def one_line(error: BaseException) -> str:
 
 def internal_error(error: Exception) -> Message:
     """Message for a fault of the program itself."""
-    return message(
+    template = N_(
         "Slipstand itself failed ({kind}: {text}). "
-        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints",
-        kind=type(error).__name__,
-        text=one_line(error),
+        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints"
     )
+    return message(template, kind=type(error).__name__, text=one_line(error))

@@ -13,6 +13,7 @@ import numpy as np
 
 from app.runs.errors import DamagedRunError, MetadataError
 from app.runs.schema import Field, Kind
+from messages.i18n import N_
 
 _PASSED, _FAILED = "passed", "failed"
 
@@ -90,11 +91,8 @@ def read_text(group: h5py.Group, name: str, default: str = "") -> str:
         return default
     value = dataset[()]
     if not isinstance(value, bytes | str):
-        raise DamagedRunError(
-            "{file}: {path} is not a text. Restore a good copy",
-            file=group.file.filename,
-            path=f"{group.name}/{name}",
-        )
+        template = N_("{file}: {path} is not a text. Restore a good copy")
+        raise DamagedRunError(template, file=group.file.filename, path=f"{group.name}/{name}")
     return value if isinstance(value, str) else value.decode("utf-8", "replace")
 
 
@@ -105,11 +103,8 @@ def read_number(group: h5py.Group, name: str) -> float | None:
         return None
     value = dataset[()]
     if not isinstance(value, np.number):
-        raise DamagedRunError(
-            "{file}: {path} is not a number. Restore a good copy",
-            file=group.file.filename,
-            path=f"{group.name}/{name}",
-        )
+        template = N_("{file}: {path} is not a number. Restore a good copy")
+        raise DamagedRunError(template, file=group.file.filename, path=f"{group.name}/{name}")
     return None if np.isnan(value) else float(value)
 
 

@@ -26,6 +26,7 @@ from app.runs.metadata_io import read_end_metadata, read_identifier
 from app.runs.reader import check_openable, read_file
 from app.runs.rewrite import editing_lock, replace_run
 from app.runs.validator import Validator
+from messages.i18n import N_
 
 TRASH = ".trash"
 ASIDE = ".before-recovery"
@@ -68,11 +69,8 @@ def move_to_trash(path: Path) -> Path:
             "{path} is a link to {target}. Give that file", path=path, target=path.resolve()
         )
     if path.suffix != schema.SUFFIX:
-        raise UnsuitableRunError(
-            "{path} is not named like a run. Give a file that ends in {suffix}",
-            path=path,
-            suffix=schema.SUFFIX,
-        )
+        template = N_("{path} is not named like a run. Give a file that ends in {suffix}")
+        raise UnsuitableRunError(template, path=path, suffix=schema.SUFFIX)
     make_folder(path.parent / TRASH)
     return _move(path, path.parent / TRASH)
 

@@ -3,6 +3,7 @@
 import datetime
 import math
 import re
+from collections.abc import Iterator
 from typing import Any, Literal, Self
 
 import msgspec
@@ -11,7 +12,8 @@ from app.runs.errors import ConditionError, MetadataError
 from config.schema import ConfigError, GaugeCheck, Gauges, Stand
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, Losses
-from messages.message import message
+from messages.i18n import N_
+from messages.message import Message, message
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
@@ -32,6 +34,10 @@ class _FrozenStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def is_field_name(name: str) -> bool:
     """Tell whether `name` can name a fact in a run file: a letter, then letters, digits, underscores."""
     return _FACT_NAME.fullmatch(name) is not None
+
+
+def _is_line(text: str) -> bool:
+    return len(text) <= _TEXT_MAX and text.isprintable()
 
 
 _PLAUSIBLE = {"temperature_c": (-40.0, 80.0), "humidity_percent": (0.0, 100.0), "run_in_number": (0, 10**9)}
@@ -55,30 +61,25 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
     """Anything else, by a name of letters, digits and underscores."""
 
     def __post_init__(self) -> None:
-        for name, (low, high) in _PLAUSIBLE.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                reason = message(
-                    "{value:g} cannot be. Give {low:g} to {high:g}, or leave it out",
-                    value=value,
-                    low=low,
-                    high=high,
-                )
-                raise ConditionError("condition {name} = {reason}", name=name, reason=reason)
-        texts = {name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other
-        for name, text in texts.items():
-            if len(text) > _TEXT_MAX or not text.isprintable():
-                reason = message(
-                    "{text!r} is not a line of text of up to {text_max} characters",
-                    text=text[:40],
-                    text_max=_TEXT_MAX,
-                )
-                raise ConditionError("condition {name} = {reason}", name=name, reason=reason)
+        for name, reason in self._faults():
+            raise ConditionError("condition {name} = {reason}", name=name, reason=reason)
         for name in self.other:
             if not is_field_name(name) or name in Conditions.__struct_fields__:
                 raise MetadataError(
                     "condition {name!r} is not a usable name. Use letters, digits and underscores", name=name
                 )
+
+    def _faults(self) -> Iterator[tuple[str, Message]]:
+        """Names of fields that cannot be, and why."""
+        for name, (low, high) in _PLAUSIBLE.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                template = N_("{value:g} cannot be. Give {low:g} to {high:g}, or leave it out")
+                yield name, message(template, value=value, low=low, high=high)
+        for name, text in ({name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other).items():
+            if not _is_line(text):
+                template = N_("{text!r} is not a line of text of up to {text_max} characters")
+                yield name, message(template, text=text[:40], text_max=_TEXT_MAX)
 
     def as_text(self) -> str:
         """What is known, in a few words; "" where nothing is."""
@@ -149,37 +150,26 @@ class RunMetadata(_FrozenStruct, frozen=True):
     """Why the run does not count in a campaign; empty for one that does."""
 
     def __post_init__(self) -> None:
+        start = self.start_time.isoformat()
         if self.start_time.tzinfo is None:
-            raise MetadataError(
-                "start_time {isoformat} has no time zone. Give one", isoformat=self.start_time.isoformat()
-            )
+            raise MetadataError("start_time {isoformat} has no time zone. Give one", isoformat=start)
         if not _YEARS[0] <= self.start_time.year <= _YEARS[1]:
-            raise MetadataError(
-                "start_time {isoformat} cannot be. Set the clock", isoformat=self.start_time.isoformat()
-            )
+            raise MetadataError("start_time {isoformat} cannot be. Set the clock", isoformat=start)
         if any(c in _NOT_IN_NAMES or not c.isprintable() for c in self.series or ""):
-            raise MetadataError(
-                "series {series!r} cannot be part of a file's name. Use letters and digits",
-                series=self.series,
-            )
+            template = N_("series {series!r} cannot be part of a file's name. Use letters and digits")
+            raise MetadataError(template, series=self.series)
         for name in ("table_mass_kg", "plate_mass_kg", "pullback_m", "rate_hz"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise MetadataError(
                     "{name} = {value!r} must be a finite number above 0", name=name, value=value
                 )
-        if len(self.excluded) > _TEXT_MAX or not self.excluded.isprintable():
-            raise MetadataError(
-                "excluded = {excluded!r} is not a line of text of up to {text_max} characters",
-                excluded=self.excluded[:40],
-                text_max=_TEXT_MAX,
-            )
+        if not _is_line(self.excluded):
+            template = N_("excluded = {excluded!r} is not a line of text of up to {text_max} characters")
+            raise MetadataError(template, excluded=self.excluded[:40], text_max=_TEXT_MAX)
         if self.quantity not in QUANTITY_UNITS:
-            raise MetadataError(
-                "quantity {quantity!r} is not known. Use {quantity_units}",
-                quantity=self.quantity,
-                quantity_units=", ".join(QUANTITY_UNITS),
-            )
+            template = N_("quantity {quantity!r} is not known. Use {quantity_units}")
+            raise MetadataError(template, quantity=self.quantity, quantity_units=", ".join(QUANTITY_UNITS))
         for name in self.truth:
             if not is_field_name(name):
                 raise MetadataError(

@@ -21,6 +21,7 @@ from app.runs.fields import (
 from app.runs.metadata import EndMetadata, RunMetadata, is_field_name
 from app.version import __version__
 from config.schema import GaugeCheck
+from messages.i18n import N_
 
 EDITABLE = frozenset((
     "title", "series", "pullback_m", "table_mass_kg", "plate_mass_kg", "operator", "note", "conditions",
@@ -63,11 +64,8 @@ def read_metadata(file: h5py.File) -> RunMetadata:
         for change in read_changes(file):
             metadata = apply_change(metadata, change)
     except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise DamagedRunError(
-            "{file}: its metadata cannot be read ({fault}). Restore a good copy",
-            file=file.filename,
-            fault=one_line(error),
-        ) from None
+        template = N_("{file}: its metadata cannot be read ({fault}). Restore a good copy")
+        raise DamagedRunError(template, file=file.filename, fault=one_line(error)) from None
     return metadata
 
 

@@ -3,6 +3,7 @@
 import datetime
 import hashlib
 import math
+import re
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,9 @@ import msgspec
 import numpy as np
 
 from analysis.identification import Identification
-from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs import schema
-from app.runs.analysis_json import budget_documents, warning_documents
+from app.runs.analysis_json import budget_documents, json_values, quantity_document, warning_documents
 from app.runs.fields import make_group, read_number, read_text, write_number, write_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
@@ -46,7 +46,7 @@ class SavedAnalysis:
 def analysis_document(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
     """JSON object of one identification, schema `slipstand-analysis/1`."""
     quantities = {
-        name: _quantity(value) for name, value in result.results.items() if math.isfinite(value.value)
+        name: quantity_document(value) for name, value in result.results.items() if math.isfinite(value.value)
     }
     return {
         "schema": SCHEMA,
@@ -54,9 +54,9 @@ def analysis_document(path: Path, series: str | None, losses: Losses, result: Id
         "series": series,
         "kind": result.kind,
         "results": quantities | result.labels,
-        "model": None if result.model is None else _finite(msgspec.to_builtins(result.model)),
+        "model": json_values(result.model),
         "budget": budget_documents(result.budget),
-        "events": _finite(msgspec.to_builtins(result.events)),
+        "events": json_values(result.events),
         "warnings": warning_documents(result.warnings, with_templates=True),
         "quality": {name: getattr(losses, name) for name in ("samples", "missing", "damaged", "overloaded")}
         | {"missing_estimated": losses.missing_estimated},
@@ -101,12 +101,8 @@ def read_analyses(file: h5py.File) -> tuple[SavedAnalysis, ...]:
 
 
 def _numbers(file: h5py.File) -> list[int]:
-    found = [name.removeprefix(schema.ANALYSIS_PREFIX) for name in file[schema.ENTRY] if _is_analysis(name)]
-    return sorted(int(number) for number in found)
-
-
-def _is_analysis(name: str) -> bool:
-    return name.startswith(schema.ANALYSIS_PREFIX) and name.removeprefix(schema.ANALYSIS_PREFIX).isdigit()
+    found = (re.fullmatch(rf"{schema.ANALYSIS_PREFIX}(\d+)", name) for name in file[schema.ENTRY])
+    return sorted(int(match[1]) for match in found if match)
 
 
 def _read(file: h5py.File, number: int) -> SavedAnalysis:
@@ -177,29 +173,6 @@ def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
             group.create_dataset(name, data=np.array([math.nan if x is None else x for x in column], float))
 
 
-def _quantity(quantity: Quantity) -> dict[str, Any]:
-    interval = [_or_none(bound) for bound in quantity.interval_95]
-    return {
-        "value": quantity.value,
-        "standard_uncertainty": _or_none(quantity.standard_uncertainty),
-        "interval_95": None if None in interval else interval,
-        "unit": quantity.unit,
-    }
-
-
-def _finite(value: Any) -> Any:
-    """JSON knows no NaN: numbers that are not finite become null."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return _or_none(value) if isinstance(value, float) else value
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples. Raises DamagedRunError.
 
@@ -228,15 +201,9 @@ def _facts(metadata: RunMetadata) -> list[object]:
 
 
 _ABOUT = (
-    "serial_number",
-    "reference",
-    "date",
-    "valid_until",
-    "certificate",
-    "calibrated_by",
-    "hysteresis_m",
+    "serial_number", "reference", "date", "valid_until", "certificate", "calibrated_by", "hysteresis_m",
     "repeatability_m",
-)
+)  # fmt: skip
 
 
 def _calibration(gauge: Gauge) -> list[object]:

@@ -13,6 +13,7 @@ import numpy as np
 from app.runs import schema
 from app.runs.columns import is_finished, sample_paths, signal_paths, stored_rows
 from app.runs.errors import DamagedRunError, NotARunError
+from messages.i18n import N_
 from messages.message import MessageError
 
 _OBJECTS_MAX = 50_000
@@ -37,11 +38,8 @@ def validate_file(file: h5py.File) -> None:
         _check_columns(file)
         _check_required(file)
     except _StructureError as error:
-        raise DamagedRunError(
-            "{file} is damaged: {fault}. Restore a good copy, or recover it",
-            file=file.filename,
-            fault=error.message,
-        ) from None
+        template = N_("{file} is damaged: {fault}. Restore a good copy, or recover it")
+        raise DamagedRunError(template, file=file.filename, fault=error.message) from None
 
 
 class _StructureError(MessageError):
@@ -53,12 +51,8 @@ def _check_schema(file: h5py.File) -> None:
     if not isinstance(version, np.integer):
         raise NotARunError("{file} is HDF5, but not a Slipstand run. Give a run file", file=file.filename)
     if version != schema.SCHEMA:
-        raise NotARunError(
-            "{file} has run format {version}, this program knows {known}. Use a newer program",
-            file=file.filename,
-            version=version,
-            known=schema.SCHEMA,
-        )
+        template = N_("{file} has run format {version}, this program knows {known}. Use a newer program")
+        raise NotARunError(template, file=file.filename, version=version, known=schema.SCHEMA)
 
 
 def _check_required(file: h5py.File) -> None:
@@ -121,11 +115,8 @@ def _check_dataset(dataset: h5py.Dataset) -> None:
     if claimed > _SMALL_BYTES and not _grows(dataset):
         room = dataset.id.get_storage_size() * (_GZIP_RATIO_MAX if filters else 1)
         if claimed > room:
-            raise _StructureError(
-                "{dataset} claims {claimed} bytes that the file does not hold",
-                dataset=dataset.name,
-                claimed=claimed,
-            )
+            template = N_("{dataset} claims {claimed} bytes that the file does not hold")
+            raise _StructureError(template, dataset=dataset.name, claimed=claimed)
 
 
 def _grows(dataset: h5py.Dataset) -> bool:
@@ -151,12 +142,8 @@ def _check_columns(file: h5py.File) -> None:
         if not _is_plain(column):
             raise _StructureError("{column} is not a plain column of numbers", column=column.name)
         if is_finished(file) and len(column) != rows:
-            raise _StructureError(
-                "{column} has {length} rows instead of {rows}",
-                column=column.name,
-                length=len(column),
-                rows=rows,
-            )
+            template = N_("{column} has {length} rows instead of {rows}")
+            raise _StructureError(template, column=column.name, length=len(column), rows=rows)
         if rows * column.dtype.itemsize > size:
             raise _StructureError(
                 "{column} claims {rows} rows that the file does not hold", column=column.name, rows=rows

@@ -40,6 +40,7 @@ from app.runs.errors import (
 )
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
+from messages.i18n import N_
 from messages.message import Message
 
 _START_S = 60.0
@@ -101,12 +102,11 @@ class Validator:
                 ) from None
             except queue.Empty:
                 self.stop()
-                raise ValidationTimeoutError(
+                template = N_(
                     "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
-                    " too busy. Try again later",
-                    path=path,
-                    timeout=_REPLY_S,
-                ) from None
+                    " too busy. Try again later"
+                )
+                raise ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
         if reply.summary is None:
             raise _ERRORS[reply.fault](reply.message)
         return reply.summary

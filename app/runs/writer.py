@@ -9,25 +9,18 @@ import os
 import time
 import zlib
 from pathlib import Path
+from typing import NoReturn
 
 import h5py
+import msgspec
 import numpy as np
 
 from app.child_process import CommandReader, EventSender, ignore_session_signals, reserve_stdout
 from app.log import start_log
-from app.runs import schema
+from app.runs import disk, schema
 from app.runs.blocks import BlockLayout, Columns, RunBlock, StoredRun, count_flags
 from app.runs.columns import checksum, store_checksum
 from app.runs.creation import column_paths, create_file
-from app.runs.disk import (
-    MARGIN_BYTES,
-    make_folder,
-    reserve_space,
-    storage_error,
-    sync_file,
-    sync_folder,
-    truncate,
-)
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 from app.runs.fields import fill_fields
 from app.runs.journal import JournalSpan, UnreadableJournalError
@@ -36,6 +29,7 @@ from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.raw_bytes import copy_raw_bytes
 from app.runs.writer_client import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
 from drivers.samples import Losses
+from messages.i18n import N_
 
 _FLUSH_S = 0.1
 """Longest loss of samples in the file by a crash; each flush costs two writes of metadata."""
@@ -50,7 +44,7 @@ def create_run_in(
     identifier: str = "",
 ) -> "RunWriter":
     """Create a run under the next free name in `folder`: `20261121T143205_1FFM0_001.h5`. Raises RunError."""
-    make_folder(folder)
+    disk.make_folder(folder)
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
     stem = f"{began}_{metadata.series}" if metadata.series else began
     for number in range(1, _NAMES_MAX):
@@ -85,7 +79,7 @@ def create_run(
         ) from None
     except (OSError, RuntimeError) as error:
         lock.release()
-        raise storage_error(path, error) from None
+        raise disk.storage_error(path, error) from None
     except BaseException:
         lock.release()
         raise
@@ -104,13 +98,12 @@ def write_run(
         stored = writer.close(end)
         if replace:
             target.replace(path)
-    except OSError as error:
+    except BaseException as error:
         target.unlink(missing_ok=True)
-        raise storage_error(path, error) from None
-    except BaseException:
-        target.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise disk.storage_error(path, error) from None
         raise
-    return StoredRun(str(path), stored.samples, stored.raw_bytes_stored)
+    return msgspec.structs.replace(stored, path=str(path))
 
 
 class RunWriter:
@@ -119,7 +112,7 @@ class RunWriter:
     def __init__(
         self,
         file: h5py.File,
-        column_paths: list[str],
+        paths: list[str],
         layout: BlockLayout,
         lock: FileLock,
         journal: JournalSpan | None,
@@ -131,9 +124,8 @@ class RunWriter:
         self.usable = True
         """False once HDF5 failed: the file then stays as it was flushed last, and must be left alone."""
         self._file = file
-        self._column_paths = column_paths
-        self._columns = [file[path] for path in column_paths]
-        self._checksums = [0] * len(column_paths)
+        self._columns = [file[path] for path in paths]
+        self._checksums = dict.fromkeys(paths, 0)
         self._layout = layout
         self._lock = lock
         self._journal = journal
@@ -170,7 +162,7 @@ class RunWriter:
             self.flushed_samples = self.losses.samples
         except (OSError, RuntimeError) as error:
             self.usable = False
-            raise storage_error(self.path, error) from None
+            raise disk.storage_error(self.path, error) from None
         self._flushed_at = time.monotonic()
 
     def close(self, end: EndMetadata) -> StoredRun:
@@ -178,19 +170,19 @@ class RunWriter:
         try:
             raw_bytes_stored = self._copy_raw_bytes()
             self.flush()
-            for path, value in zip(self._column_paths, self._checksums, strict=True):
+            for path, value in self._checksums.items():
                 store_checksum(self._file, path, value)
             fill_fields(self._file, schema.END_FIELDS, end)
             self._file.flush()
             size = self._file.id.get_filesize()
             self._file.close()
-            truncate(self.path, size)
+            disk.truncate(self.path, size)
             self._verify()
-            sync_file(self.path)
-            sync_folder(self.path.parent)
+            disk.sync_file(self.path)
+            disk.sync_folder(self.path.parent)
         except (OSError, RuntimeError) as error:
             self.usable = False
-            raise storage_error(self.path, error) from None
+            raise disk.storage_error(self.path, error) from None
         finally:
             self._lock.release()
         return StoredRun(str(self.path), self.losses.samples, raw_bytes_stored)
@@ -210,16 +202,18 @@ class RunWriter:
         if not self._pending:
             return
         first = len(self._columns[0])
-        for i, dataset in enumerate(self._columns):
-            column = np.concatenate([columns[i] for columns in self._pending])
+        for path, dataset, blocks in zip(
+            self._checksums, self._columns, zip(*self._pending, strict=True), strict=True
+        ):
+            column = np.concatenate(blocks)
             dataset.resize((first + len(column),))
             dataset[first:] = column
-            self._checksums[i] = zlib.crc32(column.data, self._checksums[i])
+            self._checksums[path] = zlib.crc32(column.data, self._checksums[path])
         self._pending, self._pending_bytes = [], 0
 
     def _reserve(self, upcoming: int) -> None:
         chunks = sum(dataset.chunks[0] * dataset.dtype.itemsize for dataset in self._columns)
-        reserve_space(self.path, self._file.id.get_filesize(), upcoming + chunks + MARGIN_BYTES)
+        disk.reserve_space(self.path, self._file.id.get_filesize(), upcoming + chunks + disk.MARGIN_BYTES)
 
     def _copy_raw_bytes(self) -> bool:
         """Copy the journal's bytes; False without a readable journal or without room for them."""
@@ -234,20 +228,18 @@ class RunWriter:
 
     def _verify(self) -> None:
         """Read the datasets again that the journal is removed for."""
-        expected = dict(zip(self._column_paths, self._checksums, strict=True))
-        expected[schema.WIRE_DATA.path] = self._raw_bytes_checksum
+        expected = self._checksums | {schema.WIRE_DATA.path: self._raw_bytes_checksum}
         with h5py.File(self.path, "r", locking="best-effort") as file:
             for path, value in expected.items():
                 dataset = file[path]
                 is_whole = path == schema.WIRE_DATA.path or len(dataset) == self.losses.samples
                 if not is_whole or checksum(dataset) != value:
                     self.flushed_samples = 0
-                    raise WriteError(
+                    template = N_(
                         "{path}: {dataset} does not read back as written. Check the disk, and run"
-                        " `slipstand recover`: the journal of the run holds all that came",
-                        path=self.path,
-                        dataset=dataset.name,
+                        " `slipstand recover`: the journal of the run holds all that came"
                     )
+                    raise WriteError(template, path=self.path, dataset=dataset.name)
 
 
 _QUEUE_COMMANDS = 64
@@ -274,55 +266,45 @@ class WriterServer:
         """Work until the input ends. After a failure Python must not close the file: HDF5 can hang."""
         try:
             while not self._commands.is_closed:
-                self._step(self._commands.take(_IDLE_S))
+                self._execute(self._commands.take(_IDLE_S))
             self._finish("interrupted", "the program that recorded ended")
-        except Exception as error:
+        except RunError as error:
             self._fail(error)
-            self._replies.close()
-            os._exit(1)
+        except Exception as error:
+            self._fail(WriteError("the run writer failed: {error}", error=error))
         self._replies.close()
 
-    def _step(self, command: WriterCommand | None) -> None:
-        if command is not None:
-            self._execute(command)
-        elif self._writer is not None:
-            self._writer.flush_if_due()
-
-    def _fail(self, error: Exception) -> None:
-        """Close the run if that can be done, and say what went wrong."""
-        told = (
-            error
-            if isinstance(error, RunError)
-            else WriteError("the run writer failed: {error}", error=error)
-        )
+    def _fail(self, error: RunError) -> NoReturn:
+        """Close the run if that can be done, say what went wrong, and end."""
         writer = self._writer
         try:
-            self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(told))
+            self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(error))
         except RunError as second:
-            told = second
-        self._replies.send(failure(told, writer.flushed_samples if writer else 0))
+            error = second
+        self._replies.send(failure(error, writer.flushed_samples if writer else 0))
+        self._replies.close()
+        os._exit(1)
 
-    def _execute(self, message: WriterCommand) -> None:
-        if isinstance(message, OpenRun):
-            self._open(message)
-        elif self._writer is None:
+    def _execute(self, command: WriterCommand | None) -> None:
+        """Execute a command; bring older rows to disk while none comes."""
+        writer = self._writer
+        if isinstance(command, OpenRun):
+            self._finish("interrupted", "another run was begun")
+            self._writer = create_run_in(
+                Path(command.folder), command.metadata, command.layout, command.journal, command.identifier
+            )
+            self._replies.send(Opened(str(self._writer.path)))
+        elif command is None:
+            if writer is not None:
+                writer.flush_if_due()
+        elif writer is None:
             raise WriteError("rows came for the writer before a run was opened. Open one first")
-        elif isinstance(message, RunBlock):
-            self._writer.append(message)
+        elif isinstance(command, RunBlock):
+            writer.append(command)
         else:
-            self._close(self._writer, message)
-
-    def _open(self, request: OpenRun) -> None:
-        self._finish("interrupted", "another run was begun")
-        self._writer = create_run_in(
-            Path(request.folder), request.metadata, request.layout, request.journal, request.identifier
-        )
-        self._replies.send(Opened(str(self._writer.path)))
-
-    def _close(self, writer: RunWriter, ending: EndMetadata) -> None:
-        stored = writer.close(ending)
-        self._writer = None
-        self._replies.send(Closed(stored))
+            stored = writer.close(command)
+            self._writer = None
+            self._replies.send(Closed(stored))
 
     def _finish(self, ended: str, message: str) -> None:
         writer, self._writer = self._writer, None

@@ -25,6 +25,7 @@ from app.runs.errors import (
 )
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, RunMetadata
+from messages.i18n import N_
 from messages.message import Message
 
 _FRAME = struct.Struct("<BI")
@@ -209,10 +210,8 @@ class WriterClient:
         if self._failure:
             raise self._failure
         if not self._child.send(block):
-            raise WriterBehindError(
-                "the disk is too slow: {blocks} blocks wait to be written. Record to a faster disk",
-                blocks=_QUEUE_COMMANDS,
-            )
+            template = N_("the disk is too slow: {blocks} blocks wait to be written. Record to a faster disk")
+            raise WriterBehindError(template, blocks=_QUEUE_COMMANDS)
 
     def close(self, ending: EndMetadata) -> "Future[StoredRun]":
         return self._ask(ending, self._closing)

@@ -21,6 +21,7 @@ import msgspec
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from app.runs.errors import ClusterError, ExtraMissingError, one_line
 from app.version import __version__
+from messages.i18n import N_
 from messages.message import Message, message
 
 Item = TypeVar("Item")
@@ -232,19 +233,15 @@ class DaskExecutor(Executor):
                 fault=one_line(error)[:120],
             ) from None
         if not versions:
-            raise ClusterError(
-                "the cluster at {address} has no workers. Start some: dask worker {address}",
-                address=self._address,
-            )
+            template = N_("the cluster at {address} has no workers. Start some: dask worker {address}")
+            raise ClusterError(template, address=self._address)
         for worker, version in versions.items():
             if version != __version__:
-                raise ClusterError(
+                template = N_(
                     "worker {worker} has Slipstand {version}, here it is {own_version}."
-                    " Install the same version on both",
-                    worker=worker,
-                    version=version,
-                    own_version=__version__,
+                    " Install the same version on both"
                 )
+                raise ClusterError(template, worker=worker, version=version, own_version=__version__)
 
 
 def program_version() -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
+from messages.i18n import N_
 from messages.message import Message, message
 
 
@@ -40,13 +41,8 @@ class ForeignColumns:
 
 def cell_fault(path: Path, row_label: Message, column: str, fault: Message) -> ImportFileError:
     """Error in one cell of a foreign file."""
-    return ImportFileError(
-        "{path}, {row_label}, column {names}: {fault}",
-        path=path,
-        row_label=row_label,
-        names=column,
-        fault=fault,
-    )
+    template = N_("{path}, {row_label}, column {names}: {fault}")
+    return ImportFileError(template, path=path, row_label=row_label, names=column, fault=fault)
 
 
 _OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
@@ -59,12 +55,8 @@ def find_columns(path: Path, wanted: list[str], names: list[str], width: int) ->
         at = _find_column(path, name, names, width)
         if at in found:
             other = _OF_TIME_AND_GAUGES[found.index(at)]
-            raise ImportFileError(
-                "column {name!r} is given for {other} and {one}. Give each its own",
-                name=name,
-                other=other,
-                one=one,
-            )
+            template = N_("column {name!r} is given for {other} and {one}. Give each its own")
+            raise ImportFileError(template, name=name, other=other, one=one)
         found.append(at)
     return found
 
@@ -73,12 +65,8 @@ def _find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
     name = wanted.strip().lstrip("\ufeff")
     count = names.count(name)
     if name and count > 1:
-        raise ImportFileError(
-            "{path} has {count} columns named {name!r}. Give its number, from 0",
-            path=path,
-            count=count,
-            name=name,
-        )
+        template = N_("{path} has {count} columns named {name!r}. Give its number, from 0")
+        raise ImportFileError(template, path=path, count=count, name=name)
     if name and count:
         return names.index(name)
     if name.isdecimal() and int(name) < width:

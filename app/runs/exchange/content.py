@@ -13,6 +13,7 @@ from app.runs.errors import ExtraMissingError
 from app.runs.reader import Run, load_counts
 from app.runs.saved_analyses import Document
 from app.runs.schema import signal_path
+from messages.i18n import N_
 
 COEFFICIENT_COLUMNS = (
     "run", "series", "start_time", "kind", "model", "adequate",
@@ -128,11 +129,8 @@ def import_optional(module: str, for_what: str) -> Any:
         return importlib.import_module(module)
     except ImportError:
         package = module.partition(".")[0]
-        raise ExtraMissingError(
-            "{for_what} needs {package}, which is not installed. Install it: pip install {package}",
-            for_what=for_what,
-            package=package,
-        ) from None
+        template = N_("{for_what} needs {package}, which is not installed. Install it: pip install {package}")
+        raise ExtraMissingError(template, for_what=for_what, package=package) from None
 
 
 def _name(run: Run, gauge: int) -> str:

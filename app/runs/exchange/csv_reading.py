@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
+from messages.i18n import N_
 from messages.message import Message, MessageError, message, option
 
 _SAMPLE_LINES = 20
@@ -122,11 +123,8 @@ def _decoded(path: Path) -> str:
             "{path}: there is no such file. Give the path of a CSV file", path=path
         ) from None
     except OSError as error:
-        raise ImportFileError(
-            "{path}: cannot be read ({strerror}). Give a readable CSV file",
-            path=path,
-            strerror=error.strerror,
-        ) from None
+        template = N_("{path}: cannot be read ({strerror}). Give a readable CSV file")
+        raise ImportFileError(template, path=path, strerror=error.strerror) from None
     encoding = next((name for bom, name in _BOMS.items() if data.startswith(bom)), "")
     if not encoding and b"\0" in data[:4096]:
         raise ImportFileError(
@@ -150,12 +148,8 @@ def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
         if len(found) > _SAMPLE_LINES:
             break
     if not found:
-        raise ImportFileError(
-            "{path} holds no line of data. Give a file with numbers, and check {option} {skip}",
-            path=path,
-            option=option("--skip"),
-            skip=skip,
-        )
+        template = N_("{path} holds no line of data. Give a file with numbers, and check {option} {skip}")
+        raise ImportFileError(template, path=path, option=option("--skip"), skip=skip)
     return comment, found
 
 

@@ -16,6 +16,7 @@ from app.runs.exchange.export_formats import FORMATS, ExportFormat, write_csv_co
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, message_of, option
 
 
@@ -127,12 +128,8 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
     if len(paths) == 1 and not output.is_dir():
         return [output]
     if output.exists() and not output.is_dir():
-        raise UnsuitableRunError(
-            "{output} is a file, but {count} runs need a folder. Choose another {option}",
-            option=option("-o"),
-            output=output,
-            count=len(paths),
-        )
+        template = N_("{output} is a file, but {count} runs need a folder. Choose another {option}")
+        raise UnsuitableRunError(template, option=option("-o"), output=output, count=len(paths))
     output.mkdir(parents=True, exist_ok=True)
     return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
 

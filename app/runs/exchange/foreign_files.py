@@ -15,6 +15,7 @@ from app.runs.errors import ExtraMissingError, ImportFileError, one_line
 from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_reading import CsvOptions, read_columns
+from messages.i18n import N_
 from messages.message import Message, message, option
 
 _LARGEST_BYTES = 4 << 30
@@ -44,11 +45,8 @@ def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise ImportFileError(
-            "{path}: the columns differ in length ({told}). Choose columns of one record",
-            path=path,
-            told=told,
-        )
+        template = N_("{path}: the columns differ in length ({told}). Choose columns of one record")
+        raise ImportFileError(template, path=path, told=told)
     if not any(lengths.values()):
         raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
     values = np.column_stack(list(columns.values()))
@@ -119,12 +117,10 @@ def _open_parquet(path: Path, layout: CsvOptions) -> _Table:
         stored = file.read(columns=[names[at]]).column(names[at])
         values = stored.to_numpy()
         if values.dtype.kind not in "iuf":
-            raise ImportFileError(
-                "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds",
-                path=path,
-                name=names[at],
-                type=stored.type,
+            template = N_(
+                "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds"
             )
+            raise ImportFileError(template, path=path, name=names[at], type=stored.type)
         return np.asarray(values, dtype=np.float64)
 
     return _Table(names, column)
@@ -198,11 +194,8 @@ def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], l
         if rows and all(name.strip() in header for name in layout.wanted):
             return found[-1]
     if not found:
-        raise ImportFileError(
-            "{path} holds no rows. Give a workbook with numbers, and check {option}",
-            path=path,
-            option=option("--skip"),
-        )
+        template = N_("{path} holds no rows. Give a workbook with numbers, and check {option}")
+        raise ImportFileError(template, path=path, option=option("--skip"))
     return found[0]
 
 

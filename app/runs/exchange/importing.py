@@ -30,6 +30,7 @@ from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_meta
 from app.runs.writer import write_run
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
+from messages.i18n import N_
 from messages.message import Message, message, option
 
 Floats = NDArray[np.float64]
@@ -107,23 +108,18 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
             time_unit=plan.time_unit,
         )
     if np.isinf(block.readings).any():
-        raise ImportFileError(
-            "{path}: with {option} {value:g} its readings are too large. Check both",
-            path=path,
-            option=option("--gain"),
-            value=plan.gain or 1.0,
-        )
+        template = N_("{path}: with {option} {value:g} its readings are too large. Check both")
+        raise ImportFileError(template, path=path, option=option("--gain"), value=plan.gain or 1.0)
     return gauge, float(time_s[0]), block
 
 
 def _gauge(plan: CsvImport) -> Gauge:
     """Calibration that turns cells into readings. Raises ImportFileError."""
     if plan.gain is not None and plan.unit is not None:
-        raise ImportFileError(
-            "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them",
-            unit_option=option("--unit"),
-            gain_option=option("--gain"),
+        template = N_(
+            "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them"
         )
+        raise ImportFileError(template, unit_option=option("--unit"), gain_option=option("--gain"))
     if plan.unit_name and plan.gain is None:
         raise ImportFileError(
             "{name_option} {unit_name!r} needs {gain_option}, the {unit_name} of one cell unit",
@@ -144,20 +140,16 @@ def _gauge(plan: CsvImport) -> Gauge:
 
 def _impossible(gain: float, plan: CsvImport) -> Message:
     if not math.isfinite(gain) or gain == 0.0:
-        return message(
-            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge",
-            option=option("--gain"),
-            value=gain,
+        template = N_(
+            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
         )
+        return message(template, option=option("--gain"), value=gain)
     if not math.isfinite(plan.offset):
         return message(
             "{option} {value:g} cannot be. Give a finite number", option=option("--offset"), value=plan.offset
         )
-    return message(
-        "{option} {value} cannot be. Give a finite share of the gain, 0 or above",
-        option=option("--gain-uncertainty"),
-        value=plan.gain_uncertainty,
-    )
+    template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
+    return message(template, option=option("--gain-uncertainty"), value=plan.gain_uncertainty)
 
 
 def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
@@ -192,13 +184,10 @@ def _segment(columns: ForeignColumns, number: int | None) -> slice:
     bounds = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), len(time)]
     count = len(bounds) - 1
     if not 0 <= number < count:
-        raise ImportFileError(
-            "{path}: there is no segment {number}. Its times rise in {count} stretches: give 0 to {count_2}",
-            path=columns.path,
-            number=number,
-            count=count,
-            count_2=count - 1,
+        template = N_(
+            "{path}: there is no segment {number}. Its times rise in {count} stretches: give 0 to {count_2}"
         )
+        raise ImportFileError(template, path=columns.path, number=number, count=count, count_2=count - 1)
     return slice(bounds[number], bounds[number + 1])
 
 

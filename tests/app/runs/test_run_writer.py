@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs import writer as writer_module
+from app.runs import disk
 from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
 from app.runs.journal import MAGIC, JournalSpan, RecordKind, encode_record
@@ -76,7 +76,7 @@ def test_a_full_disk_keeps_what_came_before(tmp_path, metadata, monkeypatch):
         raise DiskFullError("full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(writer_module, "reserve_space", full)
+        patch.setattr(disk, "reserve_space", full)
         with pytest.raises(DiskFullError):
             writer.append(block(100, 100))
     writer.interrupt("disk-full", "no room")
@@ -151,7 +151,7 @@ def test_a_disk_that_forgets_is_noticed_at_close(tmp_path, metadata, monkeypatch
         stored = written.readings[:, 1].tobytes()
         path.write_bytes(data.replace(stored, bytes(len(stored))))
 
-    monkeypatch.setattr(writer_module, "truncate", corrupt)
+    monkeypatch.setattr(disk, "truncate", corrupt)
     with pytest.raises(WriteError, match="relative_displacement does not read back"):
         writer.close(ENDING)
     assert not is_being_recorded(writer.path)
