@@ -37,10 +37,14 @@ def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
     """Append a journal's raw bytes to an open file. Returns their CRC-32. Raises UnreadableJournalError."""
     checksum = 0
     try:
-        for records in _batches(_records(journal)):
+        for records in _batches(journal):
             data = b"".join(record.data for record in records)
             checksum = zlib.crc32(data, checksum)
-            _extend(file, data, records)
+            first = len(file[WIRE_DATA.path])
+            lengths = np.array([len(record.data) for record in records], np.uint64)
+            _append(file[WIRE_DATA.path], np.frombuffer(data, np.uint8))
+            _append(file[WIRE_ARRIVAL.path], np.array([record.arrival_ns for record in records], np.int64))
+            _append(file[WIRE_END.path], np.uint64(first) + np.cumsum(lengths))
     except UnreadableJournalError:
         for column in WIRE_COLUMNS:
             file[column.path].resize((0,))
@@ -55,34 +59,22 @@ def read_raw_bytes(file: h5py.File) -> RawBytes:
     return RawBytes(*(file[column.path][:] for column in WIRE_COLUMNS))
 
 
-def _records(journal: JournalSpan) -> Iterator[JournalRecord]:
+def _batches(journal: JournalSpan) -> Iterator[list[JournalRecord]]:
+    """Received bytes, about a batch at a time. Raises UnreadableJournalError."""
+    batch: list[JournalRecord] = []
+    size = 0
     try:
         for record in read_journal(Path(journal.path), journal.start):
             if record.kind is RecordKind.WIRE:
-                yield record
+                batch.append(record)
+                size += len(record.data)
+            if size >= _BATCH_BYTES:
+                yield batch
+                batch, size = [], 0
     except (OSError, ValueError) as error:
         raise UnreadableJournalError(str(error)) from None
-
-
-def _batches(records: Iterator[JournalRecord]) -> Iterator[list[JournalRecord]]:
-    batch: list[JournalRecord] = []
-    size = 0
-    for record in records:
-        batch.append(record)
-        size += len(record.data)
-        if size >= _BATCH_BYTES:
-            yield batch
-            batch, size = [], 0
     if batch:
         yield batch
-
-
-def _extend(file: h5py.File, data: bytes, records: list[JournalRecord]) -> None:
-    lengths = np.array([len(record.data) for record in records], np.uint64)
-    first = len(file[WIRE_DATA.path])
-    _append(file[WIRE_DATA.path], np.frombuffer(data, np.uint8))
-    _append(file[WIRE_ARRIVAL.path], np.array([record.arrival_ns for record in records], np.int64))
-    _append(file[WIRE_END.path], np.uint64(first) + np.cumsum(lengths))
 
 
 def _append(dataset: h5py.Dataset, values: NDArray[np.generic]) -> None:

@@ -79,34 +79,21 @@ class Validator:
     """Validates files, one after another, for several threads. A file that crashes the process is damaged."""
 
     def __init__(self) -> None:
-        self._child: _Child | None = None
+        self._child: ChildProcess[str, ValidatorEvent] | None = None
+        self._replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
+        self._is_ready = False
         self._turn = threading.Lock()
 
     @classmethod
     def start(cls) -> Self:
         validator = cls()
-        validator._child = _Child()
+        validator._started()
         return validator
 
     def validate(self, path: Path) -> RunSummary:
         """Validate a file as `app.runs.validation` says, and return its summary. Raises RunError."""
         with self._turn:
-            self._child = self._child or _Child()
-            try:
-                reply = self._child.validate(str(path))
-            except _CrashedError:
-                self.stop()
-                raise DamagedRunError(
-                    "{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it",
-                    path=path,
-                ) from None
-            except queue.Empty:
-                self.stop()
-                template = N_(
-                    "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
-                    " too busy. Try again later"
-                )
-                raise ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
+            reply = self._ask(self._started(), path)
         if reply.summary is None:
             raise _ERRORS[reply.fault](reply.message)
         return reply.summary
@@ -116,9 +103,45 @@ class Validator:
         return self._child.pid if self._child else None
 
     def stop(self) -> None:
+        """End the process, which has nothing to lose."""
         if self._child:
-            self._child.stop()
+            self._child.kill()
+            self._child.stop(_STOP_S)
             self._child = None
+
+    def _started(self) -> "ChildProcess[str, ValidatorEvent]":
+        if self._child is None:
+            replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
+            process = spawn("app.runs.validator", discard_stderr=True)  # a crash becomes a fault of the file
+            self._child = ChildProcess(
+                process, encode_line, decode_validator_event, replies.put, lambda _: replies.put(None)
+            )
+            self._replies, self._is_ready = replies, False
+        return self._child
+
+    def _ask(self, child: "ChildProcess[str, ValidatorEvent]", path: Path) -> ValidationReply:
+        if not self._is_ready:
+            with contextlib.suppress(queue.Empty):
+                self._is_ready = isinstance(self._replies.get(timeout=_START_S), ValidatorReady)
+        if not self._is_ready:
+            raise RunError("the process that examines run files does not start. Run `slipstand doctor`")
+        child.send(str(path))
+        try:
+            reply = self._replies.get(timeout=_REPLY_S)
+        except queue.Empty:
+            self.stop()
+            template = N_(
+                "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
+                " too busy. Try again later"
+            )
+            raise ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
+        if not isinstance(reply, ValidationReply):
+            self.stop()
+            template = N_(
+                "{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
+            )
+            raise DamagedRunError(template, path=path)
+        return reply
 
     def __enter__(self) -> Self:
         return self
@@ -146,51 +169,6 @@ def check_validator() -> None:
         except NotARunError:
             return
     raise RunError("a file that is no run was taken for one")
-
-
-class _CrashedError(Exception):
-    """The process ended over a file."""
-
-
-class _Child:
-    """The process; its replies come in the order of the paths."""
-
-    def __init__(self) -> None:
-        self._replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
-        self._child: ChildProcess[str, ValidatorEvent] = ChildProcess(
-            spawn("app.runs.validator", discard_stderr=True),  # a crash becomes a fault of the file
-            encode_line,
-            decode_validator_event,
-            self._replies.put,
-            lambda _: self._replies.put(None),
-        )
-        self._is_ready = False
-
-    @property
-    def pid(self) -> int:
-        return self._child.pid
-
-    def validate(self, path: str) -> ValidationReply:
-        """Return the reply for a path. Raises _CrashedError; queue.Empty where no reply comes."""
-        self._await_start()
-        self._child.send(path)
-        reply = self._replies.get(timeout=_REPLY_S)
-        if not isinstance(reply, ValidationReply):
-            raise _CrashedError
-        return reply
-
-    def _await_start(self) -> None:
-        if self._is_ready:
-            return
-        with contextlib.suppress(queue.Empty):
-            self._is_ready = isinstance(self._replies.get(timeout=_START_S), ValidatorReady)
-        if not self._is_ready:
-            raise RunError("the process that examines run files does not start. Run `slipstand doctor`")
-
-    def stop(self) -> None:
-        """End the process, which has nothing to lose."""
-        self._child.kill()
-        self._child.stop(_STOP_S)
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ from app.runs.writer import write_run
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
 from messages.i18n import N_
-from messages.message import Message, message, option
+from messages.message import message, option
 
 Floats = NDArray[np.float64]
 _TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -73,10 +73,12 @@ def import_csv(
     `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
     """
     gauge, start_s, block = read_record(path, plan)
+    # The nearest to the time of the test that a foreign file tells.
+    changed = datetime.datetime.fromtimestamp(path.stat().st_mtime).astimezone()
     metadata = create_metadata(
         stand,
         Gauges(table=gauge, relative=gauge.replace(measures=plan.measures)),
-        _changed(path),
+        changed,
         device=DeviceIdentity(protocol="import", name=path.name),
         rate_hz=even_rate_hz(block.time_s),
         quantity=plan.quantity,
@@ -84,7 +86,12 @@ def import_csv(
         source=f"imported from {path.name}, time 0 is its {start_s!r} s",
         **facts,
     )
-    return write_run(output, metadata, block, _ending(block, metadata.start_time), replace=replace)
+    ending = EndMetadata(
+        ended="imported",
+        end_time=changed + datetime.timedelta(seconds=float(block.time_s[-1])),
+        losses=Losses(samples=len(block), missing=int(np.count_nonzero(block.status))),
+    )
+    return write_run(output, metadata, block, ending, replace=replace)
 
 
 def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
@@ -128,28 +135,24 @@ def _gauge(plan: CsvImport) -> Gauge:
             unit_name=plan.unit_name,
         )
     gain = _LENGTH_UNITS_M[plan.unit or "m"] if plan.gain is None else plan.gain
+    if not math.isfinite(gain) or gain == 0.0:
+        template = N_(
+            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
+        )
+        raise ImportFileError(template, option=option("--gain"), value=gain)
+    if not math.isfinite(plan.offset / gain):
+        template = N_("{option} {value:g} cannot be. Give a finite number")
+        raise ImportFileError(template, option=option("--offset"), value=plan.offset)
     try:
         return Gauge(
             gain_m_per_count=gain,
             zero_count=-plan.offset / gain if plan.offset else 0.0,
             gain_relative_standard_uncertainty=plan.gain_uncertainty,
         )
-    except (ValueError, ZeroDivisionError):
-        raise ImportFileError(_impossible(gain, plan)) from None
-
-
-def _impossible(gain: float, plan: CsvImport) -> Message:
-    if not math.isfinite(gain) or gain == 0.0:
-        template = N_(
-            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
-        )
-        return message(template, option=option("--gain"), value=gain)
-    if not math.isfinite(plan.offset):
-        return message(
-            "{option} {value:g} cannot be. Give a finite number", option=option("--offset"), value=plan.offset
-        )
-    template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
-    return message(template, option=option("--gain-uncertainty"), value=plan.gain_uncertainty)
+    except ValueError:
+        template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
+        value = plan.gain_uncertainty
+        raise ImportFileError(template, option=option("--gain-uncertainty"), value=value) from None
 
 
 def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
@@ -226,20 +229,6 @@ def even_rate_hz(time_s: Floats) -> float | None:
         return None
     middling = float(np.median(steps))
     return 1.0 / middling if np.all(np.abs(steps - middling) <= _EVEN * middling) else None
-
-
-def _changed(path: Path) -> datetime.datetime:
-    """When the file was last changed: the nearest to the time of the test that a CSV file tells."""
-    return datetime.datetime.fromtimestamp(path.stat().st_mtime).astimezone()
-
-
-def _ending(block: RunBlock, start: datetime.datetime) -> EndMetadata:
-    missing = int(np.count_nonzero(block.status))
-    return EndMetadata(
-        ended="imported",
-        end_time=start + datetime.timedelta(seconds=float(block.time_s[-1])),
-        losses=Losses(samples=len(block), missing=missing),
-    )
 
 
 _LINES = 8
