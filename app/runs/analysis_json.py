@@ -3,7 +3,7 @@
 import datetime
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -11,13 +11,14 @@ import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
 from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
-from analysis.record import Record
+from analysis.record import Record, StandMasses
+from messages.i18n import N_
 from messages.message import Message, joined, message
 
 if TYPE_CHECKING:
     from analysis.classical_estimates import ClassicalEstimates
     from app.runs.metadata import EndMetadata, RunMetadata
-    from config.schema import GaugeCheck, Gauges
+    from config.schema import Gauge, GaugeCheck, Gauges
 
 _OFF = 3.0
 """The plain log decrement is called biased so many standard uncertainties off the fitted one."""
@@ -27,7 +28,6 @@ _ZERO_MOVED_M = 50e-6
 _SWING_READINGS = 10
 """In the last two periods, over which the swing is averaged; fewer tell nothing of its middle."""
 _GAUGE_NAMES = {"table": "gauge 1 (table)", "relative": "gauge 2 (relative)"}
-_MASSES = ("table_mass_kg", "plate_mass_kg")
 
 
 def classical_document(checks: "ClassicalEstimates", result: Identification) -> dict[str, Any]:
@@ -141,76 +141,61 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def mass_warnings(metadata: "RunMetadata", given: dict[str, float | None]) -> list[ResultWarning]:
+def mass_warnings(metadata: "RunMetadata", used: StandMasses) -> Iterator[ResultWarning]:
     """Say which masses were used where they are not those of the run."""
-    other = {
-        name: value
-        for name in _MASSES
-        if (value := given.get(name)) is not None and value != getattr(metadata, name)
-    }
-    if not other:
-        return []
+    template = N_("{body} mass {mass_kg:g} kg as given, not {run_mass_kg:g} kg as in the run")
     masses = [
-        message(
-            "{body} mass {mass_kg:g} kg as given, not {run_mass_kg:g} kg as in the run",
-            body=message(name.removesuffix("_mass_kg")),
-            mass_kg=value,
-            run_mass_kg=getattr(metadata, name),
+        message(template, body=message(body), mass_kg=mass_kg, run_mass_kg=of_run)
+        for body, mass_kg, of_run in (
+            ("table", used.table_mass_kg, metadata.table_mass_kg),
+            ("plate", used.plate_mass_kg, metadata.plate_mass_kg),
         )
-        for name, value in other.items()
+        if mass_kg != of_run
     ]
-    return [ResultWarning("masses-given", message("analysed with {masses}.", masses=joined(masses, " and ")))]
+    if masses:
+        text = message("analysed with {masses}.", masses=joined(masses, " and "))
+        yield ResultWarning("masses-given", text)
 
 
-def calibration_warnings(gauges: "Gauges", day: datetime.date) -> list[ResultWarning]:
+def calibration_warnings(gauges: "Gauges", day: datetime.date) -> Iterator[ResultWarning]:
     """Say which gauges' calibrations had expired on the day of a run."""
-    named = ((said, getattr(gauges, name)) for name, said in _GAUGE_NAMES.items())
-    return [
-        ResultWarning(
-            "calibration-expired",
-            message(
-                "the calibration of {gauge} was valid until {valid_until}, the run is of {day}. Calibrate"
-                " it again: slipstand calibrate",
-                gauge=message(name),
-                valid_until=gauge.valid_until,
-                day=day,
-            ),
-        )
-        for name, gauge in named
-        if gauge.is_expired(day)
-    ]
+    template = N_(
+        "the calibration of {gauge} was valid until {valid_until}, the run is of {day}. Calibrate"
+        " it again: slipstand calibrate"
+    )
+    for name, said in _GAUGE_NAMES.items():
+        gauge: Gauge = getattr(gauges, name)
+        if gauge.is_expired(day):
+            text = message(template, gauge=message(said), valid_until=gauge.valid_until, day=day)
+            yield ResultWarning("calibration-expired", text)
 
 
 def zero_warnings(
     ending: "EndMetadata | None", record: Record, result: Identification
-) -> list[ResultWarning]:
+) -> Iterator[ResultWarning]:
     """Say where the table swings about another place than that where it rested before the pull."""
     period, begins_s = result.results.get("period_s"), result.events.slip_end_s or result.events.release_s
     if ending is None or ending.zero_m is None or ending.held_m is None or period is None:
-        return []
+        return
     last = record.time_s[record.time_s > record.time_s[-1] - 2.0 * period.value / record.clock_scale]
     if result.curves is None or len(last) < _SWING_READINGS or begins_s is None or last[0] < begins_s:
-        return []
+        return
     swing_m = result.curves(last).table_displacement_m
     moved_m = float(np.average(swing_m, weights=np.hanning(len(last)))) - ending.zero_m
-    pulled_m = abs(ending.held_m - ending.zero_m)
-    if abs(moved_m) <= max(_ZERO_MOVED * pulled_m, _ZERO_MOVED_M):
-        return []
-    text = message(
-        "the table swings about a place {moved_m:+.0f} um from where it rested before the pull:"
-        " gauge 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the"
-        " swing alone.",
-        moved_m=moved_m * 1e6,
-    )
-    return [ResultWarning("zero-moved", text)]
+    if abs(moved_m) > max(_ZERO_MOVED * abs(ending.held_m - ending.zero_m), _ZERO_MOVED_M):
+        template = N_(
+            "the table swings about a place {moved_m:+.0f} um from where it rested before the pull:"
+            " gauge 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the"
+            " swing alone."
+        )
+        yield ResultWarning("zero-moved", message(template, moved_m=moved_m * 1e6))
 
 
-def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
+def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> Iterator[ResultWarning]:
     """Say which gauges did not pass the last check before a run."""
-    return [
-        ResultWarning(
-            "gauge-check-failed",
-            message(
+    for check in checks:
+        if not check.passed:
+            text = message(
                 "{gauge} was {deviation_m:+.0f} um off at {expected_m:g} mm in its last check"
                 " ({at}), where {tolerance_m:.0f} um are allowed. Calibrate it again:"
                 " slipstand calibrate",
@@ -219,11 +204,8 @@ def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning
                 expected_m=check.expected_m * 1e3,
                 at=f"{check.at:%Y-%m-%d %H:%M}",
                 tolerance_m=check.tolerance_m * 1e6,
-            ),
-        )
-        for check in checks
-        if not check.passed
-    ]
+            )
+            yield ResultWarning("gauge-check-failed", text)
 
 
 def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
@@ -233,7 +215,8 @@ def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
         own = checks.log_decrement_uncertainty or 0.0
         away = checks.log_decrement - fitted.value
         if abs(away) > _OFF * (own**2 + fitted.standard_uncertainty**2) ** 0.5:
-            cause = "dry friction in the stand" if _bends(result) else "noise or an offset"
+            bends = any(caution.code == "tail-not-exponential" for caution in result.warnings)
+            cause = "dry friction in the stand" if bends else "noise or an offset"
             notes.append(
                 f"the plain log decrement is {away / fitted.value:+.1%} off the fitted one: {cause} biases it"
             )
@@ -243,10 +226,6 @@ def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
     if count == 0 and "residual_displacement_m" in result.results:
         notes.append("no f_d from 0.03 to 0.3 gives the measured residual displacement")
     return notes
-
-
-def _bends(result: Identification) -> bool:
-    return any(caution.code == "tail-not-exponential" for caution in result.warnings)
 
 
 def _difference(budget: Quantity, drawn: Quantity) -> float:

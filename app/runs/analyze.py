@@ -13,16 +13,8 @@ from analysis.identify import identify
 from analysis.one_mass.identify import identify_one_mass
 from analysis.quantities import Quantity
 from analysis.record import Record
+from app.runs import analysis_json
 from app.runs.analysis_input import to_record
-from app.runs.analysis_json import (
-    calibration_warnings,
-    classical_document,
-    gauge_check_warnings,
-    mass_warnings,
-    monte_carlo_document,
-    one_mass_document,
-    zero_warnings,
-)
 from app.runs.errors import MetadataError
 from app.runs.metadata import QUANTITY_UNITS
 from app.runs.reader import Run, open_run
@@ -90,36 +82,39 @@ def analyze_run(
         identification = identify(
             record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
         )
-    identification.warnings.extend(mass_warnings(run.metadata, msgspec.to_builtins(request)))
-    identification.warnings.extend(calibration_warnings(run.metadata.gauges, run.metadata.start_time.date()))
-    identification.warnings.extend(gauge_check_warnings(run.metadata.gauge_checks))
-    if request.kind == "two-mass":
-        identification.warnings.extend(zero_warnings(run.end, record, identification))
+    metadata = run.metadata
+    identification.warnings.extend(
+        [
+            *analysis_json.mass_warnings(metadata, record.masses),
+            *analysis_json.calibration_warnings(metadata.gauges, metadata.start_time.date()),
+            *analysis_json.gauge_check_warnings(metadata.gauge_checks),
+            *(
+                analysis_json.zero_warnings(run.end, record, identification)
+                if request.kind == "two-mass"
+                else ()
+            ),
+        ]
+    )
     losses = run.end.losses if run.end else Losses(samples=len(run))
-    document = analysis_document(path, run.metadata.series, losses, identification)
-    document |= _beside(record, request, identification)
+    document = analysis_document(path, metadata.series, losses, identification)
+    if request.classical:
+        document["classical"] = _classical(record, identification)
+    if identification.monte_carlo is not None:
+        document["monte_carlo"] = analysis_json.monte_carlo_document(
+            identification.monte_carlo, identification.results
+        )
     number = None
     if save:
         number = save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
     return Analysis(run, record, identification, document, number)
 
 
-def _beside(record: Record, request: AnalysisRequest, result: Identification) -> Document:
-    """What stands beside the results: classical figures, and the comparison with Monte Carlo if asked for."""
-    beside: Document = {}
-    if request.classical:
-        beside["classical"] = _classical(record, result)
-    if result.monte_carlo is not None:
-        beside["monte_carlo"] = monte_carlo_document(result.monte_carlo, result.results)
-    return beside
-
-
 def _classical(record: Record, result: Identification) -> Document | None:
     if result.kind == "one-mass":
-        return one_mass_document(result)
+        return analysis_json.one_mass_document(result)
     if "friction_dynamic" not in result.parameters:
         return None
-    return classical_document(estimate_classically(record, result), result)
+    return analysis_json.classical_document(estimate_classically(record, result), result)
 
 
 def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:
