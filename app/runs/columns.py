@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 from numpy.typing import NDArray
 
 from app.runs import schema
@@ -55,16 +54,6 @@ def checksum(dataset: h5py.Dataset) -> int:
     for first in range(0, len(dataset), _ROWS_AT_ONCE):
         value = zlib.crc32(dataset[first : first + _ROWS_AT_ONCE].data, value)
     return value
-
-
-def reserve_checksum(file: h5py.File, column: str) -> None:
-    """Make room for the checksum of a column, which is known when the run is closed."""
-    file.create_dataset(schema.checksum_path(column), data=np.uint32(0))
-
-
-def store_checksum(file: h5py.File, column: str, value: int) -> None:
-    """Fill the room."""
-    file[schema.checksum_path(column)][()] = value
 
 
 def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:

@@ -18,7 +18,6 @@ import numpy as np
 
 from app.runs import schema
 from app.runs.blocks import BlockLayout
-from app.runs.columns import reserve_checksum
 from app.runs.disk import MARGIN_BYTES, check_free_space, reserve_space, storage_error
 from app.runs.errors import RunError
 from app.runs.fields import make_group, reserve_fields
@@ -106,7 +105,7 @@ def create_template(
     reserve_fields(file, schema.END_FIELDS)
     file.create_dataset(schema.STORED, data=0, dtype="uint64")
     for path in column_paths(metadata, layout):
-        reserve_checksum(file, path)
+        file.create_dataset(schema.checksum_path(path), data=np.uint32(0))
 
 
 def check_folder(folder: Path) -> None:

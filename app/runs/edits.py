@@ -1,6 +1,7 @@
 """Edits of a run's metadata: each is added to the history, none takes anything away."""
 
 import datetime
+import functools
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,6 @@ import msgspec
 
 from app.runs.errors import MetadataError, UnsuitableRunError
 from app.runs.fields import encode_text
-from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import (
     EDITABLE,
     Change,
@@ -44,28 +44,16 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Ch
 
     def back(file: h5py.File) -> Change:
         changes = read_changes(file)
-        number = _last_undoable(changes, fields)
-        if number is None:
+        numbers = [i for i in _undoable(changes) if not changes[i].fields.keys().isdisjoint(fields)]
+        if not numbers:
             raise UnsuitableRunError("{path}: there is no edit to undo. It is as it was recorded", path=path)
-        before = apply_changes(read_recorded_metadata(file), changes[:number])
+        number = numbers[-1]
+        before = functools.reduce(apply_change, changes[:number], read_recorded_metadata(file))
         since = {name for i in _undoable(changes) if i > number for name in changes[i].fields}
         old = {name: getattr(before, name) for name in changes[number].fields if name not in since}
         return Change(_now(), author, msgspec.to_builtins(old), undoes=number)
 
     return _append(path, back)
-
-
-def apply_changes(original: RunMetadata, changes: Sequence[Change]) -> RunMetadata:
-    """Metadata with changes applied one after another. Raises ValueError."""
-    for change in changes:
-        original = apply_change(original, change)
-    return original
-
-
-def _last_undoable(changes: Sequence[Change], fields: Collection[str]) -> int | None:
-    """Number of the last edit of one of these fields that can be undone; None where there is none."""
-    of_them = (i for i in reversed(_undoable(changes)) if not changes[i].fields.keys().isdisjoint(fields))
-    return next(of_them, None)
 
 
 def _undoable(changes: Sequence[Change]) -> list[int]:

@@ -1,6 +1,7 @@
 """Metadata of a run to and from the groups of its file, and the history of edits."""
 
 import datetime
+import functools
 import uuid
 from typing import Any
 
@@ -60,13 +61,10 @@ def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "")
 def read_metadata(file: h5py.File) -> RunMetadata:
     """Read the metadata of a run with all edits applied. Raises DamagedRunError."""
     try:
-        metadata = read_recorded_metadata(file)
-        for change in read_changes(file):
-            metadata = apply_change(metadata, change)
+        return functools.reduce(apply_change, read_changes(file), read_recorded_metadata(file))
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         template = N_("{file}: its metadata cannot be read ({fault}). Restore a good copy")
         raise DamagedRunError(template, file=file.filename, fault=one_line(error)) from None
-    return metadata
 
 
 def read_recorded_metadata(file: h5py.File) -> RunMetadata:

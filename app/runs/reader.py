@@ -107,19 +107,14 @@ def load_raw_bytes(run: Run) -> RawBytes:
 
 def compute_fingerprint(path: Path) -> Fingerprint:
     """Compute the fingerprint of a validated run file. Raises RunError."""
-    sha256, size = file_sha256(path)
-    identifier, columns = read_file(path, lambda file: (read_identifier(file), _stored_checksums(file)))
-    return Fingerprint(path.name, size, sha256, identifier, columns)
-
-
-def file_sha256(path: Path) -> tuple[str, int]:
-    """SHA-256 of a file, hexadecimal, and its size in bytes. Raises RunNotFoundError."""
     try:
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256")
-            return digest.hexdigest(), file.tell()
+        with path.open("rb") as opened:
+            sha256 = hashlib.file_digest(opened, "sha256").hexdigest()
+            size = opened.tell()
     except OSError as error:
         raise unreadable(path, error) from None
+    identifier, columns = read_file(path, lambda file: (read_identifier(file), _stored_checksums(file)))
+    return Fingerprint(path.name, size, sha256, identifier, columns)
 
 
 def validate_and_read(

@@ -19,7 +19,7 @@ from app.child_process import CommandReader, EventSender, ignore_session_signals
 from app.log import start_log
 from app.runs import disk, schema
 from app.runs.blocks import BlockLayout, Columns, RunBlock, StoredRun, count_flags
-from app.runs.columns import checksum, store_checksum
+from app.runs.columns import checksum
 from app.runs.creation import column_paths, create_file
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 from app.runs.fields import fill_fields
@@ -171,7 +171,7 @@ class RunWriter:
             raw_bytes_stored = self._copy_raw_bytes()
             self.flush()
             for path, value in self._checksums.items():
-                store_checksum(self._file, path, value)
+                self._file[schema.checksum_path(path)][()] = value
             fill_fields(self._file, schema.END_FIELDS, end)
             self._file.flush()
             size = self._file.id.get_filesize()

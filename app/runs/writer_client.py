@@ -136,13 +136,6 @@ def failure(error: RunError, samples: int = 0) -> Failed:
     return Failed(reasons[0] if reasons else "write-error", error.message, samples)
 
 
-def error_of(failed: Failed) -> RunError:
-    """Error of a reply."""
-    error = ERRORS.get(failed.reason, WriteError)(failed.message)
-    error.stored_samples = failed.samples
-    return error
-
-
 def _frame(kind: int, payload: bytes) -> bytes:
     return _FRAME.pack(kind, len(payload)) + payload
 
@@ -249,7 +242,9 @@ class WriterClient:
 
     def _on_reply(self, reply: Reply) -> None:
         if isinstance(reply, Failed):
-            self._fail(error_of(reply))
+            error = ERRORS.get(reply.reason, WriteError)(reply.message)
+            error.stored_samples = reply.samples
+            self._fail(error)
         elif isinstance(reply, Opened):
             self._settle(self._opening, Path(reply.path))
         else:

@@ -56,71 +56,37 @@ def sample_columns(run: Run) -> tuple[SampleColumn, ...]:
     Named as `time_s`, `table_displacement_m`, `plate_velocity_m_per_s`, `status`, `table_count`.
     """
     unit = run.metadata.unit
-    readings = (
-        [run.table_reading] if run.relative_reading is None else [run.table_reading, run.relative_reading]
-    )
+    readings = [values for values in (run.table_reading, run.relative_reading) if values is not None]
     columns = [SampleColumn("time_s", run.time_s, "s")]
     columns += [SampleColumn(_name(run, gauge), values, unit) for gauge, values in enumerate(readings)]
     columns.append(SampleColumn("status", run.status, "1"))
     counts = load_counts(run)
     if counts is not None:
-        names = ("table_count", "relative_count")
-        columns += [
-            SampleColumn(names[i], np.ascontiguousarray(counts[:, i]), "count")
-            for i in range(counts.shape[1])
-        ]
+        named = zip(("table_count", "relative_count"), counts.T, strict=False)
+        columns += [SampleColumn(name, np.ascontiguousarray(values), "count") for name, values in named]
     return tuple(columns)
 
 
-def coefficient_rows(exported: ExportedRun) -> Iterator[tuple[Any, ...]]:
-    """Rows of `COEFFICIENT_COLUMNS`: numbers under `value`, words under `label`, None where absent."""
-    analysis = exported.analysis
-    if analysis is None:
-        return
-    metadata = exported.run.metadata
-    model = analysis["model"] or {}
-    about = (
-        exported.name,
-        metadata.series,
-        metadata.start_time.isoformat(),
-        analysis["kind"],
-        model.get("name"),
-        model.get("adequate"),
-    )
-    for quantity, result in analysis["results"].items():
-        if isinstance(result, dict):
-            low, high = result["interval_95"] or (None, None)
-            numbers: tuple[Any, ...] = (
-                result["value"],
-                result["standard_uncertainty"],
-                low,
-                high,
-                result["unit"],
-                None,
-            )
-        else:
-            numbers = (None, None, None, None, None, str(result))
-        yield (*about, quantity, *numbers)
-
-
-def coefficient_documents(runs: Iterable[ExportedRun]) -> list[dict[str, Any]]:
-    """Rows of `coefficient_rows` of several runs, as dicts by column."""
-    return [
-        dict(zip(COEFFICIENT_COLUMNS, row, strict=True))
-        for exported in runs
-        for row in coefficient_rows(exported)
-    ]
+def coefficient_rows(runs: Iterable[ExportedRun]) -> Iterator[dict[str, Any]]:
+    """A row a quantity, with `COEFFICIENT_COLUMNS`: words stand under `label`; None where absent."""
+    for exported in runs:
+        metadata, analysis = exported.run.metadata, exported.analysis or {"results": {}}
+        for quantity, result in analysis["results"].items():
+            numbers, model = result if isinstance(result, dict) else {}, analysis["model"] or {}
+            low, high = numbers.get("interval_95") or (None, None)
+            row = (
+                exported.name, metadata.series, metadata.start_time.isoformat(), analysis["kind"],
+                model.get("name"), model.get("adequate"), quantity,
+                numbers.get("value"), numbers.get("standard_uncertainty"), low, high, numbers.get("unit"),
+                None if numbers else str(result),
+            )  # fmt: skip
+            yield dict(zip(COEFFICIENT_COLUMNS, row, strict=True))
 
 
 def run_metadata_document(run: Run) -> dict[str, Any]:
     """Everything that a run carries beside its samples, as plain JSON values."""
-    ending = None if run.end is None else msgspec.to_builtins(run.end)
-    return {
-        "identifier": run.identifier,
-        "metadata": msgspec.to_builtins(run.metadata),
-        "ending": ending,
-        "changes": msgspec.to_builtins(list(run.changes)),
-    }
+    facts = {"metadata": run.metadata, "ending": run.end, "changes": run.changes}
+    return {"identifier": run.identifier} | {name: msgspec.to_builtins(fact) for name, fact in facts.items()}
 
 
 def import_optional(module: str, for_what: str) -> Any:

@@ -19,7 +19,6 @@ from app.runs.exchange.content import (
     COEFFICIENT_COLUMNS,
     ExportedRun,
     SampleColumn,
-    coefficient_documents,
     coefficient_rows,
     import_optional,
     run_metadata_document,
@@ -50,8 +49,7 @@ def write_csv_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     with path.open("x", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COEFFICIENT_COLUMNS)
-        for exported in runs:
-            writer.writerows([csv_cell(value) for value in row] for row in coefficient_rows(exported))
+        writer.writerows([csv_cell(value) for value in row.values()] for row in coefficient_rows(runs))
 
 
 def csv_cell(value: Any) -> str:
@@ -86,7 +84,7 @@ def _write_json_run(exported: ExportedRun, path: Path) -> None:
 
 
 def _write_json_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    rows = coefficient_documents(runs)
+    rows = list(coefficient_rows(runs))
     _write_json(path, {"schema": "slipstand-coefficients/1", "coefficients": rows})
 
 
@@ -115,7 +113,7 @@ def _write_parquet_coefficients(runs: Iterable[ExportedRun], path: Path) -> None
     numbers = ("value", "standard_uncertainty", "interval_95_low", "interval_95_high")
     kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string()) | dict.fromkeys(numbers, pa.float64())
     schema = pa.schema(list((kinds | {"adequate": pa.bool_()}).items()))
-    _write_parquet(pa.Table.from_pylist(coefficient_documents(runs), schema=schema), path)
+    _write_parquet(pa.Table.from_pylist(list(coefficient_rows(runs)), schema=schema), path)
 
 
 def _write_parquet(table: Any, path: Path) -> None:
@@ -141,7 +139,7 @@ def _write_mat_run(exported: ExportedRun, path: Path) -> None:
 
 def _write_mat_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     """The struct array `coefficients`, one element a quantity of a run."""
-    _write_mat({"coefficients": [_mat_value(row) for row in coefficient_documents(runs)]}, path)
+    _write_mat({"coefficients": [_mat_value(row) for row in coefficient_rows(runs)]}, path)
 
 
 def _write_mat(variables: dict[str, Any], path: Path) -> None:
@@ -167,7 +165,7 @@ def _mat_name(key: str) -> str:
 
 # --- Excel -------------------------------------------------------------------------------
 
-Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
+Sheet = tuple[Sequence[str], Iterable[Iterable[Any]]]
 """Header and rows."""
 
 _SHEET_ROWS = 1_048_576
@@ -188,7 +186,7 @@ def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
         )
     samples = zip(*(column.values.tolist() for column in exported.samples), strict=True)
     sheets: dict[str, Sheet] = {
-        "Coefficients": (COEFFICIENT_COLUMNS, coefficient_rows(exported)),
+        "Coefficients": (COEFFICIENT_COLUMNS, (row.values() for row in coefficient_rows([exported]))),
         "Samples": ([column.name for column in exported.samples], samples),
         "Run": (("fact", "value"), _flat_facts("", run_metadata_document(exported.run))),
     }
@@ -196,7 +194,7 @@ def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
 
 
 def _write_xlsx_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    rows = (row for exported in runs for row in coefficient_rows(exported))
+    rows = (row.values() for row in coefficient_rows(runs))
     write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path)
 
 

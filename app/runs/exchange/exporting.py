@@ -76,12 +76,13 @@ class ExportOutcome(msgspec.Struct, frozen=True):
     """What was left out, and why."""
 
 
-def _load(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, Message]:
+def _load(path: Path, request: ExportRequest, validator: Validator) -> tuple[ExportedRun, Message]:
     """Read a run with its newest valid or new coefficients, or why there are none beside samples.
 
     Raises RunError, AnalysisError (coefficients alone are wanted, and there are none).
     """
     run = open_run(path, validator=validator)
+    content: Content = "coefficients" if request.is_one_file else request.content
     samples = () if content == "coefficients" else sample_columns(run)
     if content == "samples":
         return ExportedRun(run, None, samples), EMPTY
@@ -113,15 +114,26 @@ def export_runs(
         raise UnsuitableRunError(
             "{format} holds coefficients, not samples. Choose csv, json or parquet", format=request.format
         )
+    targets = [output] * len(paths) if request.is_one_file else _targets(paths, output, request)
+    gathered: list[ExportedRun] = []
+    outcomes = []
     with Validator.start() as validator:
-        if request.is_one_file:
-            return _into_one(paths, output, request, validator, progress)
-        targets = _targets(paths, output, request)
-        outcomes = []
         for done, (path, target) in enumerate(zip(paths, targets, strict=True)):
             progress(done, path.name)
-            outcomes.append(_export_one(path, target, request, validator))
-        return outcomes
+            try:
+                exported, note = _load(path, request, validator)
+                files = [output.absolute()]
+                if request.is_one_file:
+                    gathered.append(exported)
+                else:
+                    files = write_exported_run(request.format, exported, target, replace=request.replace)
+                outcomes.append(ExportOutcome(str(path.absolute()), list(map(str, files)), note=note))
+            except (RunError, AnalysisError) as error:
+                outcomes.append(ExportOutcome(str(path.absolute()), error=message_of(error)))
+    if gathered and request.writer.write_coefficients is not None:
+        with atomic_write(output.absolute(), replace=request.replace) as made:
+            request.writer.write_coefficients(gathered, made)
+    return outcomes
 
 
 def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> list[Path]:
@@ -132,35 +144,6 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
         raise UnsuitableRunError(template, option=option("-o"), output=output, count=len(paths))
     output.mkdir(parents=True, exist_ok=True)
     return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
-
-
-def _export_one(path: Path, target: Path, request: ExportRequest, validator: Validator) -> ExportOutcome:
-    name = str(path.absolute())
-    try:
-        exported, note = _load(path, request.content, validator)
-        files = write_exported_run(request.format, exported, target, replace=request.replace)
-    except RunError as error:
-        return ExportOutcome(name, error=error.message)
-    return ExportOutcome(name, list(map(str, files)), note=note)
-
-
-def _into_one(
-    paths: Sequence[Path], output: Path, request: ExportRequest, validator: Validator, progress: Progress
-) -> list[ExportOutcome]:
-    found: list[ExportedRun] = []
-    outcomes = []
-    for done, path in enumerate(paths):
-        progress(done, path.name)
-        try:
-            found.append(_load(path, "coefficients", validator)[0])
-            outcomes.append(ExportOutcome(str(path.absolute()), [str(output.absolute())]))
-        except (RunError, AnalysisError) as error:
-            outcomes.append(ExportOutcome(str(path.absolute()), error=message_of(error)))
-    write = request.writer.write_coefficients
-    if found and write is not None:
-        with atomic_write(output.absolute(), replace=request.replace) as made:
-            write(found, made)
-    return outcomes
 
 
 def _document(run: Run) -> dict[str, object]:
