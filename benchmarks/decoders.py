@@ -31,7 +31,7 @@ from drivers.envelope import wrap
 from drivers.pair.source import make_pair
 from drivers.registry import find_driver
 from drivers.samples import SampleBlock
-from drivers.stream import Decoder
+from drivers.source import Decoder
 
 RATE_HZ = 2000.0
 FEEDER = "import sys; sys.stdout.buffer.write(sys.stdin.buffer.read())"

@@ -34,7 +34,8 @@ _MAX_BYTES = 1 << 18
 _ANSWER_S = 0.4
 """How long an answer is waited for; serial devices answer within 100 ms."""
 
-_BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
+_USUAL_BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
+_BAUDS = dict.fromkeys((*_USUAL_BAUDS, *(driver.default_baud for driver in AVAILABLE if driver.default_baud)))
 _BAUDS_WITH_PARITY = (115200, 9600, 19200, 38400, 57600)
 COMMON_LINE_SETTINGS = (
     *(LineSettings(baud) for baud in _BAUDS),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.registry import AVAILABLE
-from drivers.stream import Decoder
+from drivers.source import Decoder
 
 RATE_HZ = 1000.0
 Counts = NDArray[np.int32]
