@@ -263,12 +263,9 @@ class Settings(_Checked, frozen=True):
     language: Literal["system", "en", "ru"] = "system"
     scale: float = 1.0
     """Of all that is shown, on top of the system's own scaling."""
-    recordings: str = ""
-    """Folder of the runs; empty for the usual one."""
-    operator: str = ""
-    """Who records, unless a run names another operator."""
-    sounds: bool = False
-    """Whether each state of a pullback has a sound."""
+    recordings: str = ""  # folder of the runs; empty for the usual one
+    operator: str = ""  # who records, unless a run names another operator
+    sounds: bool = False  # whether each state of a pullback has a sound
     log_level: Literal["error", "warning", "info", "debug"] = "info"
 
     def __post_init__(self) -> None:

@@ -13,5 +13,4 @@ Flags: TypeAlias = NDArray[np.bool_]
 Counts: TypeAlias = Int32s | Floats
 Records: TypeAlias = NDArray[np.void]
 """A structured array."""
-Record: TypeAlias = Any
-"""One element of a structured array inside compiled code, its fields as attributes."""
+Record: TypeAlias = Any  # one element of a structured array inside compiled code, its fields as attributes

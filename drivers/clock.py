@@ -57,10 +57,8 @@ def rate_from_steps(steps_s: Floats, resolution_s: float = 0.0) -> float | None:
 class ClockEstimate:
     """The device's clock compared with the host's."""
 
-    rate_hz: float
-    """Samples a second of the host's clock."""
-    scale: float
-    """True over nominal time: index / nominal rate is to be multiplied by it."""
+    rate_hz: float  # samples a second of the host's clock
+    scale: float  # true over nominal time: index / nominal rate is to be multiplied by it
     scale_standard_uncertainty: float
     """Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The error of the host's own clock, some
     1e-5 where nothing disciplines it, is not included."""
@@ -127,10 +125,8 @@ class RobustLine:
     slope: float
     slope_uncertainty: float
     """Standard uncertainty; it allows for correlated residuals."""
-    scatter: float
-    """Root mean square of the residuals."""
-    span: float
-    """From the first to the last point."""
+    scatter: float  # root mean square of the residuals
+    span: float  # from the first to the last point
 
     def at(self, x: Floats) -> Floats:
         """Values of the line, (n,)."""
@@ -178,8 +174,7 @@ _MAX_SKEW_WINDOWS = 4 * 3600 * 4  # four hours, the longest run
 class Skew:
     """Time between the readings of both gauges, over the rows of a run."""
 
-    mean_s: float
-    """Gauge 2 was read so much later than gauge 1 on average (s)."""
+    mean_s: float  # gauge 2 was read so much later than gauge 1 on average (s)
     standard_uncertainty_s: float
     """For each period of the stand (s): drift of the lag, scatter of arrivals of both devices, and delays by
     ports that cannot be seen (1 ms each, evenly distributed)."""
@@ -201,14 +196,11 @@ _EARLIER = N_(
 class TimeBase(msgspec.Struct, frozen=True):
     """How the times of a run's rows relate to true time; applied once, in analysis."""
 
-    scale: float = 1.0
-    """True seconds for one second of the rows' time."""
-    scale_standard_uncertainty: float = 0.0
-    """0 where the times are exact, as in a simulated run."""
+    scale: float = 1.0  # true seconds for one second of the rows' time
+    scale_standard_uncertainty: float = 0.0  # 0 where the times are exact, as in a simulated run
     skew_s: float | None = None
     """Gauge 2 was read so much later than gauge 1 on average (s); None where one device reads both."""
-    skew_standard_uncertainty_s: float | None = None
-    """See `Skew`."""
+    skew_standard_uncertainty_s: float | None = None  # see `Skew`
 
     @classmethod
     def from_estimates(cls, clock: ClockEstimate | None, skew: Skew | None) -> "TimeBase":

@@ -36,25 +36,18 @@ class DeviceDriver:
     `single_gauge_settings(gauge, settings)`; and `simulated.py` with `make_protocol(settings)`.
     """
 
-    name: str
-    """As given to `--protocol`."""
+    name: str  # as given to `--protocol`
     title: str
     rank: int
     """Place in lists of devices; by how often the device is used."""
-    default_baud: int = 0
-    """0 where none is usual."""
-    channels: int = 2
-    """Gauges on one port."""
-    verified: str = RESERVED
-    """What it was tested against."""
-    package: str = ""
-    """The folder as a package (`__name__`); "" for a name that is only reserved."""
+    default_baud: int = 0  # 0 where none is usual
+    channels: int = 2  # gauges on one port
+    verified: str = RESERVED  # what it was tested against
+    package: str = ""  # the folder as a package (`__name__`); "" for a name that is only reserved
     format_bauds: Mapping[str, int] = field(default_factory=dict)
     """Usual baud rates of a device that is chosen by its setting `format`."""
-    frames_title: str = ""
-    """What its bytes are called in messages; "" where they are lines of text."""
-    single_gauge: SingleGauge | None = None
-    """For a device that can be set to one gauge of two."""
+    frames_title: str = ""  # what its bytes are called in messages; "" where they are lines of text
+    single_gauge: SingleGauge | None = None  # for a device that can be set to one gauge of two
 
     @property
     def available(self) -> bool:

@@ -25,12 +25,9 @@ _MAX_PORT = 0xFF
 class StampedRead:
     """One read of one port."""
 
-    port: int
-    """Number of the port, from 0."""
-    arrival_ns: int
-    """Host's monotonic time (ns, `drivers.host_time.host_ns`) after the read."""
-    data: bytes
-    """As received; b"" marks where the connection of this port broke."""
+    port: int  # number of the port, from 0
+    arrival_ns: int  # host's monotonic time (ns, `drivers.host_time.host_ns`) after the read
+    data: bytes  # as received; b"" marks where the connection of this port broke
 
 
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
@@ -58,8 +55,7 @@ class Unwrapper:
     """
 
     def __init__(self) -> None:
-        self.discarded_bytes = 0
-        """Bytes outside whole envelopes."""
+        self.discarded_bytes = 0  # bytes outside whole envelopes
         self._unfinished = b""
 
     @property

@@ -15,8 +15,7 @@ from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 
-MAX_BLOCK_ROWS = 65536
-"""A long gap becomes several blocks, so that no block is large."""
+MAX_BLOCK_ROWS = 65536  # a long gap becomes several blocks, so that no block is large
 
 MAX_GAP_S = 600.0
 """Longest gap that is believed. A sequence or time that leaps further is a new start of the device."""

@@ -21,8 +21,7 @@ from drivers.source import LineSettings, Link
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
-FIRST_WAIT_S = 3.5
-"""A board that is reset by opening its port is silent for two seconds and more."""
+FIRST_WAIT_S = 3.5  # a board that is reset by opening its port is silent for two seconds and more
 _WINDOW_S = 0.8
 _SLOW_WINDOW_S = 1.2
 """How long is listened at one setting: to a stream, and to a device of few bytes."""

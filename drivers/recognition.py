@@ -37,10 +37,8 @@ class Recognition:
     """The device's own, as `--set` takes them."""
     rate_hz: float | None = None
     """Samples a second by the device's own times, else by when the bytes came; None if neither is known."""
-    needs_rate: bool = False
-    """Whether `--rate` must be given, because the device does not send its rate."""
-    remark: Message = EMPTY
-    """What to check before recording."""
+    needs_rate: bool = False  # whether `--rate` must be given, because the device does not send its rate
+    remark: Message = EMPTY  # what to check before recording
 
     @property
     def rate_option(self) -> str:
@@ -56,8 +54,7 @@ class IdentityQuery:
     reference firmware S, P and R.
     """
 
-    order: int
-    """Place among the queries of all devices: those with few line settings first."""
+    order: int  # place among the queries of all devices: those with few line settings first
     data: bytes
     line_settings: tuple[LineSettings, ...]
     """Usual ones of such devices."""

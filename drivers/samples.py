@@ -37,15 +37,12 @@ class SampleBlock:
     `first_index + len(self)`.
     """
 
-    first_index: int
-    """Index of the first row, counted from the first good sample of the stream (0)."""
+    first_index: int  # index of the first row, counted from the first good sample of the stream (0)
     counts: Counts
     """(n, 2) int32 or float64: readings of table gauge and relative gauge in the device's own unit; 0 where
     absent."""
-    status: UInt8s
-    """(n,) uint8: `SampleStatus` flags of each row."""
-    arrival_ns: int
-    """Host's monotonic time (ns) after the read that brought the last byte of the block."""
+    status: UInt8s  # (n,) uint8: `SampleStatus` flags of each row
+    arrival_ns: int  # host's monotonic time (ns) after the read that brought the last byte of the block
     device_time_s: Floats | None = None
     """(n,) float64: the device's own time of each row, unwrapped, from 0 at index 0; None if it sends
     none."""
@@ -61,16 +58,13 @@ class Losses:
     samples: int = 0
     missing: int = 0
     """Proven lost by a sequence number."""
-    missing_estimated: int = 0
-    """Lost according to elapsed time and rate, where there is no sequence number."""
+    missing_estimated: int = 0  # lost according to elapsed time and rate, where there is no sequence number
     damaged: int = 0
     overloaded: int = 0
     discarded_bytes: int = 0
     """Bytes outside good frames and lines."""
-    restarts: int = 0
-    """Restarts of the device within the stream; the rows between are estimated."""
-    repeated: int = 0
-    """Frames or lines that came twice; one of the two was left out."""
+    restarts: int = 0  # restarts of the device within the stream; the rows between are estimated
+    repeated: int = 0  # frames or lines that came twice; one of the two was left out
     unexplained_drops: int = 0
     """How often the device reported dropped samples while its sequence shows no gap."""
 

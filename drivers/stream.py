@@ -49,12 +49,9 @@ class SampleSource(ABC):
 
     batch_delay_s = 0.0
     """How long `read` may let bytes collect (s); set by the caller. Polled devices ignore it."""
-    stop_command = b""
-    """What asks the device to stop sending."""
-    is_polled = False
-    """Whether the device is polled on a grid of the host's clock, see `set_poll_rate`."""
-    timeout_s = 3.0
-    """How long `start` waits for the first good data."""
+    stop_command = b""  # what asks the device to stop sending
+    is_polled = False  # whether the device is polled on a grid of the host's clock, see `set_poll_rate`
+    timeout_s = 3.0  # how long `start` waits for the first good data
     answer_timeout_s = 0.4
 
     def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:

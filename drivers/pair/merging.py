@@ -29,12 +29,9 @@ _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
 class ChannelSamples:
     """Consecutive readings of one device, lost ones included."""
 
-    host_ns: Ints
-    """(n,) int64: host's time of each reading (ns), never decreasing."""
-    counts: Counts
-    """(n,) int32 or float64."""
-    status: UInt8s
-    """(n,) uint8: `SampleStatus`, flags as of gauge 1."""
+    host_ns: Ints  # (n,) int64: host's time of each reading (ns), never decreasing
+    counts: Counts  # (n,) int32 or float64
+    status: UInt8s  # (n,) uint8: `SampleStatus`, flags as of gauge 1
 
     def __len__(self) -> int:
         return len(self.status)
@@ -61,14 +58,10 @@ NO_SAMPLES = ChannelSamples(np.empty(0, np.int64), np.empty(0, np.int32), np.emp
 class MergedRows:
     """Rows of both gauges."""
 
-    counts: Counts
-    """(n, 2) int32 or float64."""
-    status: UInt8s
-    """(n,) uint8: `SampleStatus` flags."""
-    lag_ns: Ints
-    """(n,) int64: time of gauge 2 minus time of gauge 1."""
-    is_paired: Flags
-    """(n,) bool: whether both readings exist."""
+    counts: Counts  # (n, 2) int32 or float64
+    status: UInt8s  # (n,) uint8: `SampleStatus` flags
+    lag_ns: Ints  # (n,) int64: time of gauge 2 minus time of gauge 1
+    is_paired: Flags  # (n,) bool: whether both readings exist
 
     def __len__(self) -> int:
         return len(self.status)

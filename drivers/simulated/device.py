@@ -28,14 +28,10 @@ SignalFactory: TypeAlias = Callable[[float, float], Signal]
 class DeviceSetup:
     """Properties of a simulated device."""
 
-    rate_hz: float
-    """Sample rate at power-on (Hz), as the device reports it."""
-    clock_ppm: float = 0.0
-    """How much the device's clock is fast (1e-6)."""
-    rate_error: float = 0.0
-    """Fraction by which it samples faster than it reports; its times are right."""
-    first_sequence: int = 0
-    """Number of sample 0; it wraps at 2**32."""
+    rate_hz: float  # sample rate at power-on (Hz), as the device reports it
+    clock_ppm: float = 0.0  # how much the device's clock is fast (1e-6)
+    rate_error: float = 0.0  # fraction by which it samples faster than it reports; its times are right
+    first_sequence: int = 0  # number of sample 0; it wraps at 2**32
     first_time_s: float = 0.0
     faults: FaultRates = field(default_factory=FaultRates)
     disturbances: tuple[Disturbance, ...] = ()
@@ -93,10 +89,8 @@ class SimulatedDevice:
         self._session_ns: int | None = None
         self.log = TransmissionLog(setup.rate_hz, setup.rate_hz)
         """Of the running stream, or of the last one."""
-        self.earlier_logs: list[TransmissionLog] = []
-        """Of earlier streams of this session."""
-        self.streams = 0
-        """Streams started until now."""
+        self.earlier_logs: list[TransmissionLog] = []  # of earlier streams of this session
+        self.streams = 0  # streams started until now
 
     @property
     def is_streaming(self) -> bool:

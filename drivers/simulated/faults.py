@@ -121,8 +121,7 @@ class Disturbance:
     kind: DisturbanceKind
     seconds: float | None = None
     """How long it lasts, None for ever; of a jump, by how much (s), of either sign."""
-    at_s: float | None = None
-    """Stand's own time (s), negative before its motion begins; None: at once."""
+    at_s: float | None = None  # stand's own time (s), negative before its motion begins; None: at once
 
     def __post_init__(self) -> None:
         seconds = self.seconds

@@ -7,8 +7,7 @@ from enum import Enum, auto
 
 from drivers.arrays import Floats, Int32s, UInt8s
 
-MAX_RATE_HZ = 100_000.0
-"""Rate at which the simulated stand still keeps up on a common computer."""
+MAX_RATE_HZ = 100_000.0  # rate at which the simulated stand still keeps up on a common computer
 
 
 class CommandKind(Enum):
@@ -51,13 +50,11 @@ class CommandParser:
 class SimulatedProtocol(ABC):
     """Samples to frames, and commands to answers. A frame is damaged or lost as a whole."""
 
-    streams_on_open = False
-    """Whether it sends once its port is open, or when a command starts it."""
+    streams_on_open = False  # whether it sends once its port is open, or when a command starts it
     max_rate_hz = MAX_RATE_HZ
     line_end = b""
     """What ends a frame; damage to its last byte damages the next frame too. b"" for frames of fixed form."""
-    flags_overload = False
-    """Whether a frame flags clipped readings."""
+    flags_overload = False  # whether a frame flags clipped readings
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         """Whole commands in `data`, and the number of bytes that were used; the rest may begin a command."""
@@ -87,8 +84,7 @@ class PolledProtocol(SimulatedProtocol):
     streams_on_open = True
     byte_s: float
     """Time of one byte on the wire (s)."""
-    turnaround_s: float
-    """From the end of a request to the beginning of its answer (s)."""
+    turnaround_s: float  # from the end of a request to the beginning of its answer (s)
 
     @abstractmethod
     def request_bytes(self, command: Command) -> int:

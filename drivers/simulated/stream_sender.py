@@ -18,8 +18,7 @@ from drivers.simulated.faults import (
 from drivers.simulated.protocol import SimulatedProtocol
 from drivers.simulated.transport import Transport
 
-MAX_DAMAGE_LISTED = 10_000
-"""Damaged and lost stretches beyond this number are counted, not listed."""
+MAX_DAMAGE_LISTED = 10_000  # damaged and lost stretches beyond this number are counted, not listed
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +38,9 @@ class TransmissionLog:
     fault, the lost ones not at all, or only in part.
     """
 
-    rate_hz: float
-    """As the device reports it."""
-    true_rate_hz: float
-    """Samples a second of the stand's own time."""
-    started_s: float = 0.0
-    """When sample 0 was taken, on the stand's own time."""
+    rate_hz: float  # as the device reports it
+    true_rate_hz: float  # samples a second of the stand's own time
+    started_s: float = 0.0  # when sample 0 was taken, on the stand's own time
     frames: int = 0
     samples: int = 0
     frames_damaged: int = 0
@@ -53,8 +49,7 @@ class TransmissionLog:
     samples_lost: int = 0
     samples_clipped: int = 0
     """Readings of either gauge beyond its range, sent or not."""
-    samples_flagged: int = 0
-    """In frames that were sent whole with an overload flag."""
+    samples_flagged: int = 0  # in frames that were sent whole with an overload flag
     bytes_sent: int = 0
     damage: list[DamagedStretch] = field(default_factory=list)
 

@@ -26,8 +26,7 @@ class Transport(ABC):
 
     resets_device: bool
     """Whether a reader that closes the port resets the device, as the DTR line of an Arduino does."""
-    burst_s: float
-    """How much of a late stream may be sent at once (s), so that a reader keeps up."""
+    burst_s: float  # how much of a late stream may be sent at once (s), so that a reader keeps up
 
     @abstractmethod
     def wait(self, timeout_s: float) -> None:
@@ -54,8 +53,7 @@ class Transport(ABC):
         self.unplug()
 
 
-HOST = "127.0.0.1"
-"""Only this computer may connect."""
+HOST = "127.0.0.1"  # only this computer may connect
 
 _SEND_BUFFER_BYTES = 1 << 16
 """64 KiB hold 80 ms at 100 kHz: a reader that stands still for longer loses samples, as on a UART."""

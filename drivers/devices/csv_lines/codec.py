@@ -14,8 +14,7 @@ from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder
 
-MAX_LINE_BYTES = 1024
-"""A longer line is garbage."""
+MAX_LINE_BYTES = 1024  # a longer line is garbage
 _MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
 _LINES_EXAMINED = 200
 

@@ -40,8 +40,7 @@ class LineFormat:
     columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
     """From left to right: `table` and `relative` once each, or `value` once of a device with one gauge; at
     most one time column, one `sequence` and one checksum, which is last; others in any number."""
-    separator: str = ","
-    """One character; a blank means any number of blanks."""
+    separator: str = ","  # one character; a blank means any number of blanks
     decimal: str = "."
     comment: str = "#%;/"
     """First characters of lines that are skipped."""

@@ -21,8 +21,7 @@ MEASUREMENT = 0x10
 TYPE_AND_INTERFACE = 0xF0
 INDICATOR = 0x80
 """Set in the status of every measurement frame."""
-OVERLOAD = 0x03
-"""Status bits: an input is overloaded (0), a six-axis sensor is out of its range (1)."""
+OVERLOAD = 0x03  # status bits: an input is overloaded (0), a six-axis sensor is out of its range (1)
 _BOTH_OVERLOADED = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
 
 
@@ -46,8 +45,7 @@ _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
 class FrameLayout:
     """What all measurement frames of a stream share. Raises ProtocolError without a gauge's channel."""
 
-    channels: int
-    """Values in a frame, 1 to 16."""
+    channels: int  # values in a frame, 1 to 16
     kind: ValueKind = ValueKind.FLOAT32
     table: int = 1
     """Channels of the two gauges, from 1."""

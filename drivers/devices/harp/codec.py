@@ -132,8 +132,7 @@ def find_reply(received: bytes, register: Register) -> HarpMessage | None:
 CHANNELS = 8
 EVENT_BYTES = 28
 """Bytes of a load cell event."""
-VALUES_OFFSET = 11
-"""Place of its first value."""
+VALUES_OFFSET = 11  # place of its first value
 
 LINE = np.dtype(
     [
@@ -231,8 +230,7 @@ def _value(buffer: UInt8s, at: int) -> float:
     return float(value - 65536 if value >= 32768 else value)
 
 
-FULL_SCALE = 32767
-"""Largest reading."""
+FULL_SCALE = 32767  # largest reading
 _MAX_HELD_BYTES = 1024
 
 

@@ -25,8 +25,7 @@ class HarpSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     table: int = 0
     relative: int = 1
     """Channels that the two gauges are wired to, 0 to 7."""
-    overload_count: float = codec.FULL_SCALE
-    """Readings of this size and more are marked as overloaded."""
+    overload_count: float = codec.FULL_SCALE  # readings of this size and more are marked as overloaded
 
     def __post_init__(self) -> None:
         check_gauge_channels(self.table, self.relative, range(codec.CHANNELS))

@@ -11,8 +11,7 @@ from drivers.packets import MAX_GAP_S, PACKET, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 
-LATE = 0x80
-"""Bit of an envelope's port: the time of the measurement is not known."""
+LATE = 0x80  # bit of an envelope's port: the time of the measurement is not known
 _NS = 1_000_000_000
 _OVERLOADS = (int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE))
 

@@ -11,8 +11,7 @@ from enum import IntEnum
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
-MAX_REGISTERS = 125
-"""Registers that one request may read."""
+MAX_REGISTERS = 125  # registers that one request may read
 MAX_UNIT = 247
 LONGEST = 256
 EXCEPTION_BYTES = 5
@@ -51,15 +50,12 @@ _EXCEPTIONS = {
 class Request:
     """A request to a unit."""
 
-    unit: int
-    """1 to 247."""
+    unit: int  # 1 to 247
     function: Function
     register: int
     """First register, counted from 0."""
-    count: int = 1
-    """Registers read or written."""
-    values: tuple[int, ...] = ()
-    """Values to write; none where registers are read."""
+    count: int = 1  # registers read or written
+    values: tuple[int, ...] = ()  # values to write; none where registers are read
 
     def encode(self) -> bytes:
         frame = struct.pack(">BBHH", self.unit, self.function, self.register, self._second)
@@ -117,12 +113,10 @@ class Request:
 class Response:
     """What came after a request: its registers, or why there are none."""
 
-    data: bytes = b""
-    """The requested registers, two bytes each; none after a write."""
+    data: bytes = b""  # the requested registers, two bytes each; none after a write
     fault: Message = EMPTY
     """Why this is no response, or why the device refuses; empty where it did what was asked."""
-    is_exception: bool = False
-    """Whether the device understood the request and refuses it."""
+    is_exception: bool = False  # whether the device understood the request and refuses it
 
     @property
     def is_invalid(self) -> bool:

@@ -26,13 +26,11 @@ _SHIPPED = files("drivers.devices.modbus").joinpath("maps")
 class RegisterMap:
     """A transmitter, or two on one bus."""
 
-    name: str
-    """As given to `--set map=`."""
+    name: str  # as given to `--set map=`
     title: str
     caution: str
     """Note for every run that is read by this map; "" for none."""
-    channels: dict[str, Channel]
-    """Of the gauges `table` and `relative`, or of one of them."""
+    channels: dict[str, Channel]  # of the gauges `table` and `relative`, or of one of them
 
 
 def shipped_maps() -> list[str]:

@@ -35,12 +35,9 @@ _MAX_DRAIN_READS = 8
 class Transaction:
     """A request on the wire, and what came after it."""
 
-    data: bytes
-    """All that came; b"" after a time-out."""
-    sent_ns: int
-    """Host's time before the request was written."""
-    received_ns: int
-    """Host's time after the last byte was read."""
+    data: bytes  # all that came; b"" after a time-out
+    sent_ns: int  # host's time before the request was written
+    received_ns: int  # host's time after the last byte was read
 
     @property
     def measured_ns(self) -> int:

@@ -49,22 +49,17 @@ class Channel(Struct, frozen=True):
     unit: Annotated[int, Meta(ge=1, le=MAX_UNIT)]
     function: Function
     """Function that reads it, 3 or 4."""
-    register: _Register
-    """First register, counted from 0."""
+    register: _Register  # first register, counted from 0
     kind: ValueType = field(default=ValueType.INT32, name="type")
     order: ByteOrder = ByteOrder.ABCD
     scale: float = 1.0
     """Counts for one step of the value."""
     status_register: _Register | None = None
     """Register with the state of the value, whose bits are counted from 0, the least significant."""
-    overload_bits: tuple[_Bit, ...] = ()
-    """One of these marks an overload."""
-    fault_bits: tuple[_Bit, ...] = ()
-    """One of these marks an invalid value."""
-    sign_bit: _Bit | None = None
-    """Marks a negative value, whose own sign is then ignored."""
-    zero_register: _Register | None = None
-    """Register that takes the command which sets the value to zero."""
+    overload_bits: tuple[_Bit, ...] = ()  # one of these marks an overload
+    fault_bits: tuple[_Bit, ...] = ()  # one of these marks an invalid value
+    sign_bit: _Bit | None = None  # marks a negative value, whose own sign is then ignored
+    zero_register: _Register | None = None  # register that takes the command which sets the value to zero
     zero_value: Annotated[int, Meta(ge=0, le=0xFFFF)] | None = None
     zero_function: Function = Function.WRITE_SINGLE
 

@@ -36,12 +36,10 @@ _QUERY = Request(1, Function.READ_HOLDING, 0)
 class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What `--set` and `[device.settings]` may give, beside the keys of a register map."""
 
-    map: str = "generic"
-    """A shipped register map, or a file that ends in `.toml`."""
+    map: str = "generic"  # a shipped register map, or a file that ends in `.toml`
     channel: Literal["both", "table", "relative"] = "both"
     """Gauges on this port; the column of another gauge is 0."""
-    zero: bool = False
-    """Whether to send the zero command of the map at the start."""
+    zero: bool = False  # whether to send the zero command of the map at the start
     timeout_s: float = 0.2
 
     def __post_init__(self) -> None:

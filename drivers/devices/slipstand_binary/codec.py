@@ -26,8 +26,7 @@ SYNC = b"\xaa\x55"
 VERSION = 1
 HEADER_BYTES = 13
 """Before the first sample: sync, version, flags, seq, t_us, n."""
-SAMPLE_BYTES = 8
-"""Two int32."""
+SAMPLE_BYTES = 8  # two int32
 MAX_SAMPLES = 32
 MIN_FRAME_BYTES = HEADER_BYTES + SAMPLE_BYTES + 2
 
