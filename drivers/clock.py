@@ -84,7 +84,6 @@ class ClockFit:
 
     @property
     def windows(self) -> int:
-        """Number of windows in memory, at most 512."""
         return len(self._earliest)
 
     def add(self, index: int, arrival_ns: int) -> None:
@@ -129,7 +128,6 @@ class RobustLine:
     span: float  # from the first to the last point
 
     def at(self, x: Floats) -> Floats:
-        """Values of the line, (n,)."""
         return self.level + self.slope * (x - self.centre)
 
 
@@ -152,13 +150,10 @@ def fit_robust_line(x: Floats, y: Floats) -> RobustLine:
 
 
 def _variance_inflation(residual: Floats) -> float:
-    """Variance of the slope relative to independent residuals, for first-order autoregressive ones.
-
-    Residuals within the steps of delivery count as independent: their effect is added separately.
-    """
+    """Variance of the slope relative to independent residuals, for first-order autoregressive ones."""
     power = float(residual @ residual)
     if power <= len(residual) * _DELIVERY_STEP_S**2 / 4:
-        return 1.0
+        return 1.0  # steps of delivery count as independent: their effect is added separately
     correlation = float(residual[1:] @ residual[:-1]) / power
     correlation += (1.0 + 4.0 * correlation) / len(residual)  # bias after a fit (Kendall 1954)
     correlation = min(max(correlation, 0.0), _MAX_CORRELATION)

@@ -18,10 +18,7 @@ _LOW = np.uint64(0xFF)
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/CCITT-FALSE of `data` (polynomial 1021, start FFFF, no reflection, no final xor).
-
-    The check value, of b"123456789", is 29B1 (Koopman; CRC RevEng catalogue, CRC-16/IBM-3740).
-    """
+    """CRC-16/CCITT-FALSE of `data` (CRC RevEng catalogue: CRC-16/IBM-3740, check value 29B1)."""
     return binascii.crc_hqx(data, CRC_START)
 
 

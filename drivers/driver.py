@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +17,6 @@ if TYPE_CHECKING:
 UNVERIFIED = "not verified on hardware"
 RESERVED = "reserved, comes later"
 GAUGES = ("table", "relative")
-
-
-class SingleGauge(Enum):
-    """Where a device with one gauge puts its readings."""
-
-    FIRST_COLUMN = "first-column"  # in column 0 of a block, whichever gauge it is
-    OWN_COLUMN = "own-column"  # in the column of its gauge
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +39,7 @@ class DeviceDriver:
     format_bauds: Mapping[str, int] = field(default_factory=dict)
     """Usual baud rates of a device that is chosen by its setting `format`."""
     frames_title: str = ""  # what its bytes are called in messages; "" where they are lines of text
-    single_gauge: SingleGauge | None = None  # for a device that can be set to one gauge of two
+    has_single_gauge_settings: bool = False  # whether it can be set to one gauge of two
 
     @property
     def available(self) -> bool:
@@ -58,12 +50,10 @@ class DeviceDriver:
         return self.format_bauds.get(settings.get("format", ""), self.default_baud)
 
     def make_source(self, settings: Mapping[str, str], rate_hz: float | None) -> "SampleSource":
-        """Source of a device with its own `settings`. Raises SettingsError."""
         source: SampleSource = self._source().make_source(dict(settings), rate_hz)
         return source
 
     def make_simulated(self, settings: Mapping[str, str]) -> "SimulatedProtocol":
-        """The simulated device's side of the protocol. Raises SettingsError."""
         self._source()
         simulated = import_module(f"{self.package}.simulated")
         protocol: SimulatedProtocol = simulated.make_protocol(dict(settings))
@@ -86,12 +76,9 @@ class DeviceDriver:
 
     def single_gauge_settings(self, gauge: str, settings: Mapping[str, str]) -> tuple[dict[str, str], int]:
         """Settings of a device with only this gauge, and the column of its readings. Raises SettingsError."""
-        if self.single_gauge is not None:
-            own = self.single_gauge is SingleGauge.OWN_COLUMN
-            return (
-                self._source().single_gauge_settings(gauge, dict(settings)),
-                GAUGES.index(gauge) if own else 0,
-            )
+        if self.has_single_gauge_settings:
+            own: tuple[dict[str, str], int] = self._source().single_gauge_settings(gauge, dict(settings))
+            return own
         if self.channels > 1:
             template = N_("protocol {protocol} has both gauges on one port: leave the port of gauge 2 out")
             raise SettingsError(template, protocol=self.name)

@@ -33,8 +33,7 @@ class StampedRead:
 def wrap(port: int, arrival_ns: int, data: bytes) -> bytes:
     """Envelope of a read; several of them where it is longer than 65,535 bytes.
 
-    `port` is 0 to 255, `arrival_ns` the host's monotonic time after the read; b"" marks a broken connection.
-    Raises ValueError if the number of the port is out of range.
+    `port` is 0 to 255 (else ValueError), `arrival_ns` the time after the read; b"" marks a broken link.
     """
     if not 0 <= port <= _MAX_PORT:
         raise ValueError(f"port {port} has no place in an envelope: give 0 to {_MAX_PORT}")
@@ -60,7 +59,6 @@ class Unwrapper:
 
     @property
     def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, fewer than the longest envelope."""
         return len(self._unfinished)
 
     def feed(self, data: bytes) -> Iterator[StampedRead]:

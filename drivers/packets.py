@@ -154,10 +154,7 @@ def count_packet(state: Record, packet: Record, is_estimated: bool) -> None:
 
 @inlined
 def is_plausible_gap(state: Record, gap: int) -> bool:
-    """Whether the host's clock agrees with the `gap` that a device reports after the connection broke.
-
-    A device that lost its power starts counting anew, and its numbers are arbitrary then.
-    """
+    """Whether the host's clock agrees with the `gap` that a device reports after the connection broke."""
     slack = _SLACK_S / state.period_s + _SLACK * state.restart_rows
     return bool(abs(gap - state.restart_rows) <= slack)
 

@@ -60,7 +60,6 @@ class PortInfo:
 
     @property
     def identity(self) -> str:
-        """Its name and, for USB, vendor, product and serial number."""
         if self.vendor_id is None or self.product_id is None:
             return self.device
         return f"{self.device} USB {self.vendor_id:04x}:{self.product_id:04x} {self.serial_number}".rstrip()
@@ -174,10 +173,7 @@ def open_port(url: str, baud: int, parity: str = "N") -> "Port":
 
 
 class Port:
-    """An open port, made by `open_port`.
-
-    Reading and writing may happen in two threads; closing must wait until both are done.
-    """
+    """An open port. Reading and writing may happen in two threads; closing must wait until both are done."""
 
     def __init__(self, wire: Any, url: str) -> None:
         self._wire = wire
@@ -195,10 +191,7 @@ class Port:
         self.close()
 
     def read(self) -> bytes:
-        """Wait at most 50 ms for the first byte and return all that is there.
-
-        Raises DeviceLostError if the port is gone. What came before it is returned by the call before.
-        """
+        """Wait at most 50 ms for the first byte and return all that is there. Raises DeviceLostError."""
         try:
             if self._terminal is not None:
                 return _read_terminal(self._terminal)

@@ -81,14 +81,11 @@ class ListenResult:
 
 
 def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], None]) -> PortReport:
-    """Find out who uses a port, then what it sends by itself, then, if `write`, what it answers.
-
-    A port that another program has open is not opened: reading would take bytes from that program.
-    """
+    """Find out who uses a port, else what it sends by itself, then, if `write`, what it answers."""
     chip = usb_chip_name(port.vendor_id, port.product_id)
     hints = tuple(port_hints(port))
     users = tuple(other_port_users(port.device))
-    if users:
+    if users:  # reading would take bytes from that program
         what = message("in use by {users}: close that program, and look again", users=users)
         return PortReport(port, chip, ProbeOutcome.IN_USE, what, users, hints=hints)
     try:

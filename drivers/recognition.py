@@ -63,10 +63,7 @@ class IdentityQuery:
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:
-    """The most likely protocol of `data`; None if no device folder knows them.
-
-    The first and the last frame or line may be cut. `duration_s` is the time from the first to the last byte.
-    """
+    """The most likely protocol of `data` that came in `duration_s`; None if no device folder knows them."""
     found = [one for driver in AVAILABLE if (one := driver.recognise(data, duration_s)) is not None]
     return max(found, key=lambda one: one.share, default=None)
 

@@ -90,11 +90,9 @@ class SampleSource(ABC):
         return EMPTY
 
     def take_warnings(self) -> list[Message]:
-        """Warnings about the stream since the last call; to be called after each `decode`."""
         return self._decoder.take_warnings() if self._decoder else []
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
-        """Skew of samples first_index <= index < end_index; None where one converter reads both gauges."""
         return self._decoder.skew(first_index, end_index) if self._decoder else None
 
     def set_poll_rate(self, rate_hz: float) -> None:
@@ -107,24 +105,20 @@ class SampleSource(ABC):
 
     @abstractmethod
     def start(self, link: Link) -> bytes:
-        """Bring the device into a known state, set it up and start the stream.
+        """Set the device up and start the stream; returns what was read of it, to be decoded first.
 
-        Returns what was read of the stream, to be decoded first. Raises NoDataError within about 3 s where
-        nothing intelligible comes, ProtocolError where the device does not do what is asked.
+        Raises NoDataError where nothing intelligible comes within about 3 s, ProtocolError where the device
+        does not do what is asked.
         """
 
     def resume(self, link: Link) -> bytes:
-        """Continue with a device that was lost and found again; else as `start`.
-
-        A device that is still sending is left alone: its sequence then proves what is missing.
-        """
+        """As `start`, after a loss; a device that still sends is left alone: its sequence proves the loss."""
         return self.start(link)
 
     def read(self, link: Link) -> bytes:
-        """Next bytes to decode, b"" if none came within a fraction of a second.
+        """Next bytes to decode, b"" if none came within a fraction of a second. Raises DeviceLostError.
 
         A polled device is asked once, when its poll is due. One thread may call this while another decodes.
-        Raises DeviceLostError.
         """
         return self._reader.read(link, self.batch_delay_s)
 
@@ -174,14 +168,12 @@ class SampleSource(ABC):
         return received, False
 
     def await_stream(self, link: Link, is_good: Callable[[bytes], object], timeout_s: float) -> bytes:
-        """Read until all that came is good. Raises NoDataError, which describes what came instead."""
         received, good = self.await_data(link, timeout_s, is_good)
         if not good:
             raise self.no_data_error(received)
         return received
 
     def is_same_rate(self, measured_hz: float | None) -> bool:
-        """Whether a measured rate is the one expected, as far as both are known."""
         if self._rate_hz is None or measured_hz is None:
             return True
         return abs(measured_hz / self._rate_hz - 1) <= RATE_TOLERANCE
@@ -215,7 +207,6 @@ class SampleSource(ABC):
         )
 
     def no_data_error(self, received: bytes) -> NoDataError:
-        """Error that describes what came instead of good data."""
         what = describe_unreadable(received, self._identity.protocol, self._baud)
         _log.info("no good data: %s", what)
         return NoDataError("no good data in {timeout_s:g} s: {what}", timeout_s=self.timeout_s, what=what)
@@ -279,10 +270,10 @@ class BatchedReader:
         self._busy_until_s = 0.0
 
     def read(self, link: Link, batch_delay_s: float) -> bytes:
-        """What came, or comes within the next 50 ms; b"" if nothing.
+        """What came, or comes within the next 50 ms; b"" if nothing. Raises DeviceLostError.
 
-        Bytes collect for `batch_delay_s`, or less where they would be too many for the port. Raises
-        DeviceLostError if the port is gone. What came before it is returned by the call before.
+        Bytes collect for `batch_delay_s`, or less where they would be too many for the port. What came before
+        the port was gone is returned by the call before.
         """
         parts: list[bytes] = []
         try:
@@ -335,10 +326,7 @@ class BatchedReader:
 
 
 def read_for(read: Callable[[], bytes], duration_s: float) -> bytes:
-    """What repeated reads bring in `duration_s`, until one brings nothing; b"" if nothing came at all.
-
-    A polled device gives one answer a read, each with its own time.
-    """
+    """What repeated reads bring in `duration_s`, until one brings nothing (a polled device answers each)."""
     due_s = time.monotonic() + duration_s
     parts = [read()]
     try:

@@ -144,7 +144,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     def device_settings(self) -> tuple[dict[str, str], bool]:
         """Settings of the device, and whether its first column holds gauge 2. Raises SettingsError."""
         driver = find_driver(self.protocol)
-        if self.gauge is None or driver.single_gauge is None:
+        if self.gauge is None or not driver.has_single_gauge_settings:
             return self.device, False
         settings, column = driver.single_gauge_settings(self.gauge, self.device)
         return settings, self.gauge == "relative" and column == 0

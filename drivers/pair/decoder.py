@@ -135,7 +135,6 @@ class PairDecoder(Decoder):
                 yield from self._ready_blocks()
 
     def _device_time_s(self, gauge: int, block: SampleBlock) -> Floats:
-        """The device's own time of each row (s): its clock, or index over rate."""
         if block.device_time_s is not None:
             return block.device_time_s
         return (block.first_index + np.arange(len(block))) / self._rates_hz[gauge]
@@ -163,8 +162,5 @@ def _without_zero_counts(block: SampleBlock) -> SampleBlock:
 
 
 def choose_base_gauge(rates_hz: tuple[float, float]) -> int:
-    """Gauge whose readings make the rows: 0 for gauge 1, or 1 if gauge 2 is much slower.
-
-    Each row then has a reading of the faster device near it.
-    """
+    """Gauge whose readings make the rows: 1 if gauge 2 is much slower, so that others are near each row."""
     return int(rates_hz[0] > _MUCH_SLOWER * rates_hz[1])

@@ -207,5 +207,4 @@ class _ChannelReader:
 
 
 def _with_gauge(gauge: int, error: DriverError) -> DriverError:
-    """The same error with the number of the gauge."""
     return type(error)("gauge {gauge}: {fault}", gauge=gauge + 1, fault=error)

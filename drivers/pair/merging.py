@@ -84,7 +84,6 @@ class Merger:
 
     @property
     def buffered(self) -> int:
-        """Readings in memory: tenths of a second of one gauge, at most 10 s of the other."""
         return sum(map(len, self._waiting))
 
     def add(self, gauge: int, readings: ChannelSamples) -> None:
@@ -195,10 +194,7 @@ class HostTimeFit:
             self._best = point
 
     def host_ns(self, device_s: Floats) -> Ints:
-        """Host's time (ns) of readings (n,) at the device's own times (s).
-
-        It includes the shortest delay of delivery, which cannot be measured here.
-        """
+        """Host's time (ns) of readings (n,) at the device's own times (s), the least delay included."""
         own_origin_s, origin_ns = self._origin
         if self._line is None:  # too few windows for a line: the last complete one
             own_origin_s, origin_ns = self._points[-1] if self._points else self._best or (0.0, 0)

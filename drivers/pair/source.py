@@ -37,7 +37,6 @@ class PairSource(SampleSource):
 
     @property
     def identity(self) -> DeviceIdentity:
-        """Identities of both devices, and their rates once these are known."""
         both = [channel.source.identity for channel in self.channel_sources]
         settings: dict[str, str] = {}
         for gauge, one, rate_hz in zip(GAUGES, both, self._rates_hz or (None, None), strict=True):
@@ -54,7 +53,6 @@ class PairSource(SampleSource):
 
     @property
     def rate_hz(self) -> float:
-        """Nominal rows a second: the rate of one device. Raises ProtocolError while it is not known."""
         first, second = (channel.source.rate_hz for channel in self.channel_sources)
         return (first, second)[choose_base_gauge((first, second))]
 

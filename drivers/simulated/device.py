@@ -98,7 +98,6 @@ class SimulatedDevice:
 
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
-        """Those of this session, planned or requested, with their times."""
         return self._schedule.disturbances
 
     @property
@@ -161,7 +160,6 @@ class SimulatedDevice:
             self._transport.send(answer)
 
     def _execute(self, command: Command, now_ns: int) -> bool:
-        """Execute a command; returns whether it is possible."""
         match command.kind:
             case CommandKind.START if self._stream is None:
                 self._start(now_ns)

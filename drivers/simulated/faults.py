@@ -83,7 +83,6 @@ class FrameDamager:
         return frame, FrameFault.MERGED if is_merged else None
 
     def garbage(self, frame: bytes) -> tuple[bytes, FrameFault]:
-        """Random bytes in place of a frame."""
         data = self._random.randbytes(len(frame))
         self.is_line_open = bool(self._line_end) and data[-1] not in self._line_end
         return data, FrameFault.GARBAGE
@@ -170,7 +169,6 @@ class DisturbanceSchedule:
         """Those of this session, each with its time."""
 
     def restart(self) -> None:
-        """Begin a session: only what is planned will happen."""
         self.disturbances = self._planned
 
     def add(self, disturbance: Disturbance, now_s: float) -> None:

@@ -95,6 +95,5 @@ class PolledProtocol(SimulatedProtocol):
         """Put a sample, (2,) counts and the overload bits of `SampleStatus`, into the registers."""
 
     def encode(self, _first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:
-        """Store the last sample; nothing is sent that was not asked for."""
         self.store_sample(counts[-1], int(status[-1]))
         return [b""] * len(times_s)

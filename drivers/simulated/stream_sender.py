@@ -136,13 +136,10 @@ class StreamSender:
         return max(complete / rate_hz - (now_ns - self._started_ns) * 1e-9, self._STEP_S)
 
     def _allowance(self, now_ns: int) -> int:
-        """Frames that may be sent now: what the time since the last step allows, one burst at most.
-
-        One frame more is saved, because steps of whole milliseconds would else lose the fraction of a frame
-        that they earn beyond a burst, and a late stream would not catch up.
-        """
+        """Frames that may be sent now: what the time since the last step allows, one burst at most."""
         rate_hz = self._CATCH_UP * self._log.true_rate_hz / self._n
         earned = (now_ns - self._stepped_ns) * 1e-9 * rate_hz
+        # One frame more is saved: steps of 1 ms would else lose the fraction that they earn beyond a burst.
         self._allowed = min(self._allowed + earned, self._burst + 1.0)
         self._stepped_ns = now_ns
         return min(math.floor(self._allowed), self._burst)

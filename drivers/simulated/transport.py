@@ -130,7 +130,6 @@ class _TcpPort(Transport):
         return True
 
     def _listen(self) -> None:
-        """Listen while plugged in. A port that another program took meanwhile is tried again later."""
         if self._is_plugged_in and self._listener is None:
             with contextlib.suppress(OSError):
                 self._listener = _listener(self._number)

@@ -1,6 +1,6 @@
 """Lines of values, as Arduinos and loggers send them."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver, SingleGauge
+from drivers.driver import UNVERIFIED, DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -11,5 +11,5 @@ DRIVER = DeviceDriver(
     verified=UNVERIFIED,
     package=__name__,
     format_bauds={"openscale": 9600},
-    single_gauge=SingleGauge.FIRST_COLUMN,
+    has_single_gauge_settings=True,
 )

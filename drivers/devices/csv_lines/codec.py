@@ -112,7 +112,6 @@ class LineDecoder(PacketDecoder):
         super().expect_restart()
 
     def _whole_lines(self, data: bytes) -> bytes:
-        """Lines that are complete; keeps the unfinished one."""
         if self._skipping:
             start = first_line_start(data)
             self._state["discarded_bytes"] += start - 1 if start else len(data)

@@ -77,7 +77,6 @@ def infer_columns(data: bytes, duration_s: float | None = None) -> InferredColum
 
 
 def _lines(data: bytes) -> list[str]:
-    """Whole lines without blank ones and comments."""
     parts = data.replace(b"\r", b"\n").split(b"\n")[1:-1]
     kept = [part for part in parts if part.strip() and part[:1] not in _COMMENT]
     return [part.decode("ascii", "replace") for part in kept]
@@ -132,7 +131,6 @@ def _roles(rows: _Rows, lines: list[str], separator: str, rate_hz: float | None)
 
 
 def _checksum(lines: list[str], separator: str) -> Column | None:
-    """Kind of checksum in the last column, if it is right in most lines."""
     agree = {Column.XOR: 0, Column.CRC: 0}
     for line in lines:
         before, _, checksum = line.strip().rpartition(separator)

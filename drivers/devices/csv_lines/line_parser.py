@@ -124,7 +124,6 @@ def _is_in(character: int, characters: UInt8s) -> bool:
 
 @inlined
 def _read_line(buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt8s, line: Record) -> int:
-    """Position of the terminator after a good line, or `_BROKEN`."""
     at = start
     for column in range(len(roles)):
         role = roles[column]

@@ -91,7 +91,6 @@ class CsvLinesSource(SampleSource):
 
     @property
     def channels(self) -> int:
-        """One with a `value` column, else two."""
         return 1 if self._layout is None else self._layout.channels
 
     def prepare(self) -> None:
@@ -147,7 +146,6 @@ class CsvLinesSource(SampleSource):
         )
 
     def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
-        """Layout of the lines in `data`, where none was given."""
         return self._layout
 
     def _rate_error(self, measured_hz: float) -> SettingsError:
@@ -188,15 +186,15 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSour
     return CsvLinesSource(parsed.layout(), rate_hz, parsed.overload_count)
 
 
-def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str]:  # noqa: ARG001
-    """Settings of a device with one gauge. Raises SettingsError for columns without `value`."""
+def single_gauge_settings(gauge: str, settings: dict[str, str]) -> tuple[dict[str, str], int]:  # noqa: ARG001
+    """Settings of a device with one gauge, and the column of its readings. Raises SettingsError."""
     if settings.get("format", "columns") != "columns":
-        return settings  # the device shows its columns itself
+        return settings, 0  # the device shows its columns itself
     columns = settings.get("columns", "time_us,value")
     if "value" not in (name.strip() for name in columns.split(",")):
         template = N_("columns {columns} have no value: a device with one gauge sends one, as time_us,value")
         raise SettingsError(template, columns=columns)
-    return settings | {"columns": columns}
+    return settings | {"columns": columns}, 0
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:

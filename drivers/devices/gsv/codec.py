@@ -69,15 +69,11 @@ class FrameLayout:
         return MEASUREMENT | (self.channels - 1)
 
     def offset(self, channel: int) -> int:
-        """Position of a channel's value (from 1) in a frame."""
         return HEADER_BYTES + (channel - 1) * self.kind.size
 
 
 def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
-    """Channels and kind of the measurement frames in `data`; None while there are not two in a row.
-
-    One frame is not enough, because the bytes that begin and end a frame may occur in a value.
-    """
+    """Channels and kind of frames in `data`; None without two in a row: one could be bytes of a value."""
     at = data.find(SYNC)
     while 0 <= at <= len(data) - HEADER_BYTES:
         found = _layout_at(data, at)
@@ -88,7 +84,6 @@ def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
 
 
 def _layout_at(data: bytes, at: int) -> tuple[int, ValueKind] | None:
-    """Channels and kind of a whole frame at `at`."""
     if len(data) < at + HEADER_BYTES or data[at] != SYNC or data[at + 1] & TYPE_AND_INTERFACE != MEASUREMENT:
         return None
     kind = (data[at + 2] & ~INDICATOR) >> 4

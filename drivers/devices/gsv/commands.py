@@ -129,10 +129,7 @@ def rate_from_response(response: Response) -> float | None:
 
 
 def text_from_response(response: Response) -> str:
-    """A serial number or version as text; "" if the device refuses.
-
-    The manuals leave the encoding open for some models: letters are kept, other bytes become numbers.
-    """
+    """A serial number or version as text, which some models send as numbers; "" if the device refuses."""
     if not response.is_ok:
         return ""
     if response.payload and all(0x20 < byte < 0x7F for byte in response.payload):

@@ -65,14 +65,12 @@ class SimulatedGsv(SimulatedProtocol):
         self._zero = np.zeros(2)
 
     def encode(self, _first_sequence: int, counts: Int32s, status: UInt8s, _times_s: Floats) -> list[bytes]:
-        """Frames; an overload of either gauge sets the same flag."""
         self._last = counts[-1].astype(np.float64)
         overloads = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
         flags = np.where(status & overloads, np.uint8(1), np.uint8(0))
         return [row.tobytes() for row in codec.encode_frames(self._layout, counts - self._zero, flags)]
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
-        """Response to a request; for `GET_VALUE` a frame of the last reading."""
         values = {Code.READ_RATE: struct.pack(">f", rate_hz)} | _VALUES
         if command.code in values:
             return commands.encode_response(commands.OK, values[Code(command.code)])

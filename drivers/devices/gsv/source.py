@@ -55,7 +55,6 @@ class GsvSource(SampleSource):
         list(FrameDecoder(layout, 1.0).feed(codec.encode_frames(layout, np.zeros((2, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
-        """Stop the device, which sends from power-on, set it up, and wait for the first frames."""
         self.prepare()
         received = self.silence(link)
         if self.request(link, self.stop_command, commands.find_response, _TRIES) is None:

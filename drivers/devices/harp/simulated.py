@@ -48,7 +48,6 @@ class SimulatedHarp(SimulatedProtocol):
         }
 
     def encode(self, _first_sequence: int, counts: Int32s, _status: UInt8s, times_s: Floats) -> list[bytes]:
-        """An event for each sample; none in standby."""
         self._ticks = round(float(times_s[-1]) * codec.TICKS_PER_S)
         if codec.with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:
             return [b""] * len(counts)

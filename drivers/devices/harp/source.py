@@ -46,7 +46,6 @@ class HarpSource(SampleSource):
         list(EventDecoder(1.0).feed(codec.encode_events(np.zeros(1), np.zeros((1, 2))).tobytes(), 0))
 
     def start(self, link: Link) -> bytes:
-        """Stop the device, identify it, start it, and wait for as many events as show the rate."""
         self.prepare()
         self._identify(link)
         self._write(link, Register.OPERATION, codec.with_active_mode)
@@ -89,7 +88,6 @@ class HarpSource(SampleSource):
         )
 
     def _read(self, link: Link, register: Register) -> int | None:
-        """Value of a register; None where the device refuses or does not answer."""
         command = codec.encode_read(register)
         reply = self.request(link, command, lambda data: codec.find_reply(data, register), _TRIES)
         return None if reply is None or reply.kind & codec.ERROR else reply.number

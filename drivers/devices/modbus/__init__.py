@@ -1,6 +1,6 @@
 """Modbus RTU transmitters: polled, their registers described by a map in TOML."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver, SingleGauge
+from drivers.driver import UNVERIFIED, DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -11,5 +11,5 @@ DRIVER = DeviceDriver(
     verified=f"{UNVERIFIED}; reads pymodbus 3.16 as server, and minimalmodbus 2.1 reads the simulated device",
     package=__name__,
     frames_title=N_("Modbus frames"),
-    single_gauge=SingleGauge.OWN_COLUMN,
+    has_single_gauge_settings=True,
 )

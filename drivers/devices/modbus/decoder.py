@@ -127,7 +127,6 @@ class ResponseDecoder(Decoder):
         self._losses += Losses(gap + 1, gap - damaged, damaged=damaged, overloaded=bool(status))
 
     def _gap(self) -> int | None:
-        """Rows between the last one and this; None where both are in one cell. Updates the row time."""
         last_ns, self._last_ns = self._last_ns, self._measured_ns
         if last_ns is None:
             return 0

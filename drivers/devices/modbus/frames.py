@@ -65,12 +65,10 @@ class Request:
 
     @property
     def response_bytes(self) -> int:
-        """Length of a response that is no exception."""
         return _HEAD + 2 * self.count + _CHECK if self.function in READ_FUNCTIONS else _ECHO_BYTES
 
     @property
     def description(self) -> Message:
-        """Function and registers, for messages."""
         last = self.register + self.count - 1
         template = N_("function {function:02d} for registers {register} to {last}")
         if last == self.register:
@@ -88,7 +86,6 @@ class Request:
         return len(received) >= self.response_bytes
 
     def parse_response(self, received: bytes) -> "Response":
-        """Decode the bytes that came after the request."""
         if len(received) < EXCEPTION_BYTES:
             return Response(fault=message("only {count} bytes came", count=len(received)))
         if with_crc(received[:-_CHECK]) != received:
@@ -155,10 +152,7 @@ def with_crc(frame: bytes) -> bytes:
 
 
 def crc16_modbus(data: bytes) -> int:
-    """CRC-16/MODBUS of `data` (polynomial 8005 reflected, start FFFF, no final xor).
-
-    The check value, of b"123456789", is 4B37 (CRC RevEng catalogue).
-    """
+    """CRC-16/MODBUS of `data` (CRC RevEng catalogue: polynomial 8005 reflected, check value 4B37)."""
     crc = 0xFFFF
     for byte in data:
         crc = crc >> 8 ^ _TABLE[(crc ^ byte) & 0xFF]

@@ -43,9 +43,8 @@ class Transaction:
     def measured_ns(self) -> int:
         """Best estimate of the time of the measurement: the middle of the transaction.
 
-        A transmitter measures between the end of the request and the beginning of its response, which take
-        about equally long on the wire and in this computer. The standard uncertainty is at most
-        `duration_s / sqrt(12)`.
+        Request and response take about equally long on the wire and in this computer. The standard
+        uncertainty is at most `duration_s / sqrt(12)`.
         """
         return (self.sent_ns + self.received_ns) // 2
 
@@ -73,10 +72,7 @@ def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
 
 
 def drain(link: Link) -> bytes:
-    """Read until the line is silent, so that the next response is that of the next request.
-
-    Ends after 8 reads: a device that sends all the time is no transmitter. Raises DeviceLostError.
-    """
+    """Read until the line is silent, or 8 times, so that the next response is that of the next request."""
     received = b""
     for _ in range(_MAX_DRAIN_READS):
         data = link.read()
@@ -100,7 +96,6 @@ class PollSchedule:
 
     @property
     def due_ns(self) -> int:
-        """Host's time of the next poll."""
         return self._cell * self._period_ns
 
     def wait(self) -> bool:
@@ -146,7 +141,6 @@ class ResponseTiming:
         return float(f"{math.floor(rate_hz / step) * step:.6g}")
 
     def skew_s(self, first: int, last: int) -> float:
-        """Time from the measurement of one request to that of another (s)."""
         return (self._phases_ns[last] - self._phases_ns[first]) / _NS
 
     def is_stale(self, transaction: Transaction) -> bool:

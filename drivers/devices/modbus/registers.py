@@ -112,7 +112,6 @@ def reorder_bytes(data: bytes, order: ByteOrder) -> bytes:
 
 
 def _limits(kind: ValueType) -> tuple[int, ...]:
-    """Least and largest whole number of a type; a value there is clipped."""
     if kind is ValueType.FLOAT32:
         return ()
     bits = 8 * struct.calcsize(_CODES[kind])
@@ -139,7 +138,6 @@ class Poll:
         return self._request_of(self.channels[0]), self._request_of(self.channels[-1])
 
     def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
-        """Values of all channels, from the registers that all requests brought."""
         values = []
         for channel in self.channels:
             state = channel.status_register

@@ -89,7 +89,6 @@ class ModbusSource(SampleSource):
 
     @property
     def run_note(self) -> Message:
-        """Quasi-static rate, caution of the map, and skew of two requests."""
         parts: list[Message] = []
         if self.rate_hz < QUASI_STATIC_HZ:
             template = N_("polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely")
@@ -170,7 +169,6 @@ class ModbusSource(SampleSource):
         return ResponseDecoder(self._poll, columns, rate_hz)
 
     def _await_responses(self, link: Link) -> None:
-        """Send all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
         deadline_s = time.monotonic() + self.timeout_s
         received = drain(link)
         for request in self._poll.requests:
@@ -214,7 +212,6 @@ class ModbusSource(SampleSource):
                 raise ProtocolError(template, gauge=gauge, reason=response.fault)
 
     def _measure_timing(self, link: Link) -> None:
-        """Measure the response time; choose the rate, or compare the one asked for with it."""
         timing = ResponseTiming([self._trial_poll(link) for _ in range(_TRIALS)])
         if self._rate_hz is None:
             self._rate_hz = min(MAX_RATE_HZ, timing.max_rate_hz)
@@ -246,9 +243,9 @@ def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSou
     return ModbusSource(parsed, register_map, rate_hz)
 
 
-def single_gauge_settings(gauge: str, settings: dict[str, str]) -> dict[str, str]:
-    """Settings of a device with one gauge."""
-    return settings | {"channel": gauge}
+def single_gauge_settings(gauge: str, settings: dict[str, str]) -> tuple[dict[str, str], int]:
+    """Settings of a device with one gauge, and the column of its readings."""
+    return settings | {"channel": gauge}, GAUGES.index(gauge)
 
 
 def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, RegisterMap]:

@@ -60,10 +60,7 @@ class FirmwareIdentity:
 
 
 def encode_rate(rate_hz: float) -> bytes:
-    r"""Command that sets the sample rate: `R<hz>\n`, whole hertz.
-
-    Raises SettingsError if `rate_hz` is no whole number from 1 to 1,000,000.
-    """
+    r"""Command that sets the sample rate, `R<hz>\n`. Raises SettingsError unless it is in whole hertz."""
     if not (1 <= rate_hz <= _MAX_RATE_HZ and rate_hz == int(rate_hz)):
         template = N_("rate {rate_hz:g} Hz cannot be set: give whole hertz from 1 to {most}")
         raise SettingsError(template, rate_hz=rate_hz, most=_MAX_RATE_HZ)

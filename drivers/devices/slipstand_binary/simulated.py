@@ -39,7 +39,6 @@ class SimulatedBinary(SimulatedProtocol):
         return codec.samples_per_frame(rate_hz)
 
     def encode(self, first_sequence: int, counts: Int32s, status: UInt8s, times_s: Floats) -> list[bytes]:
-        """Frames; one is flagged as overloaded when one of its samples is."""
         seen = np.bitwise_or.reduce(status.reshape(len(times_s), -1), axis=1)
         table = np.where(seen & SampleStatus.OVERLOAD_TABLE, np.uint8(FrameFlags.OVERLOAD_TABLE), np.uint8(0))
         relative = seen & SampleStatus.OVERLOAD_RELATIVE

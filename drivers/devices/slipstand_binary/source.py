@@ -39,10 +39,7 @@ class SlipstandBinarySource(SampleSource):
         list(FrameDecoder(1.0).feed(frame, 0))
 
     def start(self, link: Link) -> bytes:
-        """Stop the device, set it up, start it, and wait for the first good frame.
-
-        A device that does not answer `IDENTIFY` is accepted if its frames come; its rate is then measured.
-        """
+        """Accept a device that does not answer `IDENTIFY` if its frames come; its rate is then measured."""
         self.prepare()
         deadline_s = time.monotonic() + self.timeout_s
         self.silence(link)
@@ -71,7 +68,6 @@ class SlipstandBinarySource(SampleSource):
         return FrameDecoder(self._rate_hz) if self._rate_hz else None
 
     def _with_rate(self, link: Link, device: FirmwareIdentity) -> FirmwareIdentity:
-        """Set the rate where another is asked for, and let the device confirm it."""
         if self._rate_hz is None or device.rate_hz == self._rate_hz:
             return device
         link.write(codec.encode_rate(self._rate_hz))
