@@ -1,49 +1,26 @@
 """Compiled loop that counts what was lost before each reading, from the reading's time or sequence number.
 
-A reading is called a line here, whatever its bytes look like: a record with the fields start, end, good,
-time, sequence, table and relative.
+A reading is called a line here, whatever its bytes look like.
 """
 
 import numpy as np
 
-from drivers.arrays import Floats, Record, Records
+from drivers.arrays import Floats, Record, Records, record_type
 from drivers.compiled import compiled, inlined
-from drivers.packets import LOSS_FIELDS, count_packet, is_plausible_gap
+from drivers.packets import count_packet, is_plausible_gap, state_type
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
 """What gives a line its place among the others: its sequence, its time, or only its arrival."""
 
-STATE = np.dtype(
-    [
-        *LOSS_FIELDS,
-        ("started", np.int64),
-        ("restarting", np.int64),  # the connection broke, and the device may have restarted
-        ("period_s", np.float64),  # nominal, between lines
-        ("restart_rows", np.int64),  # rows for the time of a restart, by the host's clock
-        ("broken", np.int64),  # lines since the last good one
-        ("last_sequence", np.float64),
-        ("last_time", np.float64),
-        ("row_time_s", np.float64),  # unwrapped device time of the last row, from 0 at the first
-    ],
-    align=True,
-)
-"""What the decoder keeps between calls."""
+STATE = state_type("broken", "last_sequence last_time")
+"""What the decoder keeps between calls; `broken` counts the lines since the last good one."""
 
-RULES = np.dtype(
-    [
-        ("place", np.int64),
-        ("period_s", np.float64),
-        ("unit_s", np.float64),  # of the time column; 0 without one
-        ("clock_step_s", np.float64),  # of the device's clock
-        ("time_wrap", np.float64),  # in units of the column; 0: it does not wrap
-        ("sequence_wrap", np.float64),
-        ("max_gap", np.float64),  # samples
-        ("overload_count", np.float64),
-    ],
-    align=True,
-)
-"""What does not change during a stream."""
+RULES = record_type("place", "period_s unit_s clock_step_s time_wrap sequence_wrap max_gap overload_count")
+"""What does not change during a stream: the unit of the time column, 0 without one; the step of the device's
+clock; where time and sequence wrap, in their units, 0 where they do not; the gap in samples."""
+LINE = record_type("start end good discarded", "time sequence table relative")
+"""A line: where it is, whether it is good, bytes of this call discarded before it, and its values."""
 
 _NEW_START = -1
 _CORRUPT = -2

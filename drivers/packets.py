@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from drivers.arrays import Counts, Floats, Record, Records, UInt8s
+from drivers.arrays import Counts, Floats, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
@@ -31,19 +31,22 @@ PACKET = np.dtype(
     align=True,
 )
 
-CURSOR = np.dtype(
-    [
-        ("packet", np.int64),
-        ("lost", np.int64),  # rows of its gap that are filled
-        ("sample", np.int64),  # first sample of the packet
-        ("time_s", np.float64),  # of the row before
-    ],
-    align=True,
-)
-"""Progress of `fill_rows`."""
+CURSOR = record_type("packet lost sample", "time_s")
+"""Progress of `fill_rows`: packet, filled rows of its gap, its first sample, and time of the row before."""
 
-LOSS_FIELDS = [(field.name, np.int64) for field in fields(Losses)]
-"""Members that a decoder's state shares with `Losses`."""
+_LOSSES = [field.name for field in fields(Losses)]
+
+
+def state_type(ints: str, floats: str) -> np.dtype[np.void]:
+    """Type of what a decoder keeps between calls: counts of losses, what all decoders need, and own fields.
+
+    `started`: there was a good packet; `restarting`: the connection broke, and the device may have restarted;
+    `restart_rows`: rows for the time of a restart, by the host's clock; `period_s`: nominal, between samples;
+    `row_time_s`: unwrapped device time of the last row, from 0 at the first.
+    """
+    common = f"{' '.join(_LOSSES)} started restarting restart_rows"
+    return record_type(f"{common} {ints}", f"period_s row_time_s {floats}")
+
 
 _SLACK_S = 1.0
 _SLACK = 0.02
@@ -58,8 +61,8 @@ _DAMAGED = int(SampleStatus.DAMAGED)
 class PacketDecoder(Decoder):
     """A `Decoder` for devices that send by themselves; a device adds `_find_packets`.
 
-    `state` (1,) is what compiled loops keep between calls, with the fields `LOSS_FIELDS`, `restarting` and
-    `row_time_s`; `rate_hz` the nominal rate, > 0; `max_gap_s` the longest gap that rows stand for.
+    `state` is the type of what compiled loops keep between calls (`state_type`); `rate_hz` the nominal rate,
+    > 0; `max_gap_s` the longest gap that rows stand for.
     """
 
     _piece_bytes = 1 << 16  # long data are decoded in pieces that fit a processor's cache
@@ -67,8 +70,9 @@ class PacketDecoder(Decoder):
 
     _loss_estimator: "LossEstimator | None" = None  # for a device whose stream proves no loss
 
-    def __init__(self, state: Records, rate_hz: float, max_gap_s: float) -> None:
-        self._state = state
+    def __init__(self, state: np.dtype[np.void], rate_hz: float, max_gap_s: float) -> None:
+        self._state = np.zeros(1, dtype=state)
+        self._state["period_s"] = 1 / rate_hz
         self._rate_hz = rate_hz
         self._max_gap = round(max_gap_s * rate_hz)
         self._unfinished = b""
@@ -77,7 +81,7 @@ class PacketDecoder(Decoder):
 
     @property
     def losses(self) -> Losses:
-        losses = Losses(*(int(self._state[0][name]) for name, _ in LOSS_FIELDS))
+        losses = Losses(*(int(self._state[0][name]) for name in _LOSSES))
         if self._loss_estimator is not None:
             losses.missing_estimated += self._loss_estimator.lost
         return losses

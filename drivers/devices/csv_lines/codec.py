@@ -93,8 +93,7 @@ class LineDecoder(PacketDecoder):
         overload_count: float = math.inf,
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
-        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
-        self._state["period_s"] = 1 / rate_hz
+        super().__init__(STATE, rate_hz, max_gap_s)
         self._parser = LineParser(layout)
         time = layout.time_column
         place = BY_SEQUENCE if Column.SEQUENCE in layout.columns else BY_TIME if time else BY_COUNT

@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.arrays import Ints, Record, Records, UInt8s
+from drivers.arrays import Ints, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_slice
 from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.line_counting import LINE
 
 ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
 ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)
@@ -25,21 +26,7 @@ _ROLES = {
     Column.CRC: ROLE_CRC,
 }
 
-LINE = np.dtype(
-    [
-        ("start", np.int64),
-        ("end", np.int64),  # position of the terminator
-        ("good", np.int64),
-        ("time", np.float64),  # in the unit of its column
-        ("sequence", np.float64),
-        ("table", np.float64),
-        ("relative", np.float64),
-    ],
-    align=True,
-)
-"""One line with content; blank lines and comments are skipped."""
-
-MARKS = np.dtype([("separator", np.int64), ("decimal", np.int64)], align=True)
+MARKS = record_type("separator decimal", "")
 
 _LF, _CR, _BLANK, _PLUS, _MINUS, _ZERO = b"\n\r +-0"
 _EXPONENT = 0x65  # "e", after setting the bit that makes a letter small

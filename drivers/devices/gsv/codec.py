@@ -5,11 +5,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s
+from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet
+from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet, state_type
 from drivers.samples import SampleStatus
 from messages.i18n import N_
 
@@ -129,7 +129,7 @@ class FrameDecoder(PacketDecoder):
     """
 
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
-        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
+        super().__init__(STATE, rate_hz, max_gap_s)
         self._layout = layout
         self._pattern = frame_pattern(layout)
         self._loss_estimator = LossEstimator(rate_hz)
@@ -171,44 +171,21 @@ class FrameDecoder(PacketDecoder):
         return values
 
 
-FRAME_PATTERN = np.dtype(
-    [
-        ("header", np.int64),
-        ("kind", np.int64),  # high half of the status byte
-        ("length", np.int64),
-        ("table", np.int64),  # positions of the two values in a frame
-        ("relative", np.int64),
-        ("is_float", np.int64),
-    ],
-    align=True,
-)
-"""What a good frame looks like."""
+FRAME_PATTERN = record_type("header kind length table relative is_float", "")
+"""What a good frame looks like: its header, high half of its status, length, positions of both values."""
 
-STATE = np.dtype(
-    [
-        *LOSS_FIELDS,
-        ("row_time_s", np.float64),  # 0: the device sends no time
-        ("restarting", np.int64),  # the connection broke after the last good frame
-        ("garbage", np.int64),  # bytes since then
-        ("begun", np.int64),  # frames that began in them
-    ],
-    align=True,
-)
-"""What the decoder keeps between calls."""
+STATE = state_type("garbage begun", "")
+"""What the decoder keeps between calls: bytes since the last good frame, and frames that began in them."""
 
 _KIND_BITS = 0xF0
 
 
 def frame_pattern(layout: FrameLayout) -> Records:
     """(1,) FRAME_PATTERN for frames of `layout`."""
-    pattern = np.zeros(1, dtype=FRAME_PATTERN)
-    pattern["header"] = layout.header
-    pattern["kind"] = INDICATOR | layout.kind << 4
-    pattern["length"] = layout.length
-    pattern["table"] = layout.offset(layout.table)
-    pattern["relative"] = layout.offset(layout.relative)
-    pattern["is_float"] = layout.kind is ValueKind.FLOAT32
-    return pattern
+    places = layout.offset(layout.table), layout.offset(layout.relative)
+    kind = INDICATOR | layout.kind << 4
+    values = (layout.header, kind, layout.length, *places, layout.kind is ValueKind.FLOAT32)
+    return np.array([values], dtype=FRAME_PATTERN)
 
 
 @compiled

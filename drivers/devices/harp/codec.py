@@ -14,7 +14,7 @@ import numpy as np
 from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s
 from drivers.clock import rate_from_steps
 from drivers.compiled import compiled, inlined
-from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
+from drivers.line_counting import BY_TIME, LINE, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder
 
 READ, WRITE, EVENT = 1, 2, 3
@@ -134,20 +134,6 @@ EVENT_BYTES = 28
 """Bytes of a load cell event."""
 VALUES_OFFSET = 11  # place of its first value
 
-LINE = np.dtype(
-    [
-        ("discarded", np.int64),  # bytes of this call that were discarded before it
-        ("start", np.int64),
-        ("end", np.int64),
-        ("good", np.int64),
-        ("time", np.float64),  # in 32 us
-        ("sequence", np.float64),  # there is none
-        ("table", np.float64),
-        ("relative", np.float64),
-    ],
-    align=True,
-)
-"""A good event, or up to `LENGTH` bytes of garbage; see `drivers.line_counting`."""
 
 _LENGTH_BYTE = EVENT_BYTES - 2
 _ADDRESS = int(Register.LOAD_CELLS)
@@ -270,8 +256,7 @@ class EventDecoder(PacketDecoder):
         overload_count: float = FULL_SCALE,
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
-        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
-        self._state["period_s"] = 1 / rate_hz
+        super().__init__(STATE, rate_hz, max_gap_s)
         self._channels = np.array([table, relative])
         tick_s, wraps = 1 / TICKS_PER_S, (float((1 << 32) * TICKS_PER_S), 0.0)
         self._rules = make_rules(BY_TIME, rate_hz, tick_s, tick_s, wraps, overload_count, max_gap_s)

@@ -10,12 +10,12 @@ from enum import IntFlag
 
 import numpy as np
 
-from drivers.arrays import Counts, Int32s, Ints, Record, Records, UInt8s
+from drivers.arrays import Counts, Int32s, Ints, Record, Records, UInt8s, record_type
 from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16, crc16_slice
 from drivers.errors import ProtocolError, SettingsError
-from drivers.packets import LOSS_FIELDS, MAX_GAP_S, PACKET, PacketDecoder, count_packet, is_plausible_gap
+from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder, count_packet, is_plausible_gap, state_type
 from messages.i18n import N_
 
 START = b"S"
@@ -36,9 +36,7 @@ _FRAMES_PER_S = 200.0
 _MAX_RATE_HZ = 1_000_000
 _HALF = 1 << 31
 _U32 = 0xFFFFFFFF
-FRAME = np.dtype(
-    [("start", np.int64), ("end", np.int64), *((name, np.int64) for name in ("flags", "seq", "t_us", "n"))]
-)
+FRAME = record_type("start end flags seq t_us n", "")
 """A good frame in a buffer: its place and its header."""
 
 
@@ -144,8 +142,7 @@ class FrameDecoder(PacketDecoder):
     _piece_bytes = 1 << 18
 
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
-        super().__init__(np.zeros(1, dtype=STATE), rate_hz, max_gap_s)
-        self._state["period_s"] = 1 / rate_hz
+        super().__init__(STATE, rate_hz, max_gap_s)
         self._state["max_gap"] = self._max_gap
 
     def expect_restart(self) -> None:
@@ -195,24 +192,9 @@ _OVERLOADS = int(FrameFlags.OVERLOAD_TABLE | FrameFlags.OVERLOAD_RELATIVE)
 _OVERLOAD_SHIFT = 2
 """Shifts the overload bits of the frame onto those of `SampleStatus`."""
 
-STATE = np.dtype(
-    [
-        *LOSS_FIELDS,
-        ("period_s", np.float64),  # nominal, between samples
-        ("max_gap", np.int64),  # a larger step of the sequence, or a negative one, is a restart
-        ("started", np.int64),
-        ("restarting", np.int64),  # the connection broke, and the device may have restarted
-        ("restart_rows", np.int64),  # rows for the time of a restart, by the host's clock
-        ("next_seq", np.int64),  # sequence number that follows without a loss
-        ("last_seq", np.int64),
-        ("last_t_us", np.int64),
-        ("packet_us", np.int64),  # unwrapped device time of the last frame, from 0 at the first
-        ("row_time_s", np.float64),  # and of its last sample
-        ("garbage", np.int64),  # bytes since the last good frame
-    ],
-    align=True,
-)
-"""What the decoder keeps between calls."""
+STATE = state_type("max_gap next_seq last_seq last_t_us packet_us garbage", "")
+"""What the decoder keeps between calls: the longest step of the sequence that is no restart; the sequence
+number that follows without a loss; sequence, time and unwrapped time (us) of the last frame; bytes since."""
 
 
 @compiled
