@@ -10,7 +10,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.settings_screen import PersonalSettings, SettingsFile
-from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
+from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from app.presenters.worker import Worker, WorkerPool
 from app.runs.journal import unfinished_journals
@@ -87,11 +87,7 @@ def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> St
         baud="" if device.baud is None else str(device.baud),
         rate_hz="" if device.rate_hz is None else f"{device.rate_hz:g}",
     )
-    protocols = tuple(
-        ProtocolChoice(entry.name, entry.title, entry.default_baud, entry.verified)
-        for entry in DRIVERS.values()
-        if entry.available
-    )
+    protocols = tuple(driver for driver in DRIVERS.values() if driver.available)
     all_series, folder = tuple(files.published_table()), str(context.directory)
     return StartState(all_series, simulation.series, protocols, form=form, recordings=folder)
 

@@ -8,6 +8,7 @@ from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
 from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.number_text import FormError, parse_number
+from drivers.driver import DeviceDriver
 from messages.i18n import gettext, translate
 
 
@@ -18,20 +19,12 @@ class PortChoice:
 
 
 @dataclass(frozen=True, slots=True)
-class ProtocolChoice:
-    name: str
-    title: str
-    default_baud: int | None = None
-    verified: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class StartState:
     """State of the screen. `busy` names the work in progress, `connected` the connected device."""
 
     all_series: tuple[str, ...]
     series: str
-    protocols: tuple[ProtocolChoice, ...] = ()
+    protocols: tuple[DeviceDriver, ...] = ()
     ports: tuple[PortChoice, ...] = ()
     form: ConnectForm = field(default_factory=ConnectForm)
     form_error: str = ""
@@ -40,7 +33,7 @@ class StartState:
     connected: str = ""
 
     @property
-    def selected_protocol(self) -> ProtocolChoice | None:
+    def selected_protocol(self) -> DeviceDriver | None:
         return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
 
 

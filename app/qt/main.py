@@ -47,7 +47,8 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     window = MainWindow(theme, presenter, _load_layout(errors))
     window.closed.connect(lambda layout: _save_layout(layout, errors))
     code = _run(app, window, presenter, series if simulated else None)
-    _print_late_errors(errors)
+    while (late := errors.next_report()) is not None:
+        sys.stderr.write(f"error: {translate(late.message)}\n")
     return code
 
 
@@ -94,11 +95,6 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
     return _INTERRUPTED if interrupts else code
-
-
-def _print_late_errors(errors: ErrorReporter) -> None:
-    while (report := errors.next_report()) is not None:
-        sys.stderr.write(f"error: {translate(report.message)}\n")
 
 
 def _has_display() -> bool:

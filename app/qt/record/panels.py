@@ -113,14 +113,10 @@ def _reserve_height(target: QLabel, lines_min: int) -> None:
 class Stepper(QWidget):
     def __init__(self) -> None:
         super().__init__()
-        self._steps: tuple[record.Step, ...] = ()
         self._labels: list[QLabel] = []
         self._layout = make_row(spacing=4, of=self)
 
     def show_steps(self, steps: tuple[record.Step, ...]) -> None:
-        if steps == self._steps:
-            return
-        self._steps = steps
         while len(self._labels) < len(steps):
             self._add_label()
         for target, step in zip(self._labels, steps, strict=True):

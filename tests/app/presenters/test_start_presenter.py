@@ -4,7 +4,8 @@ import pytest
 
 from app.acquisition.messages import PortSettings
 from app.presenters.navigator import ConnectForm
-from app.presenters.start_screen import PortChoice, ProtocolChoice, StartPresenter, StartState, port_settings
+from app.presenters.start_screen import PortChoice, StartPresenter, StartState, port_settings
+from drivers.driver import DeviceDriver
 
 
 class FakeDoors:
@@ -99,7 +100,7 @@ def test_ports_are_looked_for_when_asked(presenter: StartPresenter) -> None:
 
 
 def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
-    csv = ProtocolChoice("csv", "Lines", 115200, "not verified on hardware")
+    csv = DeviceDriver("csv", "Lines", 1, 115200, verified="not verified on hardware")
     state = StartState(all_series=(), series="", protocols=(csv,))
     presenter = StartPresenter(state, doors, tuple)
     assert presenter.state.selected_protocol is None

@@ -28,12 +28,13 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.screens import Screen
-from app.presenters.start_screen import PortChoice, ProtocolChoice, StartState
+from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow
 from config.schema import WindowLayout
+from drivers.driver import DeviceDriver
 
 
 class Desk:
@@ -49,8 +50,8 @@ class Desk:
             all_series=bench().all_series,
             series="1FFM0",
             protocols=(
-                ProtocolChoice("slipstand-binary", "", 460800, "not verified on a GSV"),
-                ProtocolChoice("csv", "", 115200),
+                DeviceDriver("slipstand-binary", "", 1, 460800, verified="not verified on a GSV"),
+                DeviceDriver("csv", "", 2, 115200),
             ),
             form=ConnectForm(protocol="slipstand-binary"),
             recordings=str(Path.home()),
