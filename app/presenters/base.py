@@ -8,6 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from config.schema import Gauges
 from messages.i18n import N_, gettext, ngettext
+from messages.message import Message
 
 State = TypeVar("State")
 Shown = TypeVar("Shown", contravariant=True)
@@ -107,6 +108,22 @@ class Progress:
 
     text: str
     fraction: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFailure:
+    """Why a task of a worker has failed."""
+
+    message: Message
+    is_cancelled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationStarted:
+    """A simulated stand has started and is being connected."""
+
+    series: str
+    true_friction: float
 
 
 ReportProgress = Callable[[Progress], None]

@@ -10,8 +10,8 @@ from typing import TypeVar
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Command, Event, Failed, PortSettings
 from app.acquisition.ring import RingRows
+from app.presenters.base import SimulationStarted
 from app.presenters.error_reports import ErrorReport, error_report
-from app.presenters.events import SimulationStarted
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import published_row

@@ -9,7 +9,7 @@ class Screen(StrEnum):
     """All screens, in the order of the side bar: name, title, icon.
 
     `WindowPresenter` has a presenter of the same name. The view is `<Name>Screen` in `app.qt.<name>.screen`,
-    unless `app.qt.screens` makes another one.
+    unless `app.qt.window` makes another one.
     """
 
     label: str

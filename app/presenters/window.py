@@ -10,16 +10,23 @@ from typing import TYPE_CHECKING, Any
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovery
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Notice, NoticeAction, Presenter, Progress, Tone
+from app.presenters.base import (
+    Notice,
+    NoticeAction,
+    Presenter,
+    Progress,
+    SimulationStarted,
+    TaskFailure,
+    Tone,
+)
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.events import SimulationStarted, TaskFailed, TaskFailure, TaskProgress
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Connecting, Notification
+from app.presenters.record.state import AnalysisFailed, AnalysisProgress, Connecting, Notification
 from app.presenters.recovery import RecoveryReport
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
@@ -289,9 +296,9 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.on_analysed(run, self._true_frictions.get(str(run.path)))
 
     def _on_analysis_failed(self, path: str, failure: TaskFailure) -> None:
-        self.record.dispatch(TaskFailed(path, failure.message))
+        self.record.dispatch(AnalysisFailed(path, failure.message))
         self.identify.on_failed(path, failure.message)
 
     def _on_analysis_progress(self, path: str, progress: Progress) -> None:
-        self.record.dispatch(TaskProgress(path, progress))
+        self.record.dispatch(AnalysisProgress(path, progress))
         self.identify.on_progress(path, progress)

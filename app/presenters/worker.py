@@ -14,9 +14,8 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar, TypeVarTuple, overload
 
 from app.log import start_log
-from app.presenters.base import ReportProgress
+from app.presenters.base import ReportProgress, TaskFailure
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
-from app.presenters.events import TaskFailure
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import language, use_language
 from messages.message import message

@@ -1,5 +1,8 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
+import importlib
+from typing import Any, cast
+
 import qtawesome
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QIcon
@@ -17,7 +20,9 @@ from PySide6.QtWidgets import (
 from app.presenters.base import Notice
 from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter, WindowState
-from app.qt.screens import build_screen
+from app.qt.settings_screen import SettingsScreen
+from app.qt.stand_screen import StandScreen
+from app.qt.start_screen import StartScreen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
@@ -129,11 +134,29 @@ class MainWindow(QMainWindow):
 
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
-            made = build_screen(screen, self._presenter, self._theme, self)
-            self._screens[screen] = made
+            self._screens[screen] = made = self._build_screen(screen)
             self._stack.addWidget(made)
             self._geometry.restore_parts(made)
         return self._screens[screen]
+
+    def _build_screen(self, screen: Screen) -> QWidget:
+        """Build the view of a screen; one in a folder is imported now, since its plots load pyqtgraph."""
+        window, presenter = self._presenter, self._presenter.presenters[screen]
+        links = {Screen.RECORD: window.show_start, Screen.IDENTIFY: self.ask_for_run, Screen.RUNS: self}
+        view: Any
+        match screen:
+            case Screen.START:
+                view = StartScreen(window.start, self.ask_for_run)
+            case Screen.STAND:
+                view = StandScreen(window.stand)
+            case Screen.SETTINGS:
+                view = SettingsScreen(window.settings)
+            case _:
+                module = importlib.import_module(f"app.qt.{screen}.screen")
+                more = (links[screen],) if screen in links else ()
+                view = getattr(module, f"{screen.capitalize()}Screen")(self._theme, presenter, *more)
+        presenter.attach(view)
+        return cast(QWidget, view)
 
     def _rail_button(self, screen: Screen) -> QToolButton:
         button = QToolButton()

@@ -29,7 +29,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
-from app.presenters.events import TaskFailure
+from app.presenters.base import TaskFailure
 from app.presenters.navigator import StandContext
 from app.presenters.worker import CANCELLED, WorkerPool
 from app.simulated_stand.motion import stand_truth

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.campaign.state import (
     CampaignState,
     CampaignSummary,
@@ -13,7 +13,6 @@ from app.presenters.campaign.state import (
     column_titles,
     row_without_runs,
 )
-from app.presenters.events import TaskFailure
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker

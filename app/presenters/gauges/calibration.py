@@ -16,8 +16,7 @@ from app.acquisition.averaged_counts import (
     average_counts,
 )
 from app.acquisition.ring import RingRows
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
     NO_DEVICE,

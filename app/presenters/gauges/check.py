@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from analysis.formatting import typeset, with_unit
 from app.acquisition.averaged_counts import AveragedCounts, NoAverageError, ReadingAverager, RecentSamples
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
 from app.presenters.gauges.calibration import moving_text
 from app.presenters.gauges.state import (
     CONNECTION_LOST,

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import Navigator
 from app.presenters.results import sentence

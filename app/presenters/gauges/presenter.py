@@ -10,8 +10,7 @@ from analysis.formatting import format_signed, typeset, with_unit
 from app.acquisition.averaged_counts import WINDOW_S, RecentSamples
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
-from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, TaskFailure, Tone
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter

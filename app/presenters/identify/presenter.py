@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.presenters import results
 from app.presenters.analysed_run import AUTO_MODEL, AnalysedRun, AnalysisTask
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.identify import cursors as cursor_values
 from app.presenters.identify import plot_data, result_tables
 from app.presenters.identify.state import (

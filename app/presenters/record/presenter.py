@@ -2,19 +2,18 @@
 
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from app.acquisition.guidance import guidance_for
 from app.acquisition.messages import Command, PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
-from app.presenters.events import TaskDone, TaskFailed
 from app.presenters.navigator import StandContext
 from app.presenters.record import state
 from app.presenters.record.model import RecordModel
 from app.presenters.record.reducer import Effect, reduce
-from app.presenters.record.state import Action, Cue
+from app.presenters.record.state import Action, Cue, TaskDone, TaskFailed
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
@@ -112,9 +111,9 @@ class RecordPresenter(Presenter[state.RecordState]):
             failed=lambda failure: self._on_task_ended(TaskFailed(effect, failure.message)),
         )
 
-    def _on_task_ended(self, event: TaskDone[Any] | TaskFailed) -> None:
-        if event.argument in self._unfinished:
-            self._unfinished.remove(event.argument)
+    def _on_task_ended(self, event: TaskDone | TaskFailed) -> None:
+        if event.task in self._unfinished:
+            self._unfinished.remove(event.task)
         self.dispatch(event)
 
 

@@ -9,8 +9,7 @@ from app.acquisition.messages import PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
-from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, Tone
 from app.presenters.record import live, state
 from app.presenters.record.model import (
     RECORDING_STATES,
@@ -22,7 +21,7 @@ from app.presenters.record.model import (
     monitors_of,
 )
 from app.presenters.record.next_runs import NextRuns
-from app.presenters.record.state import Action
+from app.presenters.record.state import Action, AnalysisFailed, AnalysisProgress, TaskDone, TaskFailed
 from app.presenters.results import Result, sentence
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
@@ -78,7 +77,7 @@ class _Reduction:
                 self._set(live=replace(model.live, width_px=max(width_px, live.PIXELS_MIN)))
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
-            case AnalysedRun() | TaskFailed(str()) | TaskProgress():
+            case AnalysedRun() | AnalysisFailed() | AnalysisProgress():
                 self._on_identification(event)
             case TaskFailed(task, message):
                 self._on_task_failed(task, message)
@@ -297,27 +296,29 @@ class _Reduction:
 
     # --- identification of the run ---
 
-    def _on_identification(self, event: AnalysedRun | TaskFailed | TaskProgress) -> None:
+    def _on_identification(self, event: AnalysedRun | AnalysisFailed | AnalysisProgress) -> None:
         model = self.model
-        path = str(event.path) if isinstance(event, AnalysedRun) else event.argument
+        path = str(event.path)
         ended = model.ended
         if ended is None or ended.result is not None or ended.event.path != path:
             self._on_late_identification(event, path)
             return
         match event:
-            case TaskProgress(_, progress):
+            case AnalysisProgress(_, progress):
                 self._set(ended=replace(ended, progress=progress))
             case AnalysedRun():
                 result = results.make_result(event, model.session.true_friction)
                 self._set_result(ended, result, RecordedRun.of(event))
-            case TaskFailed(_, message):
+            case AnalysisFailed(_, message):
                 result = results.failed_result(message, path, ended.event.ended)
                 self._set_result(ended, result, RecordedRun(path, ended.run.note, ended.run.note))
 
-    def _on_late_identification(self, event: AnalysedRun | TaskFailed | TaskProgress, path: str) -> None:
+    def _on_late_identification(
+        self, event: AnalysedRun | AnalysisFailed | AnalysisProgress, path: str
+    ) -> None:
         """Keep a run that the operator has gone on from; without a result it stays as it is."""
         to_keep = self.model.decisions.to_keep
-        if isinstance(event, TaskProgress) or path not in to_keep:
+        if isinstance(event, AnalysisProgress) or path not in to_keep:
             return
         self._set_decisions(to_keep=to_keep - {path})
         if isinstance(event, AnalysedRun):

@@ -7,13 +7,13 @@ from typing import Any
 from app.acquisition.messages import Event
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, Tone
 from app.presenters.decimated_history import Polyline
-from app.presenters.events import SimulationStarted, TaskDone, TaskFailed, TaskProgress
 from app.presenters.results import Result, ResultRow
 from app.runs.next_tests import NextTests
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
+from messages.message import Message
 
 _NO_DEVICE = Chip(N_("no device"))
 _DOTS_MAX = 6
@@ -286,6 +286,32 @@ class RestoreFromTrash:
 RecordTask = LoadPlan | CountCompletedRuns | SavePlan | KeepRun | MoveToTrash | RestoreFromTrash
 
 
+@dataclass(frozen=True, slots=True)
+class TaskDone:
+    task: RecordTask
+    answer: Any
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFailed:
+    task: RecordTask
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisProgress:
+    """Progress of the identification of the run at `path`."""
+
+    path: str
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisFailed:
+    path: str
+    message: Message
+
+
 class Notification(Enum):
     """Events without data that the window sends."""
 
@@ -343,12 +369,10 @@ RecordEvent = (
     | AnalysedRun
     | Settings
     | Gauges
-    | TaskDone[Any]
+    | TaskDone
     | TaskFailed
-    | TaskProgress
+    | AnalysisProgress
+    | AnalysisFailed
     | Event
 )
-"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves.
-
-The argument of a `TaskFailed` or `TaskProgress` is a `RecordTask`, or the path of a run being identified.
-"""
+"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves."""

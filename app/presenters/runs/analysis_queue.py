@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.presenters.base import Progress, batch_progress, run_count_text
-from app.presenters.events import TaskFailure
+from app.presenters.base import Progress, TaskFailure, batch_progress, run_count_text
 from app.presenters.runs.state import ANALYSING, RunAnalysed
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext, ngettext

@@ -5,8 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.state import BatchOutcome
 from app.presenters.worker import LazyModule, Worker

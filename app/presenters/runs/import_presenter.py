@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.import_form import (
     FIELDS,

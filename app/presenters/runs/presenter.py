@@ -5,8 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone, run_count_text
-from app.presenters.events import TaskFailure
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone, run_count_text
 from app.presenters.results import sentence
 from app.presenters.runs import changes
 from app.presenters.runs.analysis_queue import AnalysisQueue, AnalysisSummary

@@ -9,9 +9,9 @@ from stage import FakeEngine, FakeLauncher, FakeSimulation
 
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
+from app.presenters.base import SimulationStarted
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.events import SimulationStarted
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import published_row
 from drivers.errors import PortUnavailableError

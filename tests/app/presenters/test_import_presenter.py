@@ -7,8 +7,7 @@ import pytest
 from stage import Call, FakeWorker
 
 from app.cli.commands import SlipstandGroup
-from app.presenters.base import Tone
-from app.presenters.events import TaskFailure
+from app.presenters.base import TaskFailure, Tone
 from app.presenters.runs.import_form import FIELDS, GAIN, Form, make_form, validate
 from app.presenters.runs.import_presenter import ImportPresenter, pending_text
 from app.presenters.runs.state import ImportPreview, Overlay

@@ -19,11 +19,12 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
-from app.presenters.base import Chip, Progress, Tone
-from app.presenters.events import SimulationStarted, TaskFailed, TaskProgress
+from app.presenters.base import Chip, Progress, SimulationStarted, Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
+    AnalysisFailed,
+    AnalysisProgress,
     Connecting,
     Notification,
     RunForm,
@@ -229,7 +230,7 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     assert presenter.state.traces.span == frozen.span
     assert presenter.state.guidance.instruction == "Finding friction"
     assert presenter.state.progress is not None
-    presenter.dispatch(TaskProgress(RUN, Progress("Fitting coulomb", 0.4)))
+    presenter.dispatch(AnalysisProgress(RUN, Progress("Fitting coulomb", 0.4)))
     assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
 
 
@@ -279,7 +280,7 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     presenter.dispatch(Action.STOP)
     assert recorder.stopped == 1
     presenter.dispatch(ended(reason=EndReason.STOPPED))
-    presenter.dispatch(TaskFailed(RUN, "no release in 1 s of record. Pull and release while recording"))
+    presenter.dispatch(AnalysisFailed(RUN, "no release in 1 s of record. Pull and release while recording"))
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"

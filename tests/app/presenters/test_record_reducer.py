@@ -7,13 +7,13 @@ from stage import RUN, analysed, bench, ended, health, rows_between, standing
 
 from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.events import TaskProgress
 from app.presenters.record.live import LiveTraces, tare_chip
 from app.presenters.record.model import RecordModel
 from app.presenters.record.presenter import record_state
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
     Action,
+    AnalysisProgress,
     Connecting,
     KeepRun,
     LiveEstimate,
@@ -68,7 +68,7 @@ def test_a_reduction_changes_no_model_but_its_own(screen: Screen) -> None:
 
 
 def test_only_the_run_that_is_awaited_is_shown(screen: Screen) -> None:
-    screen.send(TaskProgress("/elsewhere.h5", Progress("Fitting", 0.5)))
+    screen.send(AnalysisProgress("/elsewhere.h5", Progress("Fitting", 0.5)))
     screen.send(analysed("/elsewhere.h5"))
     assert screen.model.ended is not None
     assert (screen.model.ended.result, screen.model.ended.progress) == (None, Progress("Identifying"))

@@ -14,11 +14,11 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.presenters.analysed_run import AnalysedRun
-from app.presenters.base import Tone
-from app.presenters.events import SimulationStarted, TaskDone, TaskFailed
+from app.presenters.base import SimulationStarted, Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
+    AnalysisFailed,
     Connecting,
     CountCompletedRuns,
     Cue,
@@ -33,6 +33,7 @@ from app.presenters.record.state import (
     RestoreFromTrash,
     RunForm,
     SavePlan,
+    TaskDone,
 )
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, PlannedSeries
@@ -332,7 +333,7 @@ def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk = Desk()
     desk.record.dispatch(Action.ARM)
     desk.run()
-    desk.record.dispatch(TaskFailed(RUN, "no release"))
+    desk.record.dispatch(AnalysisFailed(RUN, "no release"))
     assert {Action.NEXT, Action.REPEAT, Action.DISCARD} <= desk.record.state.allowed
     desk.record.dispatch(Action.NEXT)
     (task,) = desk.tasks()

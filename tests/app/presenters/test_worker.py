@@ -14,9 +14,8 @@ from typing import Any
 
 import pytest
 
-from app.presenters.base import Progress, ReportProgress
+from app.presenters.base import Progress, ReportProgress, TaskFailure
 from app.presenters.error_reports import ErrorReport
-from app.presenters.events import TaskFailure
 from app.presenters.worker import CANCELLED, LazyModule, Worker, WorkerPool
 from app.runs.batch.executors import ProcessExecutor
 from config.schema import ConfigError

@@ -24,7 +24,6 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
-from app.presenters.events import TaskDone
 from app.presenters.record.next_runs import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
@@ -37,6 +36,7 @@ from app.presenters.record.state import (
     PlanState,
     RecordTask,
     RunForm,
+    TaskDone,
 )
 from app.qt.record import sound
 from app.qt.record.panels import Stepper, TargetBar

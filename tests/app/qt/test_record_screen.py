@@ -11,9 +11,8 @@ from pytestqt.qtbot import QtBot
 from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
 
 from app.acquisition.messages import Connected, LiveResult, LiveValue, PullbackState, StateChanged
-from app.presenters.events import TaskFailed
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, Connecting
+from app.presenters.record.state import Action, AnalysisFailed, Connecting
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 
@@ -99,7 +98,7 @@ def failure(stage: Stage) -> None:
     tail(stage)
     stage.presenter.dispatch(ended())
     message = "the decay lasts 0.213 s, under two periods. Record until rest"
-    stage.presenter.dispatch(TaskFailed(str(analysed().path), message))
+    stage.presenter.dispatch(AnalysisFailed(str(analysed().path), message))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
