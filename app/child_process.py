@@ -18,8 +18,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from typing import Any, Generic, Protocol, TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -27,7 +27,6 @@ _log = logging.getLogger(__name__)
 
 Command = TypeVar("Command")
 Event = TypeVar("Event")
-Decoded_co = TypeVar("Decoded_co", covariant=True)
 Decoded = TypeVar("Decoded")
 
 READ_BYTES = 1 << 16
@@ -41,14 +40,6 @@ _LINE_BYTES = 1 << 24
 _SESSION_SIGNALS = ("SIGINT", "SIGHUP", "SIGBREAK")
 """They reach all processes of a terminal; the parent decides what they mean."""
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
-class StreamDecoder(Protocol[Decoded_co]):
-    """Turns bytes, cut anywhere, into messages. Keeps what is not a whole message yet."""
-
-    def feed(self, data: bytes) -> Iterator[Decoded_co]:
-        """Raises ValueError for what is no message."""
-        ...
 
 
 class LineDecoder(Generic[Decoded]):
@@ -85,11 +76,7 @@ def encode_line(message: object) -> bytes:
 def spawn(
     module: str, *arguments: str, is_background: bool = False, discard_stderr: bool = False
 ) -> "subprocess.Popen[bytes]":
-    """Start `python -m module` with pipes for stdin and stdout. Raises OSError.
-
-    In the background, numerical libraries use one thread; on Windows the process gets a lower priority,
-    elsewhere it lowers its own. Discard stderr where the parent reports the death of the process.
-    """
+    """Start `python -m module` with pipes; less priority in the background. Raises OSError."""
     flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console window otherwise
     if is_background:
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
@@ -104,11 +91,10 @@ def spawn(
 
 
 class ChildProcess(Generic[Command, Event]):
-    """Parent's side of a child process. `send` never waits for the child, unless asked to.
+    """Parent's side of a child process, which `spawn` starts; `send` never waits for the child.
 
-    `spawn` starts the process. `on_event` receives each event and `on_exit` the exit code after the last one,
-    in the reading thread. Lines that `decode` refuses are skipped. `queue_size` commands may wait until the
-    child takes them.
+    The reading thread calls `on_event` with each event and `on_exit` with the exit code. Lines that `decode`
+    refuses are skipped.
     """
 
     def __init__(
@@ -145,19 +131,12 @@ class ChildProcess(Generic[Command, Event]):
     def has_ended(self) -> bool:
         return self._has_ended.is_set()
 
-    @property
-    def is_running(self) -> bool:
-        return self._process.poll() is None
-
     def send(self, command: Command, timeout_s: float = 0.0) -> bool:
         """Queue a command. False when the queue stays full for `timeout_s`: the child takes nothing."""
         return self._put(self._encode(command), timeout_s)
 
     def stop(self, timeout_s: float, *, wait_while_active: bool = False) -> None:
-        """Close the child's stdin after the queued commands, and wait for its end.
-
-        The child is killed after `timeout_s` from this call, or from its last event while it is active.
-        """
+        """Close stdin and wait; kill the child `timeout_s` later, or so long after its last event."""
         start_s = time.monotonic()
         is_closing = self._put(None, timeout_s)
         while is_closing:
@@ -174,7 +153,7 @@ class ChildProcess(Generic[Command, Event]):
             thread.join(_KILLED_S)
 
     def kill(self) -> None:
-        if self.is_running:
+        if self._process.poll() is None:
             _log.info("child %d is killed", self.pid)
             self._is_killed = True
             self._process.kill()
@@ -207,23 +186,21 @@ class ChildProcess(Generic[Command, Event]):
 
 
 class CommandReader(Generic[Command]):
-    """Child's side: reads commands from a pipe in a thread of its own.
+    """Child's side: reads commands from a pipe in a thread of its own; `decode` takes bytes cut anywhere.
 
     The pipe is not read through a buffered file: its lock would be held by the thread for ever, and the
-    interpreter could not finish. An error of the decoder closes the reader like the end of the pipe;
-    `on_closed` is then called in the thread. Commands beyond `queue_size` wait in the pipe, and then at the
-    parent.
+    interpreter could not finish. An error of `decode` closes the reader like the end of the pipe.
     """
 
     def __init__(
         self,
         descriptor: int,
-        decoder: StreamDecoder[Command],
+        decode: Callable[[bytes], Iterable[Command]],
         on_closed: Callable[[], None] = lambda: None,
         queue_size: int = 1024,
     ) -> None:
         self._descriptor = descriptor
-        self._decoder = decoder
+        self._decode = decode
         self._on_closed = on_closed
         self._commands: queue.Queue[Command | None] = queue.Queue(queue_size)
         self._is_closed = False
@@ -247,7 +224,7 @@ class CommandReader(Generic[Command]):
     def _read(self) -> None:
         try:
             while data := os.read(self._descriptor, READ_BYTES):
-                for command in self._decoder.feed(data):
+                for command in self._decode(data):
                     self._commands.put(command)
         except (OSError, ValueError) as error:
             _log.warning("commands: %s", error)
@@ -256,11 +233,7 @@ class CommandReader(Generic[Command]):
 
 
 class EventSender(Generic[Event]):
-    """Child's side: writes events to a pipe in a thread of its own.
-
-    A parent that does not read misses events; it never blocks the child. Events of which `is_transient` is
-    true, because newer ones soon replace them, are dropped first.
-    """
+    """Child's side: writes events in a thread of its own. A parent that does not read misses events."""
 
     _QUEUE_EVENTS = 4096
     _CLOSE_S = 2.0

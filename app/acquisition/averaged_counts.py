@@ -143,11 +143,7 @@ class ReadingAverager:
         self._windows = 0
 
     def poll(self, gauge: int) -> AveragedCounts | None:
-        """Evaluate the current window once it is complete; None before. Raises NoAverageError.
-
-        The reading is taken when it is not active any more: in a steady window, or in the last one, even if
-        the gauge still creeps. An error ends it.
-        """
+        """Average of a whole window; the reading is taken if it is inactive then. Raises NoAverageError."""
         if not self.is_active or self._recent.end_s < self._since_s + self._window_s:
             return None
         rows = self._recent.since(self._since_s)
@@ -187,11 +183,7 @@ class CountAverager:
         max_windows: int = MAX_WINDOWS,
         on_unsteady: Callable[[AveragedCounts], None] = lambda _: None,
     ) -> AveragedCounts:
-        """Average of a window of samples from now on; `on_unsteady` receives those before the gauge rested.
-
-        Raises NoAverageError if too few samples come or are valid. Raises AcquisitionError or DriverError if
-        the stream has ended.
-        """
+        """Average of a window from now on. Raises NoAverageError, and what ended the stream."""
         recent = RecentSamples(window_s + TIMEOUT_S)
         averager = ReadingAverager(recent, window_s, max_windows)
         with self._changed:

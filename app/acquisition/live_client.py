@@ -130,7 +130,7 @@ def main() -> None:
         os.nice(_NICE)
     events: EventSender[LiveAnswer] = EventSender(reserve_stdout(), is_transient=lambda _: True)
     commands: CommandReader[LiveCommand] = CommandReader(
-        0, LineDecoder(decode_live_command), on_closed=lambda: os._exit(0)
+        0, LineDecoder(decode_live_command).feed, on_closed=lambda: os._exit(0)
     )
     follower = importlib.import_module("app.acquisition.live_follower")
     follower.warm_up()

@@ -109,10 +109,7 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
-    """Record `count` runs, one after another; while one is recorded, this only causes a remark.
-
-    Only a run that came to its end by itself (rest, enough, duration) is followed by the next.
-    """
+    """Record `count` runs, each but the first after one that came to its end by itself."""
 
     run: RunSettings
     count: Annotated[int, msgspec.Meta(ge=1)] = 1

@@ -7,18 +7,10 @@ from enum import Enum, auto
 
 import msgspec
 
+from app.acquisition import messages
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import CheckpointWriter, Journal, JournalTap
 from app.acquisition.journal.records import Known, Mark, end_metadata
-from app.acquisition.messages import (
-    EndReason,
-    Event,
-    PullbackState,
-    RunEnded,
-    RunSettings,
-    RunStarted,
-    StateChanged,
-)
 from app.acquisition.pullback.plan import ObservedSlip, PullbackPlan
 from app.acquisition.pullback.trigger import Trigger
 from app.acquisition.run_file import RunFile, end_reason, sentences, start_time
@@ -60,7 +52,7 @@ class RecordingContext:
     writer: WriterClient
     """Idle."""
     time_base: Callable[[int, int], TimeBase]
-    emit: Callable[[Event], None]
+    emit: Callable[[messages.Event], None]
 
 
 class Recording:
@@ -68,7 +60,7 @@ class Recording:
 
     def __init__(
         self,
-        settings: RunSettings,
+        settings: messages.RunSettings,
         metadata: RunMetadata,
         rate_hz: float,
         journal: Journal,
@@ -90,11 +82,13 @@ class Recording:
         self._followed_index = self._armed_index
         self._file: RunFile | None = None
         self._is_path_sent = False
-        self._ended: EndReason | None = None
+        self._ended: messages.EndReason | None = None
         self._time_base = TimeBase()
         self._notes: list[Message] = []
         self._omitted_notes = 0
-        self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
+        self._state = (
+            messages.PullbackState.RECORDING if settings.trigger == "none" else messages.PullbackState.ZERO
+        )
         self._open_tap()
         self._update_checkpoint()
         self._send_state(self._state, self._armed_index, self._trigger.note)
@@ -140,7 +134,7 @@ class Recording:
         if self.latency is not Latency.BATCHED or new >= _FOLLOW_S * self._rate_hz:
             self._follow_pending()
 
-    def end(self, reason: EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
+    def end(self, reason: messages.EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
         """End the run; unless `keep_rest`, one in which the table was not pulled back leaves no file."""
         self._follow_pending()
         if self.is_ending:
@@ -161,12 +155,12 @@ class Recording:
                 self._journal.close()
             self._journal.remove()
         else:
-            self._send_state(PullbackState.CLOSING, self._file.next_index)
+            self._send_state(messages.PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
 
     def end_if_enough(self) -> None:
         if self._settings.duration_s is None and self._settings.trigger == "pullback":
-            self.end(EndReason.ENOUGH)
+            self.end(messages.EndReason.ENOUGH)
 
     def add_note(self, note: Message) -> None:
         if note and not self.is_ending:
@@ -177,7 +171,7 @@ class Recording:
         """Show the operator a note that is not stored."""
         self._send_state(self._state, self._history.next_index, note)
 
-    def poll(self) -> RunEnded | None:
+    def poll(self) -> messages.RunEnded | None:
         """Report what has happened to journal and file; return the run's end once its file is safe."""
         moved = self._journal.move_message
         if moved and moved not in self._notes:
@@ -200,7 +194,7 @@ class Recording:
     def _send_path(self, file: RunFile) -> None:
         error = file.path.exception()
         if error is None:
-            self._context.emit(RunStarted(str(file.path.result())))
+            self._context.emit(messages.RunStarted(str(file.path.result())))
         elif isinstance(error, Exception):
             self.end(end_reason(error), message_of(error))
 
@@ -301,11 +295,11 @@ class Recording:
             str(self._message()),
         )
 
-    def _run_ended(self, path: str, losses: Losses) -> RunEnded:
+    def _run_ended(self, path: str, losses: Losses) -> messages.RunEnded:
         file, release_index = self._file, self._trigger.measurement.release_index
-        return RunEnded(
+        return messages.RunEnded(
             path=path,
-            ended=self._ended or EndReason.STOPPED,
+            ended=self._ended or messages.EndReason.STOPPED,
             samples=losses.samples,
             missing=losses.missing,
             missing_estimated=losses.missing_estimated,
@@ -329,9 +323,9 @@ class Recording:
         omitted = message("{count} further notes are left out", count=self._omitted_notes)
         return sentences(*self._notes, omitted if self._omitted_notes else EMPTY)
 
-    def _send_state(self, state: PullbackState, index: int, note: Message = EMPTY) -> None:
+    def _send_state(self, state: messages.PullbackState, index: int, note: Message = EMPTY) -> None:
         self._state = state
-        self._context.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.position))
+        self._context.emit(messages.StateChanged(state, index / self._rate_hz, note, self._trigger.position))
 
 
 def _plan(metadata: RunMetadata, rate_hz: float, last_slip: ObservedSlip | None) -> PullbackPlan:

@@ -3,12 +3,11 @@
 from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from app.presenters.stand_screen import StandForm, StandPresenter, StandState
-from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, plain_text, set_text_or_hide, show_chip
+from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _FIELDS = {

@@ -177,7 +177,7 @@ def main() -> None:
     ignore_session_signals()
     _limit_memory()
     events: EventSender[ValidatorEvent] = EventSender(reserve_stdout())
-    paths: CommandReader[str] = CommandReader(0, LineDecoder(json_decoder(str)))
+    paths: CommandReader[str] = CommandReader(0, LineDecoder(json_decoder(str)).feed)
     events.send(ValidatorReady())
     while not paths.is_closed:
         if (path := paths.take(_IDLE_S)) is not None:

@@ -85,7 +85,7 @@ def main() -> int:
 
 def read_disturbances(on_invalid: Callable[[Exception], None] = lambda _: None) -> CommandReader[Disturbance]:
     """Read disturbances as lines on standard input; `on_invalid` receives what is wrong with a line."""
-    return CommandReader(0, LineDecoder(_decode_disturbance, on_invalid))
+    return CommandReader(0, LineDecoder(_decode_disturbance, on_invalid).feed)
 
 
 def _decode_disturbance(line: bytes) -> Disturbance:

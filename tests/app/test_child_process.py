@@ -60,7 +60,7 @@ def pipe():
 
 
 def command_reader(pipe: Pipe) -> CommandReader:
-    return CommandReader(pipe.read, LineDecoder(decode_command))
+    return CommandReader(pipe.read, LineDecoder(decode_command).feed)
 
 
 def event_sender(pipe: Pipe) -> EventSender:
@@ -138,7 +138,7 @@ def test_an_owner_that_is_gone_is_no_fault(pipe):
 
 ECHO = """
 from app.child_process import CommandReader, EventSender, LineDecoder, json_decoder, reserve_stdout
-events, commands = EventSender(reserve_stdout()), CommandReader(0, LineDecoder(json_decoder(str)))
+events, commands = EventSender(reserve_stdout()), CommandReader(0, LineDecoder(json_decoder(str)).feed)
 print("this is no event")
 while not commands.is_closed:
     if (command := commands.take(1.0)) is not None:

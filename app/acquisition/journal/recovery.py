@@ -103,11 +103,7 @@ def recover_folder(
 def recover_journal(
     journal: Path, progress: Progress = lambda _: None, *, original_folder: Path | None = None
 ) -> Recovery:
-    """Rebuild the run of one journal, put it in its place, and remove the journal.
-
-    Its place is beside the journal, or `original_folder` if it was meant for that, and that takes it. Raises
-    RecoveryError if no run can be rebuilt, or RunError if it cannot be written; the journal stays then.
-    """
+    """Put the run of a journal in its place, remove the journal. Raises RecoveryError, RunError."""
     if is_being_recorded(journal):
         return _being_recorded(journal)
     try:

@@ -185,13 +185,7 @@ def drift(stretch: Floats) -> tuple[float, float]:
 
 
 def fit_parabola_start(falling: Floats) -> float:
-    """Index at which a rise from zero, growing with the square of time, began (least squares).
-
-    Parameters
-    ----------
-    falling : (n, 2) float64
-        Ascending indices, and the distance (m) from where it began. One alone is its own beginning.
-    """
+    """Index at which a rise (n, 2) from zero with the square of time began, by least squares."""
     index, distance_m = falling[:, 0], falling[:, 1]
     if len(index) == 1:
         return float(index[0])

@@ -63,10 +63,7 @@ def fit_calibration(data: CalibrationData) -> CalibrationFit:
 def save_calibration(
     form: CalibrationForm, data: CalibrationData, today: datetime.date, valid_until: datetime.date | None
 ) -> tuple[str, str]:
-    """Write a calibration to a new file, and use it if the form says so.
-
-    Returns the file, and that of the previous calibration if it was replaced.
-    """
+    """Write a calibration to a new file; return it, and that of the previous one if it was replaced."""
     found = _fit(data)
     base, name = settings_file("gauges.toml"), _GAUGES[form.gauge]
     reference = form.reference.strip() or f"dial gauge {form.resolution_mm.strip()} mm"

@@ -26,13 +26,12 @@ from app.presenters.gauges.state import (
     CalibrationPoint,
     CalibrationState,
 )
-from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.inputs import CheckBox, make_button, make_choice, make_fields, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, set_text_or_hide, show_chip
+from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256

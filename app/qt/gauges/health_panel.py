@@ -10,12 +10,11 @@ from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
-from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.plots import PlotStack, pen
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import ValueGrid, label, show_chip
 from messages.i18n import N_, gettext
 
 _SYMPTOMS_SHOWN = 3

@@ -11,11 +11,10 @@ from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.check_panel import CheckPanel
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
-from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut
-from app.qt.widgets.text import break_path, label, show_chip
+from app.qt.widgets.text import ValueGrid, break_path, label, show_chip
 from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.27
