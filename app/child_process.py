@@ -131,6 +131,10 @@ class ChildProcess(Generic[Command, Event]):
     def has_ended(self) -> bool:
         return self._has_ended.is_set()
 
+    @property
+    def is_running(self) -> bool:
+        return self._process.poll() is None
+
     def send(self, command: Command, timeout_s: float = 0.0) -> bool:
         """Queue a command. False when the queue stays full for `timeout_s`: the child takes nothing."""
         return self._put(self._encode(command), timeout_s)
@@ -153,7 +157,7 @@ class ChildProcess(Generic[Command, Event]):
             thread.join(_KILLED_S)
 
     def kill(self) -> None:
-        if self._process.poll() is None:
+        if self.is_running:
             _log.info("child %d is killed", self.pid)
             self._is_killed = True
             self._process.kill()

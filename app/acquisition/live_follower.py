@@ -6,11 +6,10 @@ import time
 
 from analysis.averaging import BlockAverager, block_size, mask
 from analysis.live import LiveIdentification, LiveState
-from analysis.quantities import Quantity
 from analysis.record import Record
 from analysis.synthetic import Truth, simulate_record
 from app.acquisition.errors import RingError
-from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCommand, LiveResult, LiveValue
+from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveCommand, LiveResult
 from app.acquisition.ring import RingReader, RingRows, open_ring
 from app.child_process import CommandReader, EventSender
 from app.runs.analysis_input import build_record
@@ -108,18 +107,12 @@ def result_of(state: LiveState, origin_s: float) -> LiveResult:
     """Convert a state of the identification to an event; `origin_s` is its time 0 in the ring."""
     return LiveResult(
         time_s=origin_s + state.time_s,
-        friction_dynamic=_live_value(state.friction_dynamic),
-        period=_live_value(state.period_s),
-        damping_n1=_live_value(state.damping_n1_per_s),
+        friction_dynamic=state.friction_dynamic,
+        period=state.period_s,
+        damping_n1=state.damping_n1_per_s,
         law=state.law or "",
         slip_end_s=None if state.slip_end_s is None else origin_s + state.slip_end_s,
         narrowing=state.narrowing,
         may_stop=state.may_stop,
         is_enough=state.is_enough,
     )
-
-
-def _live_value(quantity: Quantity | None) -> LiveValue | None:
-    if quantity is None:
-        return None
-    return LiveValue(quantity.value, quantity.standard_uncertainty, quantity.unit)

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from analysis.quantities import Quantity
 from app.child_process import json_decoder
 from app.runs.metadata import Conditions, RunMetadata
 from drivers.clock import TimeBase
@@ -218,26 +219,18 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     """What a recording writes, journal included; 0 where nothing has come yet."""
 
 
-class LiveValue(msgspec.Struct, frozen=True):
-    """A quantity as known so far."""
-
-    value: float
-    standard_uncertainty: float
-    unit: str
-
-    @property
-    def is_known(self) -> bool:
-        """Tell whether the value is more than a first guess: known to a fifth of itself."""
-        return self.standard_uncertainty <= _GUESS * abs(self.value)
+def is_known(quantity: Quantity) -> bool:
+    """Tell whether a quantity is more than a first guess: known to a fifth of itself."""
+    return quantity.standard_uncertainty <= _GUESS * abs(quantity.value)
 
 
 class LiveResult(msgspec.Struct, frozen=True, tag=True):
     """Some 25 times a second after the release: what is known of the run so far, None before it can be."""
 
     time_s: float
-    friction_dynamic: LiveValue | None = None
-    period: LiveValue | None = None
-    damping_n1: LiveValue | None = None
+    friction_dynamic: Quantity | None = None
+    period: Quantity | None = None
+    damping_n1: Quantity | None = None
     law: str = ""
     slip_end_s: float | None = None
     narrowing: tuple[str, ...] = ()

@@ -8,9 +8,10 @@ import numpy as np
 
 from analysis.catalogue import Place, definition
 from analysis.formatting import format_value
+from analysis.quantities import Quantity
 from app.acquisition import messages
 from app.acquisition.guidance import PullbackSituation, guidance_for
-from app.acquisition.messages import Event, LiveResult, LiveValue, RunEnded, StateChanged
+from app.acquisition.messages import Event, LiveResult, RunEnded, StateChanged, is_known
 from app.acquisition.ring import RingRows
 from app.cli import output as out
 
@@ -163,11 +164,11 @@ def result_text(result: LiveResult) -> str:
         ("damping_n1_per_s", result.damping_n1),
         ("friction_dynamic", result.friction_dynamic),
     )
-    text = "  ".join(_value_text(name, value) for name, value in values if value and value.is_known)
+    text = "  ".join(_value_text(name, value) for name, value in values if value and is_known(value))
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
 
 
-def _value_text(name: str, value: LiveValue) -> str:
+def _value_text(name: str, value: Quantity) -> str:
     row = definition(name)
     unit = row.unit_at(Place.TERMINAL, value.unit)
     shown = format_value(value.value * unit.scale, value.standard_uncertainty * unit.scale, unit.symbol)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.catalogue import MILLIMETRE
 from analysis.formatting import THIN_SPACE, typeset, with_unit
-from analysis.quantities import Quantity
-from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition
+from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition, is_known
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters import number_text, results
@@ -267,9 +266,9 @@ def live_estimate(result: LiveResult) -> LiveEstimate:
         return LiveEstimate(note=results.sentence(result.message))
     values = (result.period, result.damping_n1, result.friction_dynamic)
     rows = tuple(
-        results.make_row(shown, Quantity.normal(value.value, value.standard_uncertainty, value.unit))
+        results.make_row(shown, value)
         for shown, value in zip((*MAIN, FRICTION), values, strict=True)
-        if value is not None and value.is_known
+        if value is not None and is_known(value)
     )
     return LiveEstimate(rows, _stop_note(result) if result.may_stop else "")
 

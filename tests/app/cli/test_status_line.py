@@ -5,14 +5,15 @@ import sys
 
 import pytest
 
-from app.acquisition.messages import Health, LiveResult, LiveValue
+from analysis.quantities import Quantity
+from app.acquisition.messages import Health, LiveResult
 from app.cli.progress_printer import StatusLine, result_text
 
 KNOWN = LiveResult(
     4.0,
-    friction_dynamic=LiveValue(0.10003, 0.00021, "1"),
-    period=LiveValue(0.32, 2.9e-5, "s"),
-    damping_n1=LiveValue(0.1213, 0.0021, "1/s"),
+    friction_dynamic=Quantity.normal(0.10003, 0.00021, "1"),
+    period=Quantity.normal(0.32, 2.9e-5, "s"),
+    damping_n1=Quantity.normal(0.1213, 0.0021, "1/s"),
     law="coulomb",
 )
 SAID = "T = 320.000 ± 0.029 ms  n1 = 0.1213 ± 0.0021 1/s  f_d = 0.10003 ± 0.00021"

@@ -2,14 +2,15 @@
 
 from stage import FakeRecorder, FakeWorker, bench
 
-from app.acquisition.messages import LiveResult, LiveValue, PullbackState, StateChanged
+from analysis.quantities import Quantity
+from app.acquisition.messages import LiveResult, PullbackState, StateChanged
 from app.presenters.record.live import live_estimate
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import LiveEstimate
 
-PERIOD = LiveValue(0.31994, 3.1e-4, "s")
-DAMPING = LiveValue(0.121, 0.0042, "1/s")
-FRICTION = LiveValue(0.1003, 0.0009, "1")
+PERIOD = Quantity.normal(0.31994, 3.1e-4, "s")
+DAMPING = Quantity.normal(0.121, 0.0042, "1/s")
+FRICTION = Quantity.normal(0.1003, 0.0009, "1")
 KNOWN = LiveResult(6.0, friction_dynamic=FRICTION, period=PERIOD, damping_n1=DAMPING, law="coulomb")
 
 
@@ -27,7 +28,7 @@ def test_what_is_not_known_yet_is_not_shown() -> None:
 
 
 def test_a_first_guess_is_not_shown() -> None:
-    guess = LiveValue(0.002, 0.046, "s")
+    guess = Quantity.normal(0.002, 0.046, "s")
     (row,) = live_estimate(LiveResult(2.0, period=guess, friction_dynamic=FRICTION)).rows
     assert row.symbol == "f<sub>d</sub>"
 

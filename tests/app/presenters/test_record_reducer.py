@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from stage import RUN, analysed, bench, ended, health, rows_between, standing
 
-from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
+from analysis.quantities import Quantity
+from app.acquisition.messages import EndReason, LiveResult, PullbackState, StateChanged
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.record.live import LiveTraces, tare_chip
 from app.presenters.record.model import RecordModel
@@ -123,7 +124,7 @@ def test_a_recording_that_begins_leaves_the_run_before(screen: Screen) -> None:
 
 def test_the_live_estimate_is_of_one_pull_only(screen: Screen) -> None:
     screen.come_to(PullbackState.SLIPPING)
-    screen.send(LiveResult(6.0, period=LiveValue(0.31994, 3.1e-4, "s")))
+    screen.send(LiveResult(6.0, period=Quantity.normal(0.31994, 3.1e-4, "s")))
     screen.come_to(PullbackState.TAIL)
     assert screen.model.session.live_estimate.rows
     screen.come_to(PullbackState.PULLING)

@@ -10,7 +10,8 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
 
-from app.acquisition.messages import Connected, LiveResult, LiveValue, PullbackState, StateChanged
+from analysis.quantities import Quantity
+from app.acquisition.messages import Connected, LiveResult, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, AnalysisFailed, Connecting
 from app.qt.record.screen import RecordScreen
@@ -18,9 +19,9 @@ from app.qt.theme import Theme
 
 LIVE = LiveResult(
     9.0,
-    friction_dynamic=LiveValue(0.1003, 0.0009, "1"),
-    period=LiveValue(0.31994, 3.1e-4, "s"),
-    damping_n1=LiveValue(0.121, 0.0042, "1/s"),
+    friction_dynamic=Quantity.normal(0.1003, 0.0009, "1"),
+    period=Quantity.normal(0.31994, 3.1e-4, "s"),
+    damping_n1=Quantity.normal(0.121, 0.0042, "1/s"),
     narrowing=("damping_n1_per_s",),
     may_stop=True,
 )
