@@ -1,6 +1,5 @@
 """The run file that is being written: rows to the writer process, their statistics, and the closing."""
 
-import contextlib
 import datetime
 import logging
 import threading
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.disk_space import ROW_BYTES
-from app.acquisition.errors import JournalError, JournalFullError
+from app.acquisition.errors import JournalFullError
 from app.acquisition.journal.journal import Journal, JournalTap
 from app.acquisition.journal.records import Ended, Named, Opened
 from app.acquisition.messages import EndReason
@@ -126,10 +125,7 @@ class RunFile:
         self._began = (datetime.datetime.now().astimezone(), host_ns())
         wire_start = request.journal.start if request.journal else 0
         started = request.metadata.start_time
-        with contextlib.suppress(JournalError):  # reported at the next read; the file can be had all the same
-            journal.append_metadata(
-                Opened(start_index, started, request.layout, wire_start, tap.decoded_reads)
-            )
+        journal.append_metadata(Opened(start_index, started, request.layout, wire_start, tap.decoded_reads))
         self.path: Future[Path] = writer.open(request)
 
     def append_all(self, reads: Iterable[DecodedRead], end_index: int | None = None) -> None:
@@ -167,14 +163,12 @@ class RunFile:
     def record_path(self) -> None:
         """Write the path of the file into the journal; a recovery finds the file without it, by a search."""
         if self.path.exception() is None and not self._is_closing:
-            with contextlib.suppress(JournalError):
-                self._journal.append_metadata(Named(str(self.path.result())))
+            self._journal.append_metadata(Named(str(self.path.result())))
 
     def close(self, ending: EndMetadata) -> None:
         """Begin to complete the file; `close_result` is set when that is done."""
         self._is_closing = True
-        with contextlib.suppress(JournalError):
-            self._journal.append_metadata(Ended(self.next_index, ending))
+        self._journal.append_metadata(Ended(self.next_index, ending))
         threading.Thread(target=self._close, args=(ending,), name="closing", daemon=True).start()
 
     def _pass_on(self) -> None:
@@ -195,15 +189,23 @@ class RunFile:
         lost = self._uncommitted.lost_after(self.start_index + samples)
         for rows in lost:
             self.statistics.remove(rows)
-        result = self._result(stored, samples, fault, journal_fault)
+        first, missing = fault or journal_fault, self.statistics.losses().samples - samples
+        notes = [] if first is None else [message_of(first)]
+        if first is None and missing:
+            notes.append(message("{samples} samples are only in the journal", samples=missing))
+        elif first is None and (stored is None or not stored.raw_bytes_stored):
+            notes.append(message("no room for the received bytes in the run"))
+        if not notes:
+            self._journal.remove()
+        elif missing or journal_fault is None:
+            notes.append(self._remedy(journal_fault))
         self._journal.release()
         if lost:
-            lost_note = message(
-                "the last {samples} samples found no room in run or journal, and are lost",
-                samples=sum(map(len, lost)),
-            )
-            result = replace(result, message=sentences(result.message, lost_note))
-        self.close_result.set_result(result)
+            template = N_("the last {samples} samples found no room in run or journal, and are lost")
+            notes.append(message(template, samples=sum(map(len, lost))))
+        path = stored.path if stored else self._known_path()
+        reason = None if first is None else end_reason(first)
+        self.close_result.set_result(CloseResult(path, reason, sentences(*notes)))
 
     def _stored(self, ending: EndMetadata) -> StoredRun:
         size = self.statistics.losses().samples * ROW_BYTES + self._journal.size
@@ -211,37 +213,16 @@ class RunFile:
         try:
             return self._writer.close(ending).result(timeout_s)
         except FutureTimeoutError:
-            raise WriteError(
-                "the run writer gives no answer for {timeout_s:.0f} s", timeout_s=timeout_s
-            ) from None
+            template = N_("the run writer gives no answer for {timeout_s:.0f} s")
+            raise WriteError(template, timeout_s=timeout_s) from None
 
-    def _result(
-        self, stored: StoredRun | None, samples: int, fault: Exception | None, journal_fault: Exception | None
-    ) -> CloseResult:
-        path = stored.path if stored else self._known_path()
-        missing = self.statistics.losses().samples - samples
-        first = fault or journal_fault
-        if first is not None:
-            remedy = self._remedy(journal_fault) if missing or journal_fault is None else EMPTY
-            return CloseResult(path, end_reason(first), sentences(message_of(first), remedy))
-        if missing:
-            what = message("{samples} samples are only in the journal", samples=missing)
-        elif stored is None or not stored.raw_bytes_stored:
-            what = message("no room for the received bytes in the run")
-        else:
-            self._journal.remove()
-            return CloseResult(path)
-        return CloseResult(path, message=sentences(what, self._remedy()))
-
-    def _remedy(self, journal_fault: Exception | None = None) -> Message:
-        journal = self._journal.path
-        if journal_fault is None:
-            template = N_("All that came is in {journal}: rebuild the run with slipstand recover {folder}")
-            return message(template, journal=journal, folder=journal.parent)
-        template = N_(
-            "More than the run has is in {journal}: rebuild the run with slipstand recover {folder}"
-        )
-        return message(template, journal=journal, folder=journal.parent)
+    def _remedy(self, journal_fault: Exception | None) -> Message:
+        template = N_("All that came is in {journal}: rebuild the run with slipstand recover {folder}")
+        if journal_fault is not None:
+            template = N_(
+                "More than the run has is in {journal}: rebuild the run with slipstand recover {folder}"
+            )
+        return message(template, journal=self._journal.path, folder=self._journal.path.parent)
 
     def _known_path(self) -> str:
         has_path = self.path.done() and self.path.exception() is None

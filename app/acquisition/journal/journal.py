@@ -90,7 +90,9 @@ class Journal:
         return start
 
     def append_metadata(self, note: MetadataRecord) -> None:
-        self.append(msgspec.json.encode(note), time.monotonic_ns(), RecordKind.NOTE)
+        """Append what became known; a failure is reported at the next read."""
+        with contextlib.suppress(JournalError):
+            self.append(msgspec.json.encode(note), time.monotonic_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
         """Bring everything to disk and close the file. Raises like `append`."""
@@ -238,12 +240,11 @@ class CheckpointWriter:
         self._due = 0
 
     def update(self, reads: int, next_index: int, measurement: PullbackMeasurement) -> None:
-        """Take what is known after so many reads. A failure of the journal is reported at the next read."""
+        """Take what is known after so many reads."""
         known = msgspec.convert(measurement, Known, from_attributes=True)
         if known == self._known and next_index < self._due:
             return
         self._known, self._due = known, next_index + self._every
         time_base = self._time_base(self._armed_index, next_index)
         mark = Mark(next_index, self._armed_index, known, time_base, reads)
-        with contextlib.suppress(JournalError):
-            self._journal.append_metadata(mark)
+        self._journal.append_metadata(mark)

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from analysis.formatting import typeset, with_unit
 from app.acquisition.averaged_counts import (
@@ -16,7 +16,7 @@ from app.acquisition.averaged_counts import (
     average_counts,
 )
 from app.acquisition.ring import RingRows
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, State, TaskFailure, Tone
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
     NO_DEVICE,
@@ -30,6 +30,7 @@ from app.presenters.number_text import FormError, format_fixed, parse_number
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import N_, gettext
+from messages.message import MessageError
 
 if TYPE_CHECKING:
     from app.presenters.gauges import tasks
@@ -43,23 +44,52 @@ _FITTED_FROM: Final = 2
 """Fewer points than this many plus one do not determine a line with a residual; that is no fault."""
 
 
-class CalibrationPresenter(Presenter[CalibrationState]):
-    """Takes one reading at a time; calls `on_saved` when a calibration is saved."""
+class ReadingPresenter(Presenter[State]):
+    """Base of a tab that averages readings; calls `on_kept` when it has written a file.
+
+    Its state has the fields `message` and `reading_status`.
+    """
+
+    def __init__(
+        self, state: State, recent: RecentSamples, worker: Worker, on_kept: Callable[[], None]
+    ) -> None:
+        super().__init__(state)
+        self._averager = ReadingAverager(recent)
+        self._worker = worker
+        self._on_kept = on_kept
+
+    def _show_error(self, error: MessageError | TaskFailure, **changes: Any) -> None:
+        self._update(message=Chip(sentence(error.message), Tone.BAD), **changes)
+
+    def _take_reading(self, gauge: int) -> AveragedCounts | None:
+        """Return a reading once it is complete; its progress or failure is shown."""
+        try:
+            average = self._averager.poll(gauge)
+        except NoAverageError as error:
+            text = gettext("Not taken. {words}", words=sentence(error.message))
+            self._update(reading_status="", message=Chip(text, Tone.BAD))
+            return None
+        if average is None or not self._averager.is_active:
+            return average
+        creep = typeset(f"{average.creep_counts:.3g}")
+        self._update(reading_status=gettext("Still moving by {creep} counts, waiting", creep=creep))
+        return None
+
+
+class CalibrationPresenter(ReadingPresenter[CalibrationState]):
+    """Takes one reading at a time, and fits a calibration to them."""
 
     def __init__(
         self,
         recent: RecentSamples,
         worker: Worker,
+        on_kept: Callable[[], None],
         now: Callable[[], datetime.datetime],
-        on_saved: Callable[[], None],
     ) -> None:
-        super().__init__(CalibrationState())
+        super().__init__(CalibrationState(), recent, worker, on_kept)
         self._recent = recent
-        self._worker = worker
         self._now = now
-        self._on_saved_file = on_saved
         self._is_connected = False
-        self._averager = ReadingAverager(recent)
         self._dial_mm = 0.0
         self._file_name = ""
 
@@ -76,16 +106,14 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         try:
             dial_mm = _millimetres(dial_text, gettext("Dial"))
         except FormError as error:
-            self._update(message=Chip(sentence(error.message), Tone.BAD))
+            self._show_error(error)
             return
         if not self._is_connected or not self._averager.start():
             self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
-        self._update(
-            reading_status=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm),
-            message=EMPTY_CHIP,
-        )
+        status = gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm)
+        self._update(reading_status=status, message=EMPTY_CHIP)
 
     def undo(self) -> None:
         if self._averager.is_active:
@@ -93,10 +121,8 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             self._update(reading_status="", message=Chip(gettext("Not taken"), Tone.PLAIN))
         elif self.state.points:
             last = self.state.points[-1]
-            self._update(
-                points=self.state.points[:-1],
-                message=Chip(gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
-            )
+            text = gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm)
+            self._update(points=self.state.points[:-1], message=Chip(text))
             self._fit()
 
     def restart(self) -> None:
@@ -110,7 +136,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         try:
             data, valid_until = self._data(), _last_day(form.valid_until, today)
         except FormError as error:
-            self._update(message=Chip(sentence(error.message), Tone.BAD))
+            self._show_error(error)
             return
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         self._worker.submit(
@@ -120,7 +146,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             today,
             valid_until,
             done=self._on_saved,
-            failed=self._on_save_failed,
+            failed=partial(self._show_error, can_save=True),
         )
 
     def set_connected(self, is_connected: bool) -> None:
@@ -138,7 +164,9 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
         if rows is not None:
             self._show_live(rows)
-        self._poll_reading()
+        average = self._take_reading(self.state.form.gauge)
+        if average is not None:
+            self._add_point(average, self._dial_mm)
 
     def _show_live(self, rows: RingRows) -> None:
         try:
@@ -146,44 +174,20 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         except NoAverageError as error:
             self._update(live_value="", live_note=sentence(error.message))
             return
-        self._update(
-            live_value=mean,
-            live_note=gettext(
-                "counts, mean of {time}; noise {noise}", time=with_unit(f"{_LIVE_S:g}", "s"), noise=noise
-            ),
-        )
-
-    def _poll_reading(self) -> None:
-        try:
-            average = self._averager.poll(self.state.form.gauge)
-        except NoAverageError as error:
-            text = gettext("Not taken. {words}", words=sentence(error.message))
-            self._update(reading_status="", message=Chip(text, Tone.BAD))
-            return
-        if average is not None and self._averager.is_active:
-            self._update(reading_status=moving_text(average))
-        elif average is not None:
-            self._add_point(average, self._dial_mm)
+        time = with_unit(f"{_LIVE_S:g}", "s")
+        note = gettext("counts, mean of {time}; noise {noise}", time=time, noise=noise)
+        self._update(live_value=mean, live_note=note)
 
     def _add_point(self, average: AveragedCounts, dial_mm: float) -> None:
         text = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_format_counts(average)[0])
-        message = Chip(text, Tone.OK)
+        tone, creep = Tone.OK, typeset(f"{average.creep_counts:.3g}")
         if not average.is_steady:
-            message = Chip(
-                gettext(
-                    "{words}, though still creeping by {creep}",
-                    words=text,
-                    creep=typeset(f"{average.creep_counts:.3g}"),
-                ),
-                Tone.WARN,
-            )
+            text = gettext("{words}, though still creeping by {creep}", words=text, creep=creep)
+            tone = Tone.WARN
         if not self.state.points:
             self._file_name = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
-        self._update(
-            points=(*self.state.points, CalibrationPoint(average.counts, dial_mm)),
-            reading_status="",
-            message=message,
-        )
+        points = (*self.state.points, CalibrationPoint(average.counts, dial_mm))
+        self._update(points=points, reading_status="", message=Chip(text, tone))
         self._fit()
 
     def _fit(self) -> None:
@@ -193,7 +197,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         try:
             data = self._data()
         except FormError as error:
-            self._update(can_save=False, message=Chip(sentence(error.message), Tone.BAD))
+            self._show_error(error, can_save=False)
             return
         points = data.points
         self._worker.submit(
@@ -219,10 +223,7 @@ class CalibrationPresenter(Presenter[CalibrationState]):
             text += " " + gettext("The one before is kept as {file}.", file=previous)
         offers_reconnect = self.state.form.use and self._is_connected
         self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=offers_reconnect)
-        self._on_saved_file()
-
-    def _on_save_failed(self, failure: TaskFailure) -> None:
-        self._update(message=Chip(sentence(failure.message), Tone.BAD), can_save=True)
+        self._on_kept()
 
     def _data(self) -> CalibrationData:
         """What the form asks to fit. Raises FormError."""
@@ -234,11 +235,6 @@ class CalibrationPresenter(Presenter[CalibrationState]):
         return CalibrationData(
             self.state.points, form.degree, resolution_mm * 1e-3, uncertainty_m, self._file_name
         )
-
-
-def moving_text(average: AveragedCounts) -> str:
-    creep = typeset(f"{average.creep_counts:.3g}")
-    return gettext("Still moving by {creep} counts, waiting", creep=creep)
 
 
 def _fit_options(form: CalibrationForm) -> tuple[object, ...]:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.formatting import typeset, with_unit
-from app.acquisition.averaged_counts import AveragedCounts, NoAverageError, ReadingAverager, RecentSamples
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
-from app.presenters.gauges.calibration import moving_text
+from app.acquisition.averaged_counts import AveragedCounts, RecentSamples
+from app.presenters.base import EMPTY_CHIP, Chip, TaskFailure, Tone
+from app.presenters.gauges.calibration import ReadingPresenter
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
     NO_DEVICE,
@@ -28,14 +28,11 @@ else:
     tasks = LazyModule("app.presenters.gauges.tasks")
 
 
-class CheckPresenter(Presenter[CheckState]):
-    """Takes two readings: at rest, and with the known step; calls `on_kept` when the outcome is recorded."""
+class CheckPresenter(ReadingPresenter[CheckState]):
+    """Takes two readings: at rest, and with the known step."""
 
     def __init__(self, recent: RecentSamples, worker: Worker, on_kept: Callable[[], None]) -> None:
-        super().__init__(CheckState())
-        self._averager = ReadingAverager(recent)
-        self._worker = worker
-        self._on_kept = on_kept
+        super().__init__(CheckState(), recent, worker, on_kept)
         self._gauges: Gauges | None = None
         self._device = ""
         self._rest: AveragedCounts | None = None
@@ -65,23 +62,15 @@ class CheckPresenter(Presenter[CheckState]):
             self._end(Chip(gettext(CONNECTION_LOST), Tone.WARN))
 
     def tick(self) -> None:
-        if self._gauges is None:
-            return
-        try:
-            average = self._averager.poll(self.state.form.gauge)
-        except NoAverageError as error:
-            self._update(reading_status="", message=Chip(sentence(error.message), Tone.BAD))
-            return
-        if average is not None and self._averager.is_active:
-            self._update(reading_status=moving_text(average))
-        elif average is not None:
+        average = self._take_reading(self.state.form.gauge)
+        if average is not None:
             self._on_reading(average)
 
     def _start(self) -> None:
         try:
             form = _normalised(self.state.form)
         except FormError as error:
-            self._update(message=Chip(sentence(error.message), Tone.BAD))
+            self._show_error(error)
             return
         self._rest = None
         self._update(
@@ -107,12 +96,13 @@ class CheckPresenter(Presenter[CheckState]):
 
     def _on_checked(self, checked: CheckOutcome) -> None:
         name = gettext("Gauge {number}", number=self.state.form.gauge + 1)
-        outcome = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
+        text, tone = gettext("{gauge} passed", gauge=name), Tone.OK
+        warnings = checked.warnings
         if not checked.passed:
-            outcome = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
-        remedy = () if checked.passed else (gettext("Check plugs and mounting, then calibrate it again."),)
+            text, tone = gettext("{gauge} FAILED", gauge=name), Tone.BAD
+            warnings += (gettext("Check plugs and mounting, then calibrate it again."),)
         self._end(EMPTY_CHIP)
-        self._update(outcome=outcome, values=checked.values, warnings=(*checked.warnings, *remedy))
+        self._update(outcome=Chip(text, tone, checked.file), values=checked.values, warnings=warnings)
         self._on_kept()
 
     def _on_failed(self, failure: TaskFailure) -> None:

@@ -60,7 +60,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._now = now
         self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
         self.ports = PortsPresenter(port_worker, navigator)
-        self.calibration = CalibrationPresenter(self._recent, worker, now, self._load_calibrations)
+        self.calibration = CalibrationPresenter(self._recent, worker, self._load_calibrations, now)
         self.check = CheckPresenter(self._recent, worker, self._load_calibrations)
         self._stream_gauges: Gauges | None = None
         self._rate_hz = 0.0
