@@ -20,7 +20,7 @@ from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, la
 from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError
 from analysis.results import fitted_quantities, joint_fit
 from analysis.results.joint_fit import DecayConstants, JointFit
@@ -28,17 +28,14 @@ from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import UncertaintyBudget, unstated_gains
+from messages.i18n import N_
 from messages.message import message
 
 Progress = Callable[[float, str], None]
 
 
 def identify(
-    record: Record,
-    *,
-    model: str = "auto",
-    progress: Progress | None = None,
-    monte_carlo: int | None = None,
+    record: Record, *, model: str = "auto", progress: Progress | None = None, monte_carlo: int | None = None
 ) -> Identification:
     """Identify friction, stiffness and damping from one pullback test.
 
@@ -140,10 +137,8 @@ def warm_up() -> None:
 def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo: bool) -> Identification:
     """Period, damping and a lower bound of f_s: all that a record without slip gives."""
     if decay.tail is None:
-        raise RecordError(
-            "the decay lasts {length} s, under two periods. Record until rest.",
-            length=format_number(decay.table.time_s[-1] - decay.release.time_s),
-        )
+        template = N_("the decay lasts {length} s, under two periods. Record until rest.")
+        raise RecordError(template, length=format_number(decay.table.time_s[-1] - decay.release.time_s))
     budget = UncertaintyBudget()
     constants = joint_fit.constants_from_tail(record, decay)
     joint_fit.add_constants(constants, budget)
@@ -182,14 +177,12 @@ def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[R
     without = search.fit(plain, [*minima, asked.parameters])
     if without.bic > asked.bic:
         return []
-    text = message(
+    template = N_(
         "the law {plain} explains the record as well (BIC {bic:.1f}, with f_s {bic_with:.1f}): f_s may"
-        " be as small as f_d, outside its interval too.",
-        plain=plain.name,
-        bic=without.bic,
-        bic_with=asked.bic,
+        " be as small as f_d, outside its interval too."
     )
-    return [ResultWarning("static-not-needed", text)]
+    values = {"plain": plain.name, "bic": without.bic, "bic_with": asked.bic}
+    return [result_warning("static-not-needed", template, **values)]
 
 
 def _is_refuted(warning: ResultWarning, joint: JointFit) -> bool:

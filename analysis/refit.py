@@ -22,6 +22,7 @@ from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
 from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
 from analysis.results.joint_fit import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
+from messages.i18n import N_
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,9 +66,6 @@ class Refitter:
             Name of a parameter that stays as it is in `start`, such as "friction_dynamic".
         steps_max : int
             Most evaluations.
-
-        Raises AnalysisError if the model is unknown, `start` lacks one of its parameters, or a parameter
-        cannot be held.
         """
         law, point = law_by_name(model), self._point(start)
         held = None if hold is None else self._held(hold, law)
@@ -84,10 +82,8 @@ class Refitter:
     def _point(self, start: Mapping[str, float]) -> Floats:
         missing = [name for name in (*PARAMETER_NAMES.values(), "release_s") if name not in start]
         if missing:
-            raise AnalysisError(
-                "the start of a refit lacks {missing}: hand over Identification.parameters.",
-                missing=", ".join(missing),
-            )
+            template = N_("the start of a refit lacks {missing}: hand over Identification.parameters.")
+            raise AnalysisError(template, missing=", ".join(missing))
         point = self._problem.prior_mean.copy()
         for place, name in PARAMETER_NAMES.items():
             point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)

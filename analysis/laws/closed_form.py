@@ -235,13 +235,7 @@ def _held_slopes(motion: Floats, slopes: Floats, parameters: Floats, rows: Float
 
 @compiled_part
 def _phase_slopes(
-    motion: Floats,
-    slopes: Floats,
-    parameters: Floats,
-    phase: Floats,
-    rows: Floats,
-    p: int,
-    which: int,
+    motion: Floats, slopes: Floats, parameters: Floats, phase: Floats, rows: Floats, p: int, which: int
 ) -> None:
     """Write the coefficients of the gauge's displacement in a phase, and of its derivatives."""
     swings, plate, slips = displacement_coefficients(parameters, phase, which, motion)

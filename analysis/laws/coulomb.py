@@ -7,8 +7,5 @@ COULOMB = FrictionLaw("coulomb", "f_s = f_d on a level plane", CLOSED_FORM)
 COULOMB_TILT = FrictionLaw("coulomb+tilt", "f_s = f_d on a tilted plane", CLOSED_FORM, (Parameter.TILT,))
 STATIC = FrictionLaw("static", "f_s >= f_d on a level plane", CLOSED_FORM, (Parameter.FRICTION_STATIC,))
 STATIC_TILT = FrictionLaw(
-    "static+tilt",
-    "f_s >= f_d on a tilted plane",
-    CLOSED_FORM,
-    (Parameter.FRICTION_STATIC, Parameter.TILT),
+    "static+tilt", "f_s >= f_d on a tilted plane", CLOSED_FORM, (Parameter.FRICTION_STATIC, Parameter.TILT)
 )

@@ -77,29 +77,23 @@ class ClosedFormSolver:
     is_closed_form = True
 
     def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:  # noqa: ARG002
-        """See `MotionSolver`."""
         return parameters.simulate(duration_s)
 
     def phases(self, vector: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         return integrate_events(vector, duration_s)
 
     def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         return sample_displacements(vector, integrate_events(vector, duration_s), time_s)
 
     def final_relative(self, vector: Floats, duration_s: float) -> float:
-        """See `MotionSolver`."""
         return float(events.final_relative(vector, integrate_events(vector, duration_s), duration_s))
 
     def peak_rates(self, vector: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         return np.array(events.peak_rates(vector, integrate_events(vector, duration_s), duration_s))
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
     ) -> list[Floats]:
-        """See `MotionSolver`."""
         end_s = max(float(gauge[0][-1]) for gauge in gauges)
         phases = integrate_events(vector, max(DURATION_MIN_S, end_s - float(point[Parameter.RELEASE])))
         rows = phase_responses(vector, phases, directions)
@@ -123,30 +117,24 @@ class IntegratedSolver:
         self.kernels = integrated_kernels(friction, name)
 
     def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:
-        """See `MotionSolver`."""
         return simulate_integrated(self.kernels, np.append(parameters.vector(), own), duration_s)
 
     def phases(self, vector: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         return self.kernels.integrate(vector, duration_s)[0][:, :5]
 
     def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         return self.kernels.sample(vector, *self.kernels.integrate(vector, duration_s), time_s, 2)
 
     def final_relative(self, vector: Floats, duration_s: float) -> float:
-        """See `MotionSolver`."""
         return float(final_relative(*self.kernels.integrate(vector, duration_s)))
 
     def peak_rates(self, vector: Floats, duration_s: float) -> Floats:
-        """See `MotionSolver`."""
         phases, nodes = self.kernels.integrate(vector, duration_s)
         return np.array(self.kernels.peak_rates(vector, phases, nodes, duration_s))
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
     ) -> list[Floats]:
-        """See `MotionSolver`."""
         extra, systems = free[len(directions) :], []
         release = int(np.flatnonzero(free == Parameter.RELEASE)[0])
         sampled_s, motion, slopes = None, np.empty(0), np.empty(0)
@@ -224,11 +212,8 @@ _FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
 """Of f_d and f_s: a fit may pass what is refused as a result, within reason."""
 _TILT_MAX = 1.0
 """No plane of a stand is steeper (rad); a plane of some milliradians is usual."""
-_DYNAMIC, _STATIC, _TILT = (
-    int(Parameter.FRICTION_DYNAMIC),
-    int(Parameter.FRICTION_STATIC),
-    int(Parameter.TILT),
-)
+_DYNAMIC, _STATIC = int(Parameter.FRICTION_DYNAMIC), int(Parameter.FRICTION_STATIC)
+_TILT = int(Parameter.TILT)
 StartPoints = Callable[[Floats, Indices], list[Floats]]
 """Points (p,) to search from, given the best one of a simpler law and the places of the own parameters."""
 

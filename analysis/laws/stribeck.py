@@ -12,6 +12,7 @@ from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Param
 from analysis.motion.events import FRICTION_DYNAMIC, FRICTION_STATIC
 from analysis.motion.integration import IntegratedMotion, simulate_integrated
 from analysis.motion.two_mass import MotionError, TwoMassParameters
+from messages.i18n import N_
 
 VELOCITY = OwnParameter("stribeck_velocity_m_per_s", "m/s", default=0.01, lower=1e-4, upper=1.0)
 _VELOCITY = MOTION_PARAMETER_COUNT
@@ -62,9 +63,7 @@ def simulate(
     Raises MotionError if a velocity or the duration is not positive and finite.
     """
     if not 0.0 < stribeck_velocity_m_per_s < math.inf:
-        raise MotionError(
-            "stribeck_velocity_m_per_s is {velocity:g}: give a positive velocity",
-            velocity=stribeck_velocity_m_per_s,
-        )
+        template = N_("stribeck_velocity_m_per_s is {velocity:g}: give a positive velocity")
+        raise MotionError(template, velocity=stribeck_velocity_m_per_s)
     vector = np.append(parameters.vector(), stribeck_velocity_m_per_s)
     return simulate_integrated(_SOLVER.kernels, vector, duration_s)

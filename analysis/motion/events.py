@@ -1,4 +1,4 @@
-"""Compiled walk of the two-mass motion from event to event, on closed forms.
+"""Compiled integration of the two-mass motion from event to event, in closed form.
 
 Inside a phase the table moves as u1 = u_e + e^(-n tau) (a cos w tau + b sin w tau), tau counted from the
 start of the phase. The derivative of e^(-n tau) (a cos + b sin) has the same form, so acceleration and
@@ -15,25 +15,15 @@ from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 
 # Places in the parameter vector that all kernels take; RELEASE is the time of release in the sampled times.
-(
-    FRICTION_DYNAMIC,
-    FRICTION_STATIC,
-    STIFFNESS,
-    DAMPING,
-    PULLBACK,
-    TILT,
-    RELEASE,
-    TABLE_MASS,
-    PLATE_MASS,
-    GRAVITY,
-) = range(10)
+FRICTION_DYNAMIC, FRICTION_STATIC, STIFFNESS, DAMPING, PULLBACK = range(5)
+TILT, RELEASE, TABLE_MASS, PLATE_MASS, GRAVITY = range(5, 10)
 PARAMETER_COUNT = 10
 
 # Columns of the phase table: start (s since release), sign of the slip (0 stick), and the state there.
 START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
 
 # A slip lasts at least this much over w. A slip that only grazes its limit is shorter than rounding can
-# resolve; this carries it past the turning point of the acceleration, so that the walk always moves on.
+# resolve; this carries it past the turning point of the acceleration, so that integration always advances.
 SLIP_PHASE_MIN_RAD = 1e-10
 
 PHASE_LIMIT = 1e5
@@ -304,7 +294,7 @@ def integrate_events(parameters: Floats, duration_s: float) -> Floats:
     ----------
     parameters : (10,) float64
         In the order of the constants above, and such as `two_mass.TwoMassParameters` allows: with others
-        the walk may end early, at `most_phases`.
+        the integration may end early, at `phase_limit`.
     duration_s : float
         Positive.
 
@@ -322,13 +312,8 @@ def integrate_events(parameters: Floats, duration_s: float) -> Floats:
         if count == len(phases):
             phases = _doubled(phases)
         row = phases[count]
-        row[START], row[SIGN], row[TABLE], row[VELOCITY], row[RELATIVE] = (
-            time,
-            sign,
-            table,
-            velocity,
-            relative,
-        )
+        row[START], row[SIGN] = time, sign
+        row[TABLE], row[VELOCITY], row[RELATIVE] = table, velocity, relative
         if sign == 0.0:
             tau, following = stick_end(parameters, table, velocity)
         else:
@@ -383,24 +368,20 @@ def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> flo
 @compiled_part
 def peak_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
     """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`."""
-    table_speed, plate_speed, table_push, plate_push = 0.0, 0.0, 0.0, 0.0
+    table_speed, plate_speed, table_acceleration, plate_acceleration = 0.0, 0.0, 0.0, 0.0
     for k in range(len(phases)):
-        start, sign, position, velocity = (
-            phases[k, START],
-            phases[k, SIGN],
-            phases[k, TABLE],
-            phases[k, VELOCITY],
-        )
+        row = phases[k]
+        start, sign, position, velocity = row[START], row[SIGN], row[TABLE], row[VELOCITY]
         span = (phases[k + 1, START] if k + 1 < len(phases) else duration_s) - start
         damping, frequency, load, drive = oscillator(parameters, sign)
         _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
         second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
         speed = _largest(damping, frequency, cosine, sine, span)
-        push = _largest(damping, frequency, second_cosine, second_sine, span)
-        table_speed, table_push = max(table_speed, speed), max(table_push, push)
+        acceleration = _largest(damping, frequency, second_cosine, second_sine, span)
+        table_speed, table_acceleration = max(table_speed, speed), max(table_acceleration, acceleration)
         if sign == 0.0:
-            plate_speed, plate_push = max(plate_speed, speed), max(plate_push, push)
+            plate_speed, plate_acceleration = max(plate_speed, speed), max(plate_acceleration, acceleration)
         else:
             plate_speed = max(plate_speed, abs(velocity), abs(velocity + drive * span))
-            plate_push = max(plate_push, abs(drive))
-    return table_speed, plate_speed, table_push, plate_push
+            plate_acceleration = max(plate_acceleration, abs(drive))
+    return table_speed, plate_speed, table_acceleration, plate_acceleration

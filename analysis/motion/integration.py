@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compile_with, compiled, compiled_part
@@ -45,9 +44,7 @@ from analysis.motion.events import (
     phase_limit,
     stick_end,
 )
-from analysis.motion.events import (
-    PARAMETER_COUNT as OWN,
-)
+from analysis.motion.events import PARAMETER_COUNT as OWN
 from analysis.motion.sampling import (
     BLOCK,
     block_basis,
@@ -56,7 +53,7 @@ from analysis.motion.sampling import (
     phase_blocks,
     rotation_tables,
 )
-from analysis.motion.two_mass import Motion, MotionError, MotionSamples, rising_times
+from analysis.motion.two_mass import Motion, MotionError
 
 Friction = Callable[[float, Floats], float]
 """Compiled: coefficient of friction at a sliding speed (m/s) with the parameters of `IntegratedKernels`."""
@@ -99,24 +96,8 @@ class IntegratedMotion(Motion):
     _phases: Floats = field(repr=False)
     _nodes: Floats = field(repr=False)
 
-    def sample(self, times_s: ArrayLike) -> MotionSamples:
-        """See `Motion.sample`."""
-        times, back = rising_times(times_s, self.duration_s)
-        table, relative, table_rate, plate_rate, table_second, plate_second = self._kernels.sample(
-            self._vector, self._phases, self._nodes, times, 6
-        )
-        phase = self.phase_signs[np.searchsorted(self.phase_starts_s, times, side="right") - 1]
-        phase[times < 0.0] = 0
-        samples = MotionSamples(
-            times.copy(), table, relative, table_rate, plate_rate, table_second, plate_second, phase
-        )
-        return samples if back is None else samples.take(back)
-
-    def sample_displacements(self, times_s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """See `Motion.sample_displacements`."""
-        times, back = rising_times(times_s, self.duration_s)
-        table, relative = self._kernels.sample(self._vector, self._phases, self._nodes, times, 2)
-        return (table, relative) if back is None else (table[back], relative[back])
+    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
+        return self._kernels.sample(self._vector, self._phases, self._nodes, times_s, count)
 
 
 def simulate_integrated(kernels: IntegratedKernels, vector: Floats, duration_s: float) -> IntegratedMotion:
@@ -368,22 +349,16 @@ def _between(nodes: Floats, k: int, tau: float, state: Floats) -> None:
     a, b = nodes[k], nodes[k + 1]
     h = b[NODE_TAU] - a[NODE_TAU]
     x = (tau - a[NODE_TAU]) / h
-    velocity, slip, push, rate = NODE_VELOCITY, NODE_SLIP, NODE_ACCELERATION, NODE_SLIP_RATE
-    table = a[NODE_TABLE], a[velocity], a[push], b[NODE_TABLE], b[velocity], b[push]
+    velocity, slip, acceleration, rate = NODE_VELOCITY, NODE_SLIP, NODE_ACCELERATION, NODE_SLIP_RATE
+    table = a[NODE_TABLE], a[velocity], a[acceleration], b[NODE_TABLE], b[velocity], b[acceleration]
     relative = a[NODE_RELATIVE], a[slip], a[rate], b[NODE_RELATIVE], b[slip], b[rate]
     state[0], state[3] = _quintic(x, h, table), _quintic(x, h, relative)
-    state[1] = _cubic(x, h, a[velocity], a[push], b[velocity], b[push])
+    state[1] = _cubic(x, h, a[velocity], a[acceleration], b[velocity], b[acceleration])
     state[2] = _cubic(x, h, a[slip], a[rate], b[slip], b[rate])
 
 
 def _slip_block(
-    parameters: Floats,
-    phase: Floats,
-    nodes: Floats,
-    end: int,
-    times: Floats,
-    out: Floats,
-    first: int,
+    parameters: Floats, phase: Floats, nodes: Floats, end: int, times: Floats, out: Floats, first: int
 ) -> None:
     """Write the channels of a block within a slip, nodes up to row `end`, from column `first` on."""
     k, start = int(phase[FIRST_NODE]), phase[START] + parameters[RELEASE]
@@ -435,8 +410,8 @@ def peak_rates(
     for p in range(len(phases)):
         if phases[p, SIGN] == 0.0:
             span = (phases[p + 1, START] if p + 1 < len(phases) else duration_s) - phases[p, START]
-            speed, push = peak_rates_in_stick(parameters, phases[p, TABLE], phases[p, VELOCITY], span)
-            _raise(largest, speed, speed, push, push)
+            speed, acceleration = peak_rates_in_stick(parameters, phases[p, TABLE], phases[p, VELOCITY], span)
+            _raise(largest, speed, speed, acceleration, acceleration)
             continue
         for k in range(int(phases[p, FIRST_NODE]), _nodes_end(phases, nodes, p) - 1):
             for look in range(5):
@@ -448,16 +423,16 @@ def peak_rates(
 
 
 @compiled_part
-def _raise(largest: Floats, table: float, plate: float, table_push: float, plate_push: float) -> None:
+def _raise(largest: Floats, table: float, plate: float, table_rate: float, plate_rate: float) -> None:
     largest[0] = max(largest[0], abs(table))
     largest[1] = max(largest[1], abs(plate))
-    largest[2] = max(largest[2], abs(table_push))
-    largest[3] = max(largest[3], abs(plate_push))
+    largest[2] = max(largest[2], abs(table_rate))
+    largest[3] = max(largest[3], abs(plate_rate))
 
 
 @compiled_part
 def final_relative(phases: Floats, nodes: Floats) -> float:
-    """Displacement of the plate against the table at the end of the walk."""
+    """Displacement of the plate against the table at the end of the motion."""
     last = phases[len(phases) - 1]
     relative: float = last[RELATIVE] if last[SIGN] == 0.0 else nodes[len(nodes) - 1, NODE_RELATIVE]
     return relative

@@ -15,12 +15,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.events import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
-from analysis.motion.two_mass import Motion, MotionError, MotionSamples, TwoMassParameters, rising_times
+from analysis.motion.two_mass import Motion, MotionError, TwoMassParameters
+from messages.i18n import N_
 
 _MOST_STEPS = 10_000_000
 
@@ -35,20 +36,17 @@ class SteppedMotion(Motion):
     _states: Floats = field(repr=False)
     _signs: NDArray[np.int8] = field(repr=False)
 
-    def sample(self, times_s: ArrayLike) -> MotionSamples:
-        """See `Motion.sample`."""
-        times, back = rising_times(times_s, self.duration_s)
-        rows, phase = _sample_steps(self._vector, self._states, self._signs, self.step_s, times)
-        table, relative, table_rate, plate_rate, table_second, plate_second = rows
-        samples = MotionSamples(
-            times.copy(), table, relative, table_rate, plate_rate, table_second, plate_second, phase
-        )
-        return samples if back is None else samples.take(back)
+    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
+        return self._sample_steps(times_s)[0][:count]
 
-    def sample_displacements(self, times_s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """See `Motion.sample_displacements`."""
-        samples = self.sample(times_s)
-        return samples.table_displacement_m, samples.relative_displacement_m
+    def _phase_at(self, times_s: Floats) -> NDArray[np.int8]:
+        return self._sample_steps(times_s)[1]
+
+    def _sample_steps(self, times_s: Floats) -> tuple[Floats, NDArray[np.int8]]:
+        sampled: tuple[Floats, NDArray[np.int8]] = _sample_steps(
+            self._vector, self._states, self._signs, self.step_s, times_s
+        )
+        return sampled
 
 
 def simulate(
@@ -85,12 +83,11 @@ def simulate(
 def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> None:
     static, dynamic = parameters.static_or_dynamic, parameters.friction_dynamic
     if static != dynamic:
-        raise MotionError(
+        template = N_(
             "friction_static is {static:g}, but the paper's method knows only friction_dynamic"
-            " ({dynamic:g}): leave it out, or take the exact method",
-            static=static,
-            dynamic=dynamic,
+            " ({dynamic:g}): leave it out, or take the exact method"
         )
+        raise MotionError(template, static=static, dynamic=dynamic)
     if parameters.tilt_rad != 0.0:
         raise MotionError(
             "tilt_rad is {tilt_rad:g}, but the paper's method knows no tilt: leave it out, or"
@@ -102,11 +99,8 @@ def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> N
             "duration_s is {duration_s:g}: give a positive number of seconds", duration_s=duration_s
         )
     if not 0.0 < step_s <= duration_s:
-        raise MotionError(
-            "step_s is {step_s:g}: give more than 0 and at most the duration, {duration_s:g}",
-            step_s=step_s,
-            duration_s=duration_s,
-        )
+        template = N_("step_s is {step_s:g}: give more than 0 and at most the duration, {duration_s:g}")
+        raise MotionError(template, step_s=step_s, duration_s=duration_s)
     if duration_s / step_s > _MOST_STEPS:
         raise MotionError(
             "step_s is {step_s:g}, {steps:.0f} steps: give at least {smallest:g}",

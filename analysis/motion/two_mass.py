@@ -18,6 +18,7 @@ from analysis.arrays import Floats
 from analysis.motion.events import SIGN, START, final_relative, integrate_events, peak_rates
 from analysis.motion.sampling import out_of_order, sample
 from analysis.record import AnalysisError
+from messages.i18n import N_
 
 
 class MotionError(AnalysisError, ValueError):
@@ -80,16 +81,30 @@ class Motion(ABC):
     """Largest absolute values."""
     plate_acceleration_max_m_per_s2: float
 
-    @abstractmethod
     def sample(self, times_s: ArrayLike) -> MotionSamples:
         """Motion at `times_s` (n,), in any order, seconds from release, negative before it.
 
         Raises MotionError if a time is not a number, or later than `duration_s`.
         """
+        times, back = rising_times(times_s, self.duration_s)
+        columns: list[Any] = [times.copy(), *self._sample_rising(times, 6), self._phase_at(times)]
+        samples = MotionSamples(*columns)
+        return samples if back is None else samples.take(back)
 
-    @abstractmethod
     def sample_displacements(self, times_s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """u1 and u2 - u1 (m) at `times_s`: what the gauges see, several times faster than `sample`."""
+        times, back = rising_times(times_s, self.duration_s)
+        table, relative = self._sample_rising(times, 2)
+        return (table, relative) if back is None else (table[back], relative[back])
+
+    @abstractmethod
+    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
+        """The first `count` of u1, u2 - u1, u1', u2', u1'', u2'' at rising times, (count, n)."""
+
+    def _phase_at(self, times_s: Floats) -> NDArray[np.int8]:
+        phase = self.phase_signs[np.searchsorted(self.phase_starts_s, times_s, side="right") - 1]
+        phase[times_s < 0.0] = 0
+        return phase
 
 
 def rising_times(
@@ -117,20 +132,15 @@ def rising_times(
     back = None
     if out_of_order(times):
         if np.isnan(times).any():
-            raise MotionError(
-                "time {index} is not a number: leave it out",
-                index=np.flatnonzero(np.isnan(times))[0],
-            )
+            template = N_("time {index} is not a number: leave it out")
+            raise MotionError(template, index=np.flatnonzero(np.isnan(times))[0])
         order = np.argsort(times, kind="stable")
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         times = times[order]
     if len(times) and times[-1] > duration_s * (1 + 1e-12):
-        raise MotionError(
-            "time {time_s:g} s is after the simulated {duration_s:g} s: simulate longer",
-            time_s=times[-1],
-            duration_s=duration_s,
-        )
+        template = N_("time {time_s:g} s is after the simulated {duration_s:g} s: simulate longer")
+        raise MotionError(template, time_s=times[-1], duration_s=duration_s)
     return times, back
 
 
@@ -193,20 +203,10 @@ class TwoMassParameters:
 
     def vector(self, release_s: float = 0.0) -> NDArray[np.float64]:
         """The parameter vector of the compiled kernels, (10,), in the order of `analysis.motion.events`."""
-        return np.array(
-            (
-                self.friction_dynamic,
-                self.static_or_dynamic,
-                self.stiffness_n_per_m,
-                self.damping_coefficient_kg_per_s,
-                self.pullback_m,
-                self.tilt_rad,
-                release_s,
-                self.table_mass_kg,
-                self.plate_mass_kg,
-                self.gravity_m_per_s2,
-            )
-        )
+        friction = (self.friction_dynamic, self.static_or_dynamic)
+        springs = (self.stiffness_n_per_m, self.damping_coefficient_kg_per_s)
+        masses = (self.table_mass_kg, self.plate_mass_kg, self.gravity_m_per_s2)
+        return np.array((*friction, *springs, self.pullback_m, self.tilt_rad, release_s, *masses))
 
     def simulate(self, duration_s: float = 10.0) -> "TwoMassMotion":
         """Motion from release to `duration_s`.
@@ -241,25 +241,8 @@ class TwoMassMotion(Motion):
     _vector: Floats = field(repr=False)
     _phases: Floats = field(repr=False)
 
-    def sample(self, times_s: ArrayLike) -> MotionSamples:
-        """See `Motion.sample`."""
-        times, order = rising_times(times_s, self.duration_s)
-        table, relative, table_rate, plate_rate, table_second, plate_second = sample(
-            self._vector, self._phases, times, 6
-        )
-        held = times < 0.0
-        phase = self.phase_signs[np.searchsorted(self.phase_starts_s, times, side="right") - 1]
-        phase[held] = 0
-        samples = MotionSamples(
-            times.copy(), table, relative, table_rate, plate_rate, table_second, plate_second, phase
-        )
-        return samples if order is None else samples.take(order)
-
-    def sample_displacements(self, times_s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """See `Motion.sample_displacements`."""
-        times, order = rising_times(times_s, self.duration_s)
-        table, relative = sample(self._vector, self._phases, times, 2)
-        return (table, relative) if order is None else (table[order], relative[order])
+    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
+        return sample(self._vector, self._phases, times_s, count)
 
 
 def simulate(*, duration_s: float = 10.0, **parameters: Any) -> TwoMassMotion:
@@ -296,11 +279,8 @@ def _check(parameters: TwoMassParameters) -> None:
             )
     for name in ("damping_coefficient_kg_per_s", "friction_dynamic"):
         if not 0.0 <= getattr(parameters, name) < math.inf:
-            raise MotionError(
-                "{name} is {value:g}: give zero or a positive number",
-                name=name,
-                value=getattr(parameters, name),
-            )
+            template = N_("{name} is {value:g}: give zero or a positive number")
+            raise MotionError(template, name=name, value=getattr(parameters, name))
     if not math.isfinite(parameters.pullback_m):
         raise MotionError(
             "pullback_m is {pullback_m:g}: give a finite number of metres", pullback_m=parameters.pullback_m
@@ -319,16 +299,14 @@ def _check(parameters: TwoMassParameters) -> None:
 def _check_friction(parameters: TwoMassParameters) -> None:
     static = parameters.static_or_dynamic
     if not parameters.friction_dynamic <= static < math.inf:
-        raise MotionError(
+        template = N_(
             "friction_static is {static:g}, less than friction_dynamic {friction_dynamic:g}:"
-            " give at least that",
-            static=static,
-            friction_dynamic=parameters.friction_dynamic,
+            " give at least that"
         )
+        raise MotionError(template, static=static, friction_dynamic=parameters.friction_dynamic)
     if not abs(parameters.tilt_rad) <= static:
-        raise MotionError(
+        template = N_(
             "tilt_rad is {tilt_rad:g}, steeper than friction_static {static:g}: the plate"
-            " slides off before release; give a smaller tilt",
-            tilt_rad=parameters.tilt_rad,
-            static=static,
+            " slides off before release; give a smaller tilt"
         )
+        raise MotionError(template, tilt_rad=parameters.tilt_rad, static=static)

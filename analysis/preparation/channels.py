@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError, StandMasses
+from messages.i18n import N_
 from messages.message import Message, message
 
 DELAY_MAX_S = 0.5
@@ -104,11 +105,8 @@ def check_masses(masses: StandMasses) -> None:
     for name in ("table_mass_kg", "plate_mass_kg", "gravity_m_per_s2"):
         value = getattr(masses, name)
         if not (np.isfinite(value) and value > 0.0):
-            raise RecordError(
-                "{name} = {value!r} is not a positive number. Give the stand's true value.",
-                name=name,
-                value=value,
-            )
+            template = N_("{name} = {value!r} is not a positive number. Give the stand's true value.")
+            raise RecordError(template, name=name, value=value)
         stated = name.replace("_kg", "_uncertainty_kg").replace("gravity_", "gravity_uncertainty_")
         _check_not_negative(stated, getattr(masses, stated))
 
@@ -121,23 +119,14 @@ def check_gauges(record: Record) -> None:
         _check_not_negative(f"{gauge}.nonlinearity_m", known.nonlinearity_m)
         _check_not_negative(f"{gauge}.delay_s_uncertainty", known.delay_s_uncertainty)
         if not abs(known.delay_s) <= DELAY_MAX_S:
-            raise RecordError(
-                "{gauge}.delay_s = {delay_s!r} is not within {delay_max_s:g} s. Measure it anew.",
-                gauge=gauge,
-                delay_s=known.delay_s,
-                delay_max_s=DELAY_MAX_S,
-            )
+            template = N_("{gauge}.delay_s = {delay_s!r} is not within {delay_max_s:g} s. Measure it anew.")
+            raise RecordError(template, gauge=gauge, delay_s=known.delay_s, delay_max_s=DELAY_MAX_S)
         if known.range_m is not None and not known.range_m > 0.0:
-            raise RecordError(
-                "{gauge}.range_m = {range_m!r} is not positive. Give the range, or none.",
-                gauge=gauge,
-                range_m=known.range_m,
-            )
+            template = N_("{gauge}.range_m = {range_m!r} is not positive. Give the range, or none.")
+            raise RecordError(template, gauge=gauge, range_m=known.range_m)
     if record.pullback_m is not None and not np.isfinite(record.pullback_m):
-        raise RecordError(
-            "pullback_m = {pullback_m!r} is not a number. Give the pullback, or none.",
-            pullback_m=record.pullback_m,
-        )
+        template = N_("pullback_m = {pullback_m!r} is not a number. Give the pullback, or none.")
+        raise RecordError(template, pullback_m=record.pullback_m)
 
 
 def quantisation_m(value_m: Floats) -> float:
@@ -148,34 +137,23 @@ def quantisation_m(value_m: Floats) -> float:
 
 def _check_not_negative(name: str, value: float) -> None:
     if not (np.isfinite(value) and value >= 0.0):
-        raise RecordError(
-            "{name} = {value!r} is not zero or a positive number. State it, or leave it out.",
-            name=name,
-            value=value,
-        )
+        template = N_("{name} = {value!r} is not zero or a positive number. State it, or leave it out.")
+        raise RecordError(template, name=name, value=value)
 
 
 def _check_columns(record: Record) -> None:
     time_s = record.time_s
     if len(time_s) < SAMPLES_MIN:
-        raise RecordError(
-            "the record has {count} samples, too short for a decay. Record from the hold to rest.",
-            count=len(time_s),
-        )
+        template = N_("the record has {count} samples, too short for a decay. Record from the hold to rest.")
+        raise RecordError(template, count=len(time_s))
     for name in ("table_displacement_m", "relative_displacement_m", "table_overload", "relative_overload"):
         column = getattr(record, name)
         if column is not None and len(column) != len(time_s):
-            raise RecordError(
-                "{name} has {count} values for {times} times. Give one for each time.",
-                name=name,
-                count=len(column),
-                times=len(time_s),
-            )
+            template = N_("{name} has {count} values for {times} times. Give one for each time.")
+            raise RecordError(template, name=name, count=len(column), times=len(time_s))
     if not (np.isfinite(record.clock_scale) and 0.5 < record.clock_scale < 2.0):
-        raise RecordError(
-            "clock_scale = {clock_scale!r} is not near 1. Check the clock fit of the run.",
-            clock_scale=record.clock_scale,
-        )
+        template = N_("clock_scale = {clock_scale!r} is not near 1. Check the clock fit of the run.")
+        raise RecordError(template, clock_scale=record.clock_scale)
     _check_times(time_s)
 
 
@@ -202,23 +180,19 @@ def _valid(
 ) -> NDArray[np.bool_]:
     present = np.isfinite(value_m)
     if not present.any():
-        raise RecordError(
-            "gauge {gauge} holds no reading (all are NaN). Check its cable and the import column.",
-            gauge=gauge,
-        )
+        template = N_("gauge {gauge} holds no reading (all are NaN). Check its cable and the import column.")
+        raise RecordError(template, gauge=gauge)
     valid = present.copy()
     if overload is not None:
         valid &= ~overload
     if range_m is not None:
         valid[present] &= np.abs(value_m[present]) < range_m
     if int(valid.sum()) < SAMPLES_MIN:
-        raise RecordError(
+        template = N_(
             "gauge {gauge} has {count} valid readings of {total}, the rest missing or clipped."
-            " Re-centre the gauge or choose a wider range, and record again.",
-            gauge=gauge,
-            count=int(valid.sum()),
-            total=len(value_m),
+            " Re-centre the gauge or choose a wider range, and record again."
         )
+        raise RecordError(template, gauge=gauge, count=int(valid.sum()), total=len(value_m))
     return valid
 
 
@@ -229,12 +203,8 @@ def _relative(
     try:
         valid = _valid(value_m, record.relative_overload, gauge.range_m, gauge=2)
     except RecordError as error:
-        warnings.append(
-            ResultWarning(
-                "gauge-2-absent",
-                message("{error} The friction comes from the table channel alone.", error=error),
-            )
-        )
+        template = N_("{error} The friction comes from the table channel alone.")
+        warnings.append(result_warning("gauge-2-absent", template, error=error))
         return None
     return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))
 
@@ -291,16 +261,8 @@ def remove_invalid_readings(channel: Channel, gauge: int, warnings: list[ResultW
 
 
 def _warning(code: str, gauge: int, count: int, total: int, what: Message) -> ResultWarning:
-    return ResultWarning(
-        code,
-        message(
-            "{count} of {total} readings of gauge {gauge} {what}: they are left out.",
-            count=count,
-            total=total,
-            gauge=gauge,
-            what=what,
-        ),
-    )
+    template = N_("{count} of {total} readings of gauge {gauge} {what}: they are left out.")
+    return result_warning(code, template, count=count, total=total, gauge=gauge, what=what)
 
 
 def _long_runs(member: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
@@ -495,22 +457,19 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
 
 def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
     """Warning of the drift of gauge 1 or 2; None as drift means that it is not steady."""
+    code = f"gauge-{gauge}-drifts"
     if drift_m_per_s is None:
-        text = message(
+        template = N_(
             "gauge {gauge} drifts or jumps after slip, not steadily: f_d may be biased. Let the"
-            " amplifier warm up.",
-            gauge=gauge,
+            " amplifier warm up."
         )
-    else:
-        moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
-        text = message(
-            "gauge {gauge} drifts by {drift_m_per_s}/s, {moved_m} in this record: the drift is taken"
-            " off. Let the amplifier warm up.",
-            gauge=gauge,
-            drift_m_per_s=format_length(drift_m_per_s),
-            moved_m=format_length(moved_m),
-        )
-    return ResultWarning(f"gauge-{gauge}-drifts", text)
+        return result_warning(code, template, gauge=gauge)
+    template = N_(
+        "gauge {gauge} drifts by {drift_m_per_s}/s, {moved_m} in this record: the drift is taken"
+        " off. Let the amplifier warm up."
+    )
+    drift, moved_m = format_length(drift_m_per_s), abs(drift_m_per_s) * float(np.ptp(channel.time_s))
+    return result_warning(code, template, gauge=gauge, drift_m_per_s=drift, moved_m=format_length(moved_m))
 
 
 def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:
@@ -564,14 +523,11 @@ def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
 
 def hum_warning(gauge: int, hum: tuple[float, float]) -> ResultWarning:
     """Warning of mains hum, given frequency (Hz) and amplitude (m)."""
-    text = message(
+    template = N_(
         "gauge {gauge} hums at {hum:.0f} Hz by {hum_2}: f_d may be biased. Check its shield and the ground"
-        " of the amplifier.",
-        gauge=gauge,
-        hum=hum[0],
-        hum_2=format_length(hum[1]),
+        " of the amplifier."
     )
-    return ResultWarning("mains-hum", text)
+    return result_warning("mains-hum", template, gauge=gauge, hum=hum[0], hum_2=format_length(hum[1]))
 
 
 def _powers(channel: Channel) -> Floats | None:

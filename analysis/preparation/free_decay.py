@@ -36,7 +36,7 @@ from analysis.preparation.oscillation import (
     median_of_three,
     white_noise,
 )
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record
 from messages.i18n import N_
 from messages.message import message
@@ -308,8 +308,8 @@ def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
     channels, found = read_channels(record)
     warnings += found
     if record.relative_displacement_m is None:
-        text = message("the record has no gauge 2. The friction comes from the table channel alone.")
-        warnings.append(ResultWarning("gauge-2-absent", text))
+        template = N_("the record has no gauge 2. The friction comes from the table channel alone.")
+        warnings.append(result_warning("gauge-2-absent", template))
     check_span(channels.table)
     check_rate(channels.table)
     table, relative = remove_invalid_readings(channels.table, 1, warnings), channels.relative
@@ -325,13 +325,11 @@ def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
 def _if_mostly_valid(readings: Channel, valid: Channel, warnings: list[ResultWarning]) -> Channel | None:
     if len(valid) >= _KEPT_MIN * len(readings):
         return valid
-    text = message(
+    template = N_(
         "only {count} of {total} readings of gauge 2 are sound: it is left out, and the friction"
-        " comes from the table channel alone. Re-centre gauge 2.",
-        count=len(valid),
-        total=len(readings),
+        " comes from the table channel alone. Re-centre gauge 2."
     )
-    warnings.append(ResultWarning("gauge-2-absent", text))
+    warnings.append(result_warning("gauge-2-absent", template, count=len(valid), total=len(readings)))
     return None
 
 
@@ -339,13 +337,11 @@ def _choose_release(releases: list[Release], warnings: list[ResultWarning]) -> R
     """The release with the longest decay after it; one with a hold before it where there is one."""
     if len(releases) > 1:
         times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
-        text = message(
+        template = N_(
             "the table was released or pushed, or gauge 1 jumped, {count} times (at {times}); the"
-            " longest decay is used.",
-            count=len(releases),
-            times=times,
+            " longest decay is used."
         )
-        warnings.append(ResultWarning("released-twice", text))
+        warnings.append(result_warning("released-twice", template, count=len(releases), times=times))
     chosen = max(releases, key=_release_preference)
     if chosen.plateau_start_s is None:
         text = message("the record begins after the release: pullback and release time are extrapolated.")

@@ -10,9 +10,9 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.preparation.channels import Channel, detect_hum, remove_hum
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
-from messages.message import message
+from messages.i18n import N_
 
 _HALF_WINDOW_S = 0.006
 """Of the lines whose slopes are speeds: short beside any swing, long beside noise at 500 Hz."""
@@ -308,10 +308,8 @@ def check_span(table: Channel) -> None:
             length_s=length_s,
         )
     if length_s > _LENGTH_MAX_S:
-        raise RecordError(
-            "the record spans {length_s} s, a test takes a minute. Check the unit of its times.",
-            length_s=format_number(length_s),
-        )
+        template = N_("the record spans {length_s} s, a test takes a minute. Check the unit of its times.")
+        raise RecordError(template, length_s=format_number(length_s))
     check_gap(table, _GAP_MAX_S)
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
@@ -387,25 +385,23 @@ def pullback_warnings(pullback_m: float, nominal_m: float | None) -> list[Result
     ratio = abs(pullback_m / nominal_m)
     if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
         return []
-    text = message(
+    template = N_(
         "the table was pulled back by {pullback_m}, the series by {nominal_m}: check the unit of the"
-        " readings, the calibration and the series.",
-        pullback_m=format_length(abs(pullback_m)),
-        nominal_m=format_length(abs(nominal_m)),
+        " readings, the calibration and the series."
     )
-    return [ResultWarning("pullback-unlike-series", text)]
+    pullback, nominal = format_length(abs(pullback_m)), format_length(abs(nominal_m))
+    return [result_warning("pullback-unlike-series", template, pullback_m=pullback, nominal_m=nominal)]
 
 
 def check_friction(friction_dynamic: float) -> None:
     """Raise RecordError for a coefficient that no dry plates have."""
     if friction_dynamic > FRICTION_MAX:
-        raise RecordError(
+        template = N_(
             "the fit gives f_d = {friction_dynamic}, over {largest:g}, which no dry"
             " plates have. Check the units of times and readings, and whether gauge 1 shows"
-            " the swing of the table.",
-            friction_dynamic=format_number(friction_dynamic, 4),
-            largest=FRICTION_MAX,
+            " the swing of the table."
         )
+        raise RecordError(template, friction_dynamic=format_number(friction_dynamic, 4), largest=FRICTION_MAX)
 
 
 _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)
@@ -480,10 +476,8 @@ def dominant_period(channel: Channel) -> float:
     first = 5
     peak = first + int(np.argmax(power[first:-1]))
     if peak <= first or power[peak] <= 0.0:
-        raise RecordError(
-            "no oscillation found in {length_s} s of gauge 1. Record a free decay of some periods.",
-            length_s=format_number(t[-1] - t[0]),
-        )
+        template = N_("no oscillation found in {length_s} s of gauge 1. Record a free decay of some periods.")
+        raise RecordError(template, length_s=format_number(t[-1] - t[0]))
     below, top, above = np.log(power[peak - 1 : peak + 2] + 1e-300)
     shift = 0.5 * (below - above) / (below - 2.0 * top + above)
     return float(4 * count * (t[1] - t[0]) / (peak + shift))
@@ -503,10 +497,8 @@ def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
     """
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:
-        raise RecordError(
-            "a decay of {length_s} s is shorter than its period. Record longer.",
-            length_s=format_number(length_s),
-        )
+        template = N_("a decay of {length_s} s is shorter than its period. Record longer.")
+        raise RecordError(template, length_s=format_number(length_s))
     shape = np.array([0.1, 2.0 * np.pi / period_s])
     stretch_s = 2.0 * period_s
     while True:

@@ -5,12 +5,12 @@ from typing import Any, Final
 
 from analysis.catalogue import ACCELERATION, CATALOGUE, METRES_PER_SECOND, Place, definition
 from analysis.formatting import format_value
+from analysis.motion.two_mass import PEAK_RATES
 from app.cli import output as out
 from app.runs.analysis_json import read_quantity
 
 _BODIES: Final = ("table", "plate")
 _LARGEST: Final = ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
-LARGEST_RATES: Final = tuple(f"{body}_{rate}" for rate in _LARGEST for body in _BODIES)
 _SHOWN: Final = 0.01
 """Sources of a smaller share of the largest one are left to the JSON."""
 
@@ -53,7 +53,7 @@ def _result_rows(results: dict[str, Any], events: dict[str, Any]) -> Iterator[tu
     """Each quantity; bounds of f_s, x_k and largest rates stand together in rows of their own."""
     for row in CATALOGUE:
         together = row.is_minor or row.symbol.relation or row.symbol.index == "k"
-        if row.name in results and row.name not in LARGEST_RATES and not together:
+        if row.name in results and row.name not in PEAK_RATES and not together:
             yield row.symbol.text, _value(row.name, results[row.name])
     for name, label in (("friction_static_lower", "at least"), ("friction_static_upper", "at most")):
         if name in results:

@@ -75,7 +75,8 @@ def _request(options: AnalyzeOptions) -> AnalysisRequest:
     """Build the request. Raises CommandError for options that do not fit together."""
     model, refits = options.model, options.monte_carlo
     if model not in MODELS:
-        raise CommandError(f"--model {model!r} is not known. Use {alternatives(MODELS)}")
+        laws = [f"{law.name} ({law.description})" for law in LAWS]
+        raise CommandError(f"--model {model!r} is not known. Use {alternatives(['auto', *laws])}")
     table_kg, plate_kg = options.table_mass, options.plate_mass
     if options.kind == "one-mass":
         if model != "auto" or refits is not None:

@@ -84,11 +84,7 @@ def _print_check(found: DisplacementCheck, entry: GaugeCheck) -> None:
     out.print_line(
         f"{'PASS' if found.passed else 'FAIL'}  gauge {GAUGES.index(entry.gauge) + 1} ({entry.gauge})"
     )
-    lengths = (
-        ("known", found.expected_m),
-        ("measured", found.measured_m),
-        ("deviation", found.deviation_m),
-    )
+    lengths = (("known", found.expected_m), ("measured", found.measured_m), ("deviation", found.deviation_m))
     rows = [
         (label, f"{format_signed(MILLIMETRE.scale * value_m, 4)} {MILLIMETRE.symbol}")
         for label, value_m in lengths

@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.catalogue import MILLIMETRE, Place, definition
 from analysis.motion.paper_method import simulate as simulate_by_paper
-from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.motion.two_mass import PEAK_RATES, Motion, TwoMassParameters
 from app.cli import output as out
-from app.cli.analysis_text import LARGEST_RATES, largest_rates
+from app.cli.analysis_text import largest_rates
 from app.cli.errors import CommandError
 from app.cli.measurement_options import SimulateOptions
 from app.cli.motion_parameters import check_samples, motion_parameters
@@ -62,7 +62,7 @@ def _document(motion: Motion, parameters: TwoMassParameters, method: str, step_s
         "residual_displacement_m": motion.residual_displacement_m,
         "slip_end_s": motion.slip_end_s,
         "phases": len(motion.phase_starts_s),
-        **{name: getattr(motion, name) for name in LARGEST_RATES},
+        **{name: getattr(motion, name) for name in PEAK_RATES},
         "stiffness_n_per_m": parameters.stiffness_n_per_m,
         "damping_coefficient_kg_per_s": parameters.damping_coefficient_kg_per_s,
         "parameters": asdict(parameters)

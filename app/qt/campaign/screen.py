@@ -4,15 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QFrame,
-    QMenu,
-    QPushButton,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QFrame, QMenu, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
