@@ -31,14 +31,12 @@ _COMPARED = 1500
 class ClassicalEstimates:
     """Estimates of one record; None where the record does not determine them."""
 
-    period_s: float | None
-    """From the turning points of the stick tail."""
+    period_s: float | None  # from the turning points of the stick tail
     log_decrement: float | None
     log_decrement_uncertainty: float | None
     cycles: int
     """Full cycles of the tail."""
-    residual_displacement_m: Floats
-    """u_s simulated at each of `SCANNED`, the other parameters as fitted."""
+    residual_displacement_m: Floats  # u_s simulated at each of `SCANNED`, the other parameters as fitted
     friction_candidates: tuple[float, ...]
     """Every f_d of the scanned range whose simulated u_s is the measured one; empty where that is unknown."""
     friction_by_paper_method: float | None

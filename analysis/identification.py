@@ -35,8 +35,7 @@ class Events:
     release_s: float | None = None
     slip_end_s: float | None = None
     """End of the last slip."""
-    rest_s: float | None = None
-    """The swing is as small as the noise from here on."""
+    rest_s: float | None = None  # the swing is as small as the noise from here on
     release_uncertainty_s: float | None = None
     """Standard uncertainties from the readings; None where they are not known."""
     slip_end_uncertainty_s: float | None = None
@@ -55,14 +54,11 @@ class Curves:
 class MonteCarlo:
     """What drawing gives beside the budget."""
 
-    draws: int
-    """Through the linearised fit."""
-    refits: int
-    """Full fits."""
+    draws: int  # through the linearised fit
+    refits: int  # full fits
     linear: dict[str, Quantity]
     """The standard uncertainty is the scatter, the interval holds 95 % of the draws."""
-    full: dict[str, Quantity]
-    """The same of the refits; empty without them."""
+    full: dict[str, Quantity]  # the same of the refits; empty without them
     agrees: dict[str, bool]
     """Whether the ends of the interval of the budget are met by those drawn (by the refits where there are
     any), within the tolerance."""
@@ -75,14 +71,11 @@ class MonteCarlo:
 class Identification:
     """Result of `identify`; the same values as `analyze --json`."""
 
-    kind: str
-    """"two-mass" or "one-mass"."""
-    results: dict[str, Quantity]
-    """By the names of INTERFACE ("results"); what cannot be determined is absent."""
+    kind: str  # "two-mass" or "one-mass"
+    results: dict[str, Quantity]  # by the names of INTERFACE ("results"); what cannot be determined is absent
     labels: dict[str, str | bool] = field(default_factory=dict)
     """Results that are not numbers: msk64_degree, coulomb_significant."""
-    model: ModelSelection | None = None
-    """None where no law of motion was fitted."""
+    model: ModelSelection | None = None  # none where no law of motion was fitted
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
     warnings: list[ResultWarning] = field(default_factory=list)
@@ -90,11 +83,9 @@ class Identification:
     parameters: dict[str, float] = field(default_factory=dict)
     """Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
     damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used."""
-    curves: Callable[[Floats], Curves] | None = None
-    """Fitted readings at given record times (n,)."""
+    curves: Callable[[Floats], Curves] | None = None  # fitted readings at given record times (n,)
     objective: Callable[[Floats], Floats] | None = None
     """Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted."""
     curves_by_friction: Callable[[float, Floats], Curves] | None = None
     """Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`."""
-    monte_carlo: MonteCarlo | None = None
-    """Where it was asked for."""
+    monte_carlo: MonteCarlo | None = None  # where it was asked for

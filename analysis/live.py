@@ -33,15 +33,13 @@ from analysis.uncertainty import ParameterUncertainty
 _FIRST_PERIODS = 1.5
 _READINGS = 1200
 """Readings a channel for refining; the chosen law then sees all."""
-_LOST = 1.3
-"""Mean square of the residual over that of the noise from which on the motion was lost."""
+_LOST = 1.3  # mean square of the residual over that of the noise from which on the motion was lost
 _AGAIN = 1.1
 """A search that found no law that fits is not repeated before the record is longer by this factor."""
 _STEPS = 3
 _ANEW_S = 0.5
 """Interval of full analyses once slip has ended; between them the chosen law is refined."""
-_SAME_START = 0.1
-"""Tails that begin so close, in periods, are one."""
+_SAME_START = 0.1  # tails that begin so close, in periods, are one
 _TAIL_PERIODS = 10.0
 """So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
 _FRICTION_WEIGHTS = np.eye(PARAMETER_COUNT)[Parameter.FRICTION_DYNAMIC]
@@ -52,8 +50,7 @@ FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 class LiveState:
     """What is known so far; None before it can be known."""
 
-    time_s: float
-    """Last row seen, in the record's time."""
+    time_s: float  # last row seen, in the record's time
     release_s: float | None = None
     """In the record's time; the slip end as fitted, None while the plate still slips."""
     slip_end_s: float | None = None
@@ -68,8 +65,7 @@ class LiveState:
     may_stop: bool = False
     """True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing slips:
     neither of the others)."""
-    is_enough: bool = False
-    """The same with none of the three narrowed: the record may end by itself."""
+    is_enough: bool = False  # the same with none of the three narrowed: the record may end by itself
 
 
 class LiveIdentification:
@@ -313,10 +309,8 @@ def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:
 
 RELATIVE_REDUCTION_MIN = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
-LATEST_END_S = 20.0
-"""After the release no record goes on for longer."""
-_LATER_READINGS = 400
-"""So many later readings a channel stand for all of them, with the noise of their mean."""
+LATEST_END_S = 20.0  # after the release no record goes on for longer
+_LATER_READINGS = 400  # so many later readings a channel stand for all of them, with the noise of their mean
 
 
 def is_worth_waiting(deviation: float, removed_variance: float) -> bool:

@@ -21,8 +21,7 @@ class RecordError(AnalysisError, ValueError):
 class GaugeUncertainty:
     """What is known of one gauge beyond its readings; None means "not stated"."""
 
-    gain_relative: float | None = None
-    """Relative standard uncertainty of the gain (1)."""
+    gain_relative: float | None = None  # relative standard uncertainty of the gain (1)
     nonlinearity_m: float = 0.0
     """Largest deviation from the calibration line (m); taken as a rectangular half-width."""
     delay_s: float = 0.0

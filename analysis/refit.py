@@ -29,15 +29,12 @@ from messages.i18n import N_
 class Refit:
     """What a refit found."""
 
-    parameters: dict[str, float]
-    """By the names of `Identification.parameters`."""
-    chi_square: float
-    """Of the readings."""
+    parameters: dict[str, float]  # by the names of `Identification.parameters`
+    chi_square: float  # of the readings
     rms_m: float
     curves: Callable[[Floats], Curves]
     """Fitted readings at given record times (n,)."""
-    steps: int
-    """Evaluations that it took."""
+    steps: int  # evaluations that it took
 
 
 class Refitter:

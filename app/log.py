@@ -17,8 +17,7 @@ LEVEL_VARIABLE = "SLIPSTAND_LOG_LEVEL"
 LEVELS = ("error", "warning", "info", "debug")
 _LARGEST_BYTES = 1_000_000
 """Some thousand lines: a day of recording at level debug."""
-_KEPT = 2
-"""Full files that are kept beside the newest."""
+_KEPT = 2  # full files that are kept beside the newest
 _FORMAT = "%(asctime)s %(levelname)s %(process)d %(name)s: %(message)s"
 
 _log = logging.getLogger(__name__)

@@ -25,12 +25,10 @@ class Message(msgspec.Struct, frozen=True):
     Build it with `message`, which converts values.
     """
 
-    template: str
-    """English, with fields in braces: "{port} is busy". It is the key of its translations."""
+    template: str  # english, with fields in braces: "{port} is busy". It is the key of its translations.
     values: dict[str, Value] = {}
     """By field name. A `Message` is rendered in the same language. A list is joined with ", "."""
-    plural: str = ""
-    """Template where `values["count"]` is not 1; "" where the message counts nothing."""
+    plural: str = ""  # template where `values["count"]` is not 1; "" where the message counts nothing
 
     def __str__(self) -> str:
         return self.render()
@@ -58,8 +56,7 @@ class Option(Message, frozen=True):
     """An option of the command line in a message; a window names its control instead (`replace_options`)."""
 
 
-EMPTY = Message("")
-"""Nothing to say; false in a condition."""
+EMPTY = Message("")  # nothing to say; false in a condition
 
 
 class MessageError(Exception):

@@ -26,10 +26,8 @@ from analysis.record import RecordError
 
 _FIRST_DAMPING = 1e-4
 """Over the diagonal of the normal matrix, scaled to ones: a step of Gauss and Newton at first."""
-_DAMPING_MAX = 1e8
-"""With more, steps are lost in rounding."""
-_UNDETERMINED = 1e-11
-"""Eigenvalue of the scaled normal matrix below which rounding decides."""
+_DAMPING_MAX = 1e8  # with more, steps are lost in rounding
+_UNDETERMINED = 1e-11  # eigenvalue of the scaled normal matrix below which rounding decides
 _PIVOT_MIN = 1e-14
 _TINY = 1e-300
 _ACCURACY = 1e-4
@@ -176,8 +174,7 @@ def _solve_cholesky(matrix: Floats, right: Floats) -> None:
         right[i] /= matrix[i, i]
 
 
-_REACH_DEVIATIONS = 10.0
-"""Known parameters are not fitted farther from what is known of them."""
+_REACH_DEVIATIONS = 10.0  # known parameters are not fitted farther from what is known of them
 _GAUGE_2_PARAMETERS = frozenset((Parameter.RELATIVE_OFFSET, Parameter.RELATIVE_GAIN, Parameter.LAG))
 _RELEASE = int(Parameter.RELEASE)
 
@@ -196,8 +193,7 @@ class FitProblem:
     prior_deviation: Floats
     gauge_2_absolute: bool = False
     """Gauge 2 measures the plate against the base."""
-    earliest_release_s: float = -math.inf
-    """The release is not looked for before, nor after the last reading."""
+    earliest_release_s: float = -math.inf  # the release is not looked for before, nor after the last reading
     stand: tuple[StandPart, ...] = IDEAL_STAND
     """Suspension, release and gauges, which every law is composed with."""
     readings: GaugeReadings = field(init=False, repr=False)

@@ -15,31 +15,23 @@ from analysis.preparation.free_decay import FreeDecay, relative_to_table
 from analysis.preparation.oscillation import local_slopes, white_noise
 from analysis.record import GaugeUncertainty, Record
 
-_FEW = 500
-"""Readings a channel for searching: the shape of chi-square needs no more, ..."""
+_FEW = 500  # readings a channel for searching: the shape of chi-square needs no more, ..
 _CLEAR = 0.005
 """... up to this noise, as a share of the swing. Beyond, as many more as keep the mean as well known."""
-_MOST = 3000
-"""Readings a channel for telling minima apart."""
-_DOUBT = 100.0
-"""Minima whose chi-square of some readings differs by less are compared with most readings."""
-_TIE = 10.0
-"""Chi-square with most readings may err by this much about which of two minima is lower."""
+_MOST = 3000  # readings a channel for telling minima apart
+_DOUBT = 100.0  # minima whose chi-square of some readings differs by less are compared with most readings
+_TIE = 10.0  # chi-square with most readings may err by this much about which of two minima is lower
 _HOPELESS = 1000.0
 """A law whose chi-square exceeds that of its rival by more, with some readings, is fitted roughly only."""
 _ROUGH_STEPS, _LAST_STEPS = 15, 15
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60), np.geomspace(2.65, 6.0, 56)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
-_FINE = np.linspace(0.975, 1.025, 51)
-"""f_s over its last value."""
-_HOPS = 4
-"""Most jumps of chi-square that are crossed one after the other; each costs two refinements."""
-_FIRST_WINDOW_PERIODS = 0.6
-"""So early f_s plays no part."""
+_FINE = np.linspace(0.975, 1.025, 51)  # f_s over its last value
+_HOPS = 4  # most jumps of chi-square that are crossed one after the other; each costs two refinements
+_FIRST_WINDOW_PERIODS = 0.6  # so early f_s plays no part
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
 """Each about twice as long as the one before: few new minima at a time."""
-_KEPT = 4
-"""Minima that are followed from one window to the next."""
+_KEPT = 4  # minima that are followed from one window to the next
 _FALLBACK_KEPT, _FALLBACK_STEPS = 3, 10
 """Start points and steps of an integrated law, whose steps take a hundred times as long as in closed form."""
 _FALLBACK_GRID, _FALLBACK_SCANS = np.geomspace(1.0, 2.0, 71), 4
@@ -61,12 +53,10 @@ class Fit:
     law: FrictionLaw
     parameters: Floats
     """(p,) float64: by `Parameter`."""
-    free: Indices
-    """(k,) int: places that were free."""
+    free: Indices  # (k,) int: places that were free
     normal_matrix: Floats
     """(k, k) Gauss-Newton curvature of half of chi-square over the free parameters, priors included."""
-    chi_square: float
-    """Of the readings alone."""
+    chi_square: float  # of the readings alone
     bic: float
     table_residual_m: Floats
     """(n,) float64: reading minus curve."""
@@ -92,8 +82,7 @@ class Fit:
 class Search:
     """Where to look for minima."""
 
-    problem: FitProblem
-    """The whole record."""
+    problem: FitProblem  # the whole record
     informed_problem: FitProblem
     """The same with prior knowledge from tail, hold and parabolas, for windows that hold too little."""
     period_s: float
@@ -298,15 +287,12 @@ def _distinct(minima: list[Minimum]) -> list[Minimum]:
 class PlatePathEstimate:
     """Friction and tilt from the plate's path."""
 
-    friction: float
-    """Estimates; the tilt is zero where all slips go one way."""
+    friction: float  # estimates; the tilt is zero where all slips go one way
     tilt_rad: float
     covariance: Floats
     """(2, 2) float64: of (friction, tilt), from the noise."""
-    slips: int
-    """Number of slip phases used."""
-    misfit: float
-    """Chi-square per degree of freedom of the phases' curvatures about the common two."""
+    slips: int  # number of slip phases used
+    misfit: float  # chi-square per degree of freedom of the phases' curvatures about the common two
 
 
 def estimate_from_plate_path(
@@ -529,8 +515,7 @@ def _with_estimates_as_priors(
     return problem
 
 
-EARLIEST_PERIODS = 6.0
-"""A record that begins later after its release tells too little of it."""
+EARLIEST_PERIODS = 6.0  # a record that begins later after its release tells too little of it
 _WINDOW_PERIODS = 1.5
 _READINGS = 60
 _STEPS_PER_PERIOD = 48

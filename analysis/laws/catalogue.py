@@ -14,8 +14,7 @@ from analysis.record import AnalysisError
 
 _COMPARED = (COULOMB, COULOMB_TILT, STATIC, STATIC_TILT)
 """Laws that are always compared, by rising number of parameters; their motion is in closed form."""
-_FALLBACK = (STRIBECK_TILT,)
-"""Laws that are tried where none of the compared ones explains the record."""
+_FALLBACK = (STRIBECK_TILT,)  # laws that are tried where none of the compared ones explains the record
 
 
 def _with_places(laws: tuple[FrictionLaw, ...]) -> tuple[FrictionLaw, ...]:

@@ -210,8 +210,7 @@ CLOSED_FORM = ClosedFormSolver()
 
 _FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
 """Of f_d and f_s: a fit may pass what is refused as a result, within reason."""
-_TILT_MAX = 1.0
-"""No plane of a stand is steeper (rad); a plane of some milliradians is usual."""
+_TILT_MAX = 1.0  # no plane of a stand is steeper (rad); a plane of some milliradians is usual
 _DYNAMIC, _STATIC = int(Parameter.FRICTION_DYNAMIC), int(Parameter.FRICTION_STATIC)
 _TILT = int(Parameter.TILT)
 StartPoints = Callable[[Floats, Indices], list[Floats]]
@@ -230,10 +229,8 @@ class FrictionLaw:
     level plane.
     """
 
-    name: str
-    """As in `analyze --model` and in saved analyses."""
-    description: str
-    """For help and reports."""
+    name: str  # as in `analyze --model` and in saved analyses
+    description: str  # for help and reports
     solver: MotionSolver
     extra: tuple[Parameter, ...] = ()
     """Which of FRICTION_STATIC and TILT it leaves free."""
@@ -241,8 +238,7 @@ class FrictionLaw:
     """Parameters that no other law has; `analysis.laws.catalogue` gives them their places."""
     start_points: StartPoints = _no_start_points
     """Additional points from which its search begins, see `StartPoints`."""
-    own_start: int = SHARED_PARAMETER_COUNT
-    """Place of the first of its own parameters."""
+    own_start: int = SHARED_PARAMETER_COUNT  # place of the first of its own parameters
 
     @property
     def own_places(self) -> Indices:

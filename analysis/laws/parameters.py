@@ -19,30 +19,25 @@ class Parameter(IntEnum):
     GRAVITY = 9
     TABLE_OFFSET = 10
     RELATIVE_OFFSET = 11
-    TABLE_GAIN = 12
-    """Relative error of gauge 1's gain."""
+    TABLE_GAIN = 12  # relative error of gauge 1's gain
     RELATIVE_GAIN = 13
-    LAG = 14
-    """Delay of gauge 2 against gauge 1 beyond the known one (s)."""
+    LAG = 14  # delay of gauge 2 against gauge 1 beyond the known one (s)
 
 
 MOTION_PARAMETER_COUNT = 10
 """Parameters of the motion that all laws have; the kernels of `analysis.motion` take them in this order."""
-SHARED_PARAMETER_COUNT = len(Parameter)
-"""The parameters of the laws' own follow from this place on."""
+SHARED_PARAMETER_COUNT = len(Parameter)  # the parameters of the laws' own follow from this place on
 
 
 @dataclass(frozen=True, slots=True)
 class OwnParameter:
     """A parameter that one friction law adds."""
 
-    name: str
-    """Key in results and in saved parameters, with its unit."""
+    name: str  # key in results and in saved parameters, with its unit
     unit: str
     default: float
     """Value in the vector of a law that does not use it."""
-    lower: float
-    """Lower bound of a fit; `upper` is the other."""
+    lower: float  # lower bound of a fit; `upper` is the other
     upper: float
 
 
@@ -50,5 +45,4 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 """Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
-TRAVEL_MAX_M = 0.5
-"""No stand for dry friction on a table moves so far: readings that do are in another unit."""
+TRAVEL_MAX_M = 0.5  # no stand for dry friction on a table moves so far: readings that do are in another unit

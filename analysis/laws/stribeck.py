@@ -18,10 +18,8 @@ VELOCITY = OwnParameter("stribeck_velocity_m_per_s", "m/s", default=0.01, lower=
 _VELOCITY = MOTION_PARAMETER_COUNT
 _VELOCITIES_M_PER_S = (0.002, 0.005, 0.012, 0.03, 0.08)
 """From a tenth of the bound up to the fastest slips of the stands of Table 1, in equal ratios."""
-_EXCESSES = (0.03, 0.1, 0.25, 0.6)
-"""f_s above f_d, in units of f_d: from hardly seen to that of oiled steel."""
-_TYPICAL_SLIP_M_PER_S = 0.06
-"""Mean sliding speed after the pullbacks of Table 1."""
+_EXCESSES = (0.03, 0.1, 0.25, 0.6)  # f_s above f_d, in units of f_d: from hardly seen to that of oiled steel
+_TYPICAL_SLIP_M_PER_S = 0.06  # mean sliding speed after the pullbacks of Table 1
 
 
 @compiled_part

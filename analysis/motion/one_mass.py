@@ -25,14 +25,10 @@ class DecayError(AnalysisError, ValueError):
 class OneMassDecay:
     """A free decay, given by one of its turning points."""
 
-    period_s: float
-    """Damped period ``2 pi / sqrt(k^2 - n^2)`` (s), above 0."""
-    damping_n_per_s: float
-    """Viscous damping constant n (1/s), 0 or above."""
-    coulomb_displacement_m: float
-    """x_k = F / c (m), 0 or above."""
-    turning_s: float
-    """Time (s) and displacement from the middle of the rest band (m) of a turning point."""
+    period_s: float  # damped period ``2 pi / sqrt(k^2 - n^2)`` (s), above 0
+    damping_n_per_s: float  # viscous damping constant n (1/s), 0 or above
+    coulomb_displacement_m: float  # x_k = F / c (m), 0 or above
+    turning_s: float  # time (s) and displacement from the middle of the rest band (m) of a turning point
     turning_m: float
 
     def __post_init__(self) -> None:
@@ -57,8 +53,7 @@ class OneMassDecay:
 class OneMassMotion:
     """Motion at the asked times, and where it ends."""
 
-    time_s: Floats
-    """(n,) float64."""
+    time_s: Floats  # (n,) float64
     displacement_m: Floats
     velocity_m_per_s: Floats
     acceleration_m_per_s2: Floats

@@ -29,12 +29,9 @@ class MotionError(AnalysisError, ValueError):
 class MotionSamples:
     """A motion at given times, arrays of shape (n,). Before release the table is held at the pullback."""
 
-    time_s: NDArray[np.float64]
-    """As asked for, zero at release."""
-    table_displacement_m: NDArray[np.float64]
-    """u1 from the rest position."""
-    relative_displacement_m: NDArray[np.float64]
-    """u2 - u1 since release."""
+    time_s: NDArray[np.float64]  # as asked for, zero at release
+    table_displacement_m: NDArray[np.float64]  # u1 from the rest position
+    relative_displacement_m: NDArray[np.float64]  # u2 - u1 since release
     table_velocity_m_per_s: NDArray[np.float64]
     plate_velocity_m_per_s: NDArray[np.float64]
     table_acceleration_m_per_s2: NDArray[np.float64]
@@ -69,12 +66,10 @@ class Motion(ABC):
     duration_s: float
     phase_starts_s: NDArray[np.float64]
     """(m,) float64: first 0.0, the release."""
-    phase_signs: NDArray[np.int8]
-    """(m,) int8: 0 where the masses move together, else the sign of u2' - u1'."""
+    phase_signs: NDArray[np.int8]  # (m,) int8: 0 where the masses move together, else the sign of u2' - u1'
     slip_end_s: float
     """When the last slip ended: 0.0 when nothing slips, `duration_s` when it still slips then."""
-    residual_displacement_m: float
-    """u2 - u1 at the end."""
+    residual_displacement_m: float  # u2 - u1 at the end
     table_velocity_max_m_per_s: float
     plate_velocity_max_m_per_s: float
     table_acceleration_max_m_per_s2: float
@@ -151,25 +146,18 @@ class TwoMassParameters:
     Raises MotionError if a value is outside these limits.
     """
 
-    table_mass_kg: float
-    """m1; positive."""
-    plate_mass_kg: float
-    """m2; positive."""
-    stiffness_n_per_m: float
-    """c; positive."""
+    table_mass_kg: float  # m1; positive
+    plate_mass_kg: float  # m2; positive
+    stiffness_n_per_m: float  # c; positive
     damping_coefficient_kg_per_s: float
     """mu; not negative, and the slipping table underdamped: mu < 2 sqrt(c m1)."""
-    friction_dynamic: float
-    """f_d; not negative."""
-    friction_static: float | None = None
-    """f_s, not less than f_d; None means f_d."""
+    friction_dynamic: float  # f_d; not negative
+    friction_static: float | None = None  # f_s, not less than f_d; None means f_d
     tilt_rad: float = 0.0
     """alpha, positive where gravity pulls the plate forward; |alpha| <= f_s, else the plate would not have
     waited for the release."""
-    pullback_m: float
-    """u1 before release."""
-    gravity_m_per_s2: float = 9.81
-    """Positive."""
+    pullback_m: float  # u1 before release
+    gravity_m_per_s2: float = 9.81  # positive
 
     def __post_init__(self) -> None:
         _check(self)

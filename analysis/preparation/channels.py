@@ -12,10 +12,8 @@ from analysis.record import Record, RecordError, StandMasses
 from messages.i18n import N_
 from messages.message import Message, message
 
-DELAY_MAX_S = 0.5
-"""A gauge later than this is not read in the same test."""
-SAMPLES_MIN = 50
-"""With fewer readings a decay cannot be distinguished from noise or drift."""
+DELAY_MAX_S = 0.5  # a gauge later than this is not read in the same test
+SAMPLES_MIN = 50  # with fewer readings a decay cannot be distinguished from noise or drift
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,18 +40,13 @@ class Channel:
 class Channels:
     """Both gauges on true time."""
 
-    table: Channel
-    """Gauge 1."""
+    table: Channel  # gauge 1
     relative: Channel | None
     """Gauge 2 as it reads (against the table, or against the base where `Record` says so)."""
-    origin_s: float
-    """Record time of the first sample."""
-    clock_scale: float
-    """True seconds per second of the record."""
-    interval_s: float
-    """Median time between rows."""
-    quantisation_m: tuple[float, float]
-    """Smallest step of each gauge's readings."""
+    origin_s: float  # record time of the first sample
+    clock_scale: float  # true seconds per second of the record
+    interval_s: float  # median time between rows
+    quantisation_m: tuple[float, float]  # smallest step of each gauge's readings
 
     def to_record_time(self, time_s: float) -> float:
         """Time in the base of `Record.time_s`."""
@@ -215,10 +208,8 @@ _SPIKE_SHARE_MAX = 0.02
 _PASSES = 8
 _WIDE = 4.0
 """A distance from the median of five beyond so many times what 97 % of the readings keep is a spike."""
-_JUMP = 0.6
-"""A motion that starts or stops goes a third of its next step at most in the first."""
-_NOISELESS_M = 2e-8
-"""Scatter of readings that are computed, not measured."""
+_JUMP = 0.6  # a motion that starts or stops goes a third of its next step at most in the first
+_NOISELESS_M = 2e-8  # scatter of readings that are computed, not measured
 _FROZEN_RUN = 8
 _FROZEN_MAX = 0.2
 """A gauge that stands still for longer than this share of the record is at rest."""
@@ -226,13 +217,11 @@ _CLIPPED_RUN = 4
 _READINGS_MIN = 16
 _GAP = 3.5
 """Readings this many median intervals apart are no neighbours."""
-_EVEN = 35.0 / 18.0
-"""1 + sum of squared weights of the cubic at even times."""
+_EVEN = 35.0 / 18.0  # 1 + sum of squared weights of the cubic at even times
 _KINK_M_PER_S2 = 4.0
 """A jump of acceleration, of 20 m/s2 at most, moves a reading off the cubic by a tenth of it times an
 interval squared; intervals are not all alike."""
-_REPEATS_MAX = 0.05
-"""A converter that repeats more of its readings than this is merely coarse."""
+_REPEATS_MAX = 0.05  # a converter that repeats more of its readings than this is merely coarse
 
 
 def remove_invalid_readings(channel: Channel, gauge: int, warnings: list[ResultWarning]) -> Channel:
@@ -372,8 +361,7 @@ def _off_cubic(x: Floats, weights: Floats) -> Floats:
     return off
 
 
-NOISE_FLOOR_M = 1e-9
-"""Noise below this is not believed: the readings are computed, not measured."""
+NOISE_FLOOR_M = 1e-9  # noise below this is not believed: the readings are computed, not measured
 _POOLED_READINGS_MIN = 30
 _DITHER = 0.4
 """Noise above this share of the converter's step makes rounding errors independent."""
@@ -433,10 +421,8 @@ def merge_repeated_readings(channel: Channel, noise_m: float, step_m: float) -> 
     return Channel(times, channel.value_m[bounds[:-1]])
 
 
-_DRIFT_SIGMAS = 6.0
-"""So far from none the drift of all readings must be, ..."""
-_STEADY_SIGMAS = 3.5
-"""... and so far that of the later half. It is steady where its parts differ by less."""
+_DRIFT_SIGMAS = 6.0  # so far from none the drift of all readings must be, ..
+_STEADY_SIGMAS = 3.5  # ... and so far that of the later half. It is steady where its parts differ by less.
 _LINE_READINGS = 10
 
 

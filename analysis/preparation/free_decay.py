@@ -41,15 +41,13 @@ from analysis.record import Record
 from messages.i18n import N_
 from messages.message import message
 
-_SURE = 0.1
-"""Slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0 or 1 to within this."""
+_SURE = 0.1  # slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0 or 1 to within this
 _UNEXPLAINED = 0.02
 """Swing of gauge 2 beyond that slope, as a share of the table's: the plate still slips where it is more."""
 _NOISE_SIGMAS = 3.0
 _SWINGS = 0.05
 """The swing is followed until it falls below this share of its first."""
-_AGAINST = 0.3
-"""Correlation of gauge 2's first slips with the table's velocity from which on it is reversed."""
+_AGAINST = 0.3  # correlation of gauge 2's first slips with the table's velocity from which on it is reversed
 _LINE_READINGS = 10
 _MEANS = 60
 
@@ -58,12 +56,9 @@ _MEANS = 60
 class Mounting:
     """How gauge 2 is mounted."""
 
-    measures_plate: bool
-    """Against the base, instead of against the table."""
-    sign: int
-    """What makes its readings positive where the plate lies ahead."""
-    warnings: tuple[ResultWarning, ...] = ()
-    """Where that is not as the record says."""
+    measures_plate: bool  # against the base, instead of against the table
+    sign: int  # what makes its readings positive where the plate lies ahead
+    warnings: tuple[ResultWarning, ...] = ()  # where that is not as the record says
 
 
 def relative_to_table(table: Channel, relative: Channel, measures_plate: bool) -> Channel:
@@ -157,20 +152,14 @@ _MOUNTINGS = {
 }
 
 
-TAIL_PERIODS_MIN = 2.0
-"""A shorter tail does not tell damping from a drift of the zero."""
+TAIL_PERIODS_MIN = 2.0  # a shorter tail does not tell damping from a drift of the zero
 _RELEASE_MARGIN_S = 0.004
 """Uncertainty of the release as `find_releases` gives it: the half window of its slopes, rounded down."""
-_NEVER_SLIPS = 2.0
-"""Residual of a damped cosine over noise above which there must have been slip."""
-_KEPT_MIN = 0.5
-"""Gauge 2 is left out where a smaller share of its readings is valid."""
-_LONG_S = 1.5
-"""A decay this long after a hold is preferred to any that begins in motion."""
-_EARLY_PERIODS = 2.0
-"""Slip comes in the first swings."""
-_CHANCE = 5.0
-"""Two mean squares of the same noise differ by this many standard deviations at most."""
+_NEVER_SLIPS = 2.0  # residual of a damped cosine over noise above which there must have been slip
+_KEPT_MIN = 0.5  # gauge 2 is left out where a smaller share of its readings is valid
+_LONG_S = 1.5  # a decay this long after a hold is preferred to any that begins in motion
+_EARLY_PERIODS = 2.0  # slip comes in the first swings
+_CHANCE = 5.0  # two mean squares of the same noise differ by this many standard deviations at most
 _NOISE_SHARE = 0.2
 """Last part of the record in which gauge 2 against the base is taken for at rest relative to the table."""
 
@@ -179,10 +168,8 @@ _NOISE_SHARE = 0.2
 class _Stretch:
     """Both gauges from the hold to the end of free motion, turned so that the pullback is positive."""
 
-    channels: Channels
-    """As read."""
-    table: Channel
-    """Gauge 1 times `sign`; in a `FreeDecay` without drift."""
+    channels: Channels  # as read
+    table: Channel  # gauge 1 times `sign`; in a `FreeDecay` without drift
     relative: Channel | None
     """Gauge 2 likewise, positive where the plate lies ahead of the table; against the base where
     `gauge_2_absolute`."""
@@ -211,22 +198,17 @@ class _Stretch:
 class FreeDecay(_Stretch):
     """One free decay."""
 
-    slip_end_s: float | None
-    """None where slip lasts to the end or the readings do not tell."""
-    slips: bool
-    """Whether the plate slips at all."""
-    period_s: float
-    """Of the stick tail, or of the spectrum where the tail is too short."""
-    tail: DampedCosine | None
-    """None where the tail is shorter than `TAIL_PERIODS_MIN`."""
+    slip_end_s: float | None  # none where slip lasts to the end or the readings do not tell
+    slips: bool  # whether the plate slips at all
+    period_s: float  # of the stick tail, or of the spectrum where the tail is too short
+    tail: DampedCosine | None  # none where the tail is shorter than `TAIL_PERIODS_MIN`
     noise_m: tuple[float, float]
     noise_reading_counts: tuple[int, int]
     """Numbers of readings that the noise was measured from."""
     warnings: tuple[ResultWarning, ...]
     drift_m_per_s: float = 0.0
     """Steady drift of gauge 2 as turned, already subtracted; zero at the release."""
-    table_drift_m_per_s: float = 0.0
-    """The same of gauge 1."""
+    table_drift_m_per_s: float = 0.0  # the same of gauge 1
 
     @property
     def dense_until_s(self) -> float:

@@ -27,36 +27,27 @@ _STILL = 0.005
 """Share of the widest swing that hum may move a table that is held."""
 _CHANCE = 4.0
 """A median distance of n readings exceeds that of many by more than this over sqrt(n) only once in 10,000."""
-_RISE_S = 0.3
-"""From the hold to the fastest swing takes less."""
-_RISE_LAG_S = 0.02
-"""Readings this long before the table has left its hold for sure may belong to the release."""
-_LEFT = 0.03
-"""Share of the way to the fastest sample; passed some hundredths of a second after the release."""
-_GROWTH = 1.25
-"""A free decay never swings this much wider than before; a second release does."""
-_SMALL_SWING = 0.03
-"""Share of the widest swing."""
+_RISE_S = 0.3  # from the hold to the fastest swing takes less
+_RISE_LAG_S = 0.02  # readings this long before the table has left its hold for sure may belong to the release
+_LEFT = 0.03  # share of the way to the fastest sample; passed some hundredths of a second after the release
+_GROWTH = 1.25  # a free decay never swings this much wider than before; a second release does
+_SMALL_SWING = 0.03  # share of the widest swing
 _STEP_SIGMAS = 5.0
 _READINGS_MIN = 8
 _GAP = 5.0
 """Readings this many median intervals apart have a gap between them."""
-_NEAR_GAP = 0.2
-"""Share of a swing's time."""
-_TRAVEL_SIGMAS = 20.0
-"""A travel wider than so many standard deviations of the noise is one."""
+_NEAR_GAP = 0.2  # share of a swing's time
+_TRAVEL_SIGMAS = 20.0  # a travel wider than so many standard deviations of the noise is one
 
 
 @dataclass(frozen=True, slots=True)
 class Release:
     """The last hold before a free decay, and the stretch of free motion that follows."""
 
-    time_s: float
-    """When the table was let go, to about a sample; the first sample if the record begins later."""
+    time_s: float  # when the table was let go, to about a sample; the first sample if the record begins later
     plateau_start_s: float | None
     """Begin of the hold (at most a second of it is used); None if the record begins after the release."""
-    level_m: float
-    """Reading of gauge 1 in the hold, or of the first sample."""
+    level_m: float  # reading of gauge 1 in the hold, or of the first sample
     end_s: float
     """End of the free motion: of the record, or of the stretch before somebody touched the table again."""
 
@@ -293,8 +284,7 @@ _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
 _SLOW_S = 0.01
 """Readings closer together than this are enough for any stand with a period of 0.1 s or more."""
-_READINGS_A_SWING = 10
-"""Fewer hide when the table is let go, and how fast it swings."""
+_READINGS_A_SWING = 10  # fewer hide when the table is let go, and how fast it swings
 _PULLBACK_FACTOR = 3.0
 """Between pullback and that of the series: beyond it is not the operator who pulled otherwise."""
 
@@ -411,15 +401,12 @@ _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)
 class DampedCosine:
     """Damped cosine  offset + exp(-n tau) (a cos w tau + b sin w tau),  tau = t - start_s."""
 
-    start_s: float
-    """Stretch of the record that was fitted."""
+    start_s: float  # stretch of the record that was fitted
     end_s: float
     parameters: Floats
     """(5,) float64: n (1/s), damped w (rad/s), a, b, offset (m)."""
-    covariance: Floats
-    """(5, 5) float64: from the residual, type A."""
-    residual_m: Floats
-    """(n,) float64: reading minus curve."""
+    covariance: Floats  # (5, 5) float64: from the residual, type A
+    residual_m: Floats  # (n,) float64: reading minus curve
 
     @property
     def damping_per_s(self) -> float:

@@ -26,10 +26,8 @@ class CommandEntry(NamedTuple):
     name: str
     options: str
     """Module and class of its options, imported when the command is named: "run_file_options:Runs"."""
-    target: str
-    """Module and function that does the work, imported when the command runs."""
-    group: type[TyperGroup] | None = None
-    """Group of the commands below this one."""
+    target: str  # module and function that does the work, imported when the command runs
+    group: type[TyperGroup] | None = None  # group of the commands below this one
 
     def load(self) -> Any:
         """Import the options, and return the Click command."""

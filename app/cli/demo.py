@@ -36,8 +36,7 @@ from app.simulated_stand.synthetic_campaign import (
 )
 from config.files import load_gauges, load_stand
 
-_RECORD_S = 8.0
-"""The demo's run ends this long after release."""
+_RECORD_S = 8.0  # the demo's run ends this long after release
 
 
 def demo(options: DemoOptions) -> None:

@@ -9,8 +9,7 @@ from app.cli.measurement_options import MotionOptions
 from app.simulated_stand.options import PULLBACK_MAX_M
 from config.files import load_stand, published_row
 
-_SAMPLES_MAX = 1e7
-"""Seven columns of doubles of so many samples take 0.6 GB, what a small computer can spare."""
+_SAMPLES_MAX = 1e7  # seven columns of doubles of so many samples take 0.6 GB, what a small computer can spare
 _REQUIRED = {
     "pullback_m": "--pullback",
     "table_mass_kg": "--table-mass",

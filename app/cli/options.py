@@ -15,8 +15,7 @@ import typer
 
 from app.cli.errors import CommandError, alternatives
 
-REQUIRED: Final[Any] = dataclasses.MISSING
-"""Default of an option that must be given."""
+REQUIRED: Final[Any] = dataclasses.MISSING  # default of an option that must be given
 
 
 def option(names: str, description: str, default: Any = None, **settings: Any) -> Any:

@@ -15,8 +15,7 @@ from app.acquisition.messages import Event, LiveResult, RunEnded, StateChanged, 
 from app.acquisition.ring import RingRows
 from app.cli import output as out
 
-_SHOWN_S = 0.05
-"""Readings are shown as means over so long a time."""
+_SHOWN_S = 0.05  # readings are shown as means over so long a time
 
 
 class ProgressPrinter:
@@ -107,8 +106,7 @@ class ProgressPrinter:
 _WAITING = ("recentre", "pulling", "held", "armed")
 
 
-_EVERY_S = 2.0
-"""How often the line is written where it cannot be rewritten in place: into a file or a pipe."""
+_EVERY_S = 2.0  # how often the line is written where it cannot be rewritten in place: into a file or a pipe
 _REDRAWN_HZ = 8
 
 

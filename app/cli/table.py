@@ -18,8 +18,7 @@ from app.reports.table.files import as_text, write_table
 from app.reports.table.text import note_sections
 from config.files import load_stand, published_table
 
-_WIDTH_MIN, _UNLIMITED = 40, 1_000_000
-"""Columns of a narrow terminal, and of a pipe."""
+_WIDTH_MIN, _UNLIMITED = 40, 1_000_000  # columns of a narrow terminal, and of a pipe
 
 
 def table(options: TableOptions) -> None:

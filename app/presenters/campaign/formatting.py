@@ -37,8 +37,7 @@ from config.files import load_gauges, load_stand, published_row
 from config.schema import ConfigError, Stand
 from messages.i18n import N_, gettext, ngettext, translate
 
-TARGET_REPEATS = 3
-"""Tests of each series that a campaign should have: the least that shows an outlier."""
+TARGET_REPEATS = 3  # tests of each series that a campaign should have: the least that shows an outlier
 _FRICTION, _STATIC = "friction_dynamic", "friction_static"
 _LOWER, _UPPER = "friction_static_lower", "friction_static_upper"
 _MARKS = (

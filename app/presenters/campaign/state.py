@@ -22,16 +22,11 @@ class Cell:
 class TableRow:
     """Row of Table 1: a series."""
 
-    label: str
-    """Unique in the table."""
-    code: str
-    """Series code; "" for runs without one."""
-    runs: tuple["RunRow", ...]
-    """Runs that are included."""
-    cells: tuple[Cell, ...]
-    """In the order of the columns."""
-    status: Chip = EMPTY_CHIP
-    """Most important warning about the series."""
+    label: str  # unique in the table
+    code: str  # series code; "" for runs without one
+    runs: tuple["RunRow", ...]  # runs that are included
+    cells: tuple[Cell, ...]  # in the order of the columns
+    status: Chip = EMPTY_CHIP  # most important warning about the series
 
 
 def row_without_runs(code: str) -> TableRow:
@@ -48,8 +43,7 @@ def column_titles() -> tuple[tuple[str, str], ...]:
 class ContactBars:
     """Bars of Fig. 2 for one contact: means over its series, and the series."""
 
-    contact: str
-    """Code and name."""
+    contact: str  # code and name
     name: str
     static: Quantity | None
     """None if no series determined it."""
@@ -58,8 +52,7 @@ class ContactBars:
     dynamic_of_series: tuple[Quantity, ...] = ()
     static_at_least: tuple[float, ...] = ()
     """Lower bounds of f_s, from series without a value."""
-    ratio: str = ""
-    """f_s over f_d as text; "" if unknown."""
+    ratio: str = ""  # f_s over f_d as text; "" if unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,10 +122,8 @@ class CampaignSummary:
     excluded: tuple[RunRow, ...] = ()
     faults: tuple[str, ...] = ()
     """A line for each run without a result."""
-    warnings: tuple[str, ...] = ()
-    """Warnings about the runs together."""
-    unsaved_count: int = 0
-    """Number of runs whose result is not saved in them."""
+    warnings: tuple[str, ...] = ()  # warnings about the runs together
+    unsaved_count: int = 0  # number of runs whose result is not saved in them
 
     @property
     def run_count(self) -> int:
@@ -151,10 +142,8 @@ class CampaignState:
     summary: CampaignSummary
     columns: tuple[tuple[str, str], ...] = ()
     """Symbol and unit of each column."""
-    selected: str = ""
-    """Label of the row whose runs are listed."""
-    undo_text: str = ""
-    """Change that undo would undo; empty without one."""
+    selected: str = ""  # label of the row whose runs are listed
+    undo_text: str = ""  # change that undo would undo; empty without one
     message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False

@@ -17,8 +17,7 @@ from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, 
 from config.files import load_gauges, load_stand
 from messages.i18n import N_
 
-FileStamp = tuple[int, int]
-"""Time of the last change of a file (ns), and its size (bytes)."""
+FileStamp = tuple[int, int]  # time of the last change of a file (ns), and its size (bytes)
 _READING = N_("Gathering {name}, {number} of {all}")
 _RECORDING = N_("Recording {name}, {number} of {all}")
 
