@@ -75,7 +75,7 @@ class Identification:
     results: dict[str, Quantity]  # by the names of INTERFACE ("results"); what cannot be determined is absent
     labels: dict[str, str | bool] = field(default_factory=dict)
     """Results that are not numbers: msk64_degree, coulomb_significant."""
-    model: ModelSelection | None = None  # none where no law of motion was fitted
+    model: ModelSelection | None = None  # None where no law of motion was fitted
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
     warnings: list[ResultWarning] = field(default_factory=list)

@@ -210,11 +210,9 @@ class FitProblem:
 
     @property
     def sample_count(self) -> int:
-        """Number of readings of both channels."""
         return len(self.table) + (0 if self.relative is None else len(self.relative))
 
     def with_prior(self, parameter: Parameter, mean: float, deviation: float) -> Self:
-        """The same with prior knowledge of one more parameter."""
         means, deviations = self.prior_mean.copy(), self.prior_deviation.copy()
         means[parameter], deviations[parameter] = mean, deviation
         return replace(self, prior_mean=means, prior_deviation=deviations)
@@ -228,7 +226,6 @@ class FitProblem:
         )
 
     def before(self, end_s: float) -> Self:
-        """Readings before `end_s`."""
         return replace(
             self,
             table=self.table.between(-np.inf, end_s),
@@ -276,7 +273,6 @@ class FitProblem:
     def minimise(
         self, start: Floats, law: FrictionLaw, steps_max: int = 30, *, fixed: int | None = None
     ) -> Minimum:
-        """Refine `start` for `law`, one parameter `fixed` where it is."""
         free = self.free_parameters(law)
         free = free if fixed is None else free[free != fixed]
         if not len(self.table) or (self.relative is not None and not len(self.relative)):
@@ -293,7 +289,6 @@ class FitProblem:
         return minimise(GaussNewton(self, law, free).evaluate, project, start, free, steps_max)
 
     def gauges(self) -> list[Gauge]:
-        """Readings of each gauge as the solvers take them."""
         gauges = [(self.table.time_s, self.table.value_m, GAUGE_1, self.noise_m[0])]
         if self.relative is not None:
             second = self.relative

@@ -63,7 +63,6 @@ class Fit:
     relative_residual_m: Floats
 
     def value(self, parameter: Parameter) -> float:
-        """Fitted value of one parameter."""
         return float(self.parameters[parameter])
 
     def determines(self, parameter: Parameter) -> bool:
@@ -73,7 +72,6 @@ class Fit:
 
     @property
     def rms_m(self) -> float:
-        """Root mean square of both channels' residuals."""
         both = np.concatenate((self.table_residual_m, self.relative_residual_m))
         return float(np.sqrt(np.mean(both**2)))
 

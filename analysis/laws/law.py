@@ -242,7 +242,6 @@ class FrictionLaw:
 
     @property
     def own_places(self) -> Indices:
-        """Places of its own parameters in the parameter vector."""
         return np.arange(self.own_start, self.own_start + len(self.own))
 
     @property
@@ -252,12 +251,10 @@ class FrictionLaw:
 
     @property
     def has_static_friction(self) -> bool:
-        """Whether f_s is a parameter."""
         return Parameter.FRICTION_STATIC in self.extra
 
     @property
     def has_tilt(self) -> bool:
-        """Whether the tilt of the plane is a parameter."""
         return Parameter.TILT in self.extra
 
     def vector(self, point: Floats) -> Floats:

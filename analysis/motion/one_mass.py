@@ -45,7 +45,6 @@ class OneMassDecay:
 
     @property
     def frequency_rad_per_s(self) -> float:
-        """Undamped frequency k (rad/s)."""
         return math.hypot(2.0 * math.pi / self.period_s, self.damping_n_per_s)
 
 

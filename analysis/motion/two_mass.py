@@ -45,7 +45,6 @@ class MotionSamples:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def take(self, places: NDArray[np.intp]) -> Self:
-        """The samples at `places`, in that order."""
         columns: dict[str, Any] = {name: column[places] for name, column in self.columns().items()}
         return type(self)(**columns)
 

@@ -32,7 +32,6 @@ class Channel:
         return Channel(self.time_s[first:last], self.value_m[first:last])
 
     def scaled(self, factor: float) -> "Channel":
-        """Readings times `factor`."""
         return Channel(self.time_s, self.value_m * factor)
 
 

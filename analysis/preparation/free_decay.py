@@ -198,10 +198,10 @@ class _Stretch:
 class FreeDecay(_Stretch):
     """One free decay."""
 
-    slip_end_s: float | None  # none where slip lasts to the end or the readings do not tell
+    slip_end_s: float | None  # None where slip lasts to the end or the readings do not tell
     slips: bool  # whether the plate slips at all
     period_s: float  # of the stick tail, or of the spectrum where the tail is too short
-    tail: DampedCosine | None  # none where the tail is shorter than `TAIL_PERIODS_MIN`
+    tail: DampedCosine | None  # None where the tail is shorter than `TAIL_PERIODS_MIN`
     noise_m: tuple[float, float]
     noise_reading_counts: tuple[int, int]
     """Numbers of readings that the noise was measured from."""

@@ -415,7 +415,6 @@ class DampedCosine:
 
     @property
     def period_s(self) -> float:
-        """Damped period."""
         return 2.0 * np.pi / float(self.parameters[_FREQUENCY])
 
     @property
@@ -425,28 +424,23 @@ class DampedCosine:
 
     @property
     def amplitude_m(self) -> float:
-        """Amplitude at `start_s`."""
         return float(np.hypot(self.parameters[_COSINE], self.parameters[_SINE]))
 
     @property
     def periods(self) -> float:
-        """Length of the fitted stretch in periods."""
         return (self.end_s - self.start_s) / self.period_s
 
     @property
     def rms_m(self) -> float:
-        """Root mean square of the residual."""
         return float(np.sqrt(np.mean(self.residual_m**2)))
 
     @property
     def period_uncertainty_s(self) -> float:
-        """Standard uncertainty of the period from the residual."""
         w = self.parameters[_FREQUENCY]
         return float(2.0 * np.pi / w**2 * np.sqrt(self.covariance[_FREQUENCY, _FREQUENCY]))
 
     @property
     def damping_uncertainty_per_s(self) -> float:
-        """Standard uncertainty of n from the residual."""
         return float(np.sqrt(self.covariance[_DECAY, _DECAY]))
 
 

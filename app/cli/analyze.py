@@ -99,7 +99,6 @@ def _analyze_runs(tasks: list[AnalysisTask], options: ExecutorOptions) -> Genera
 
 
 def _analyze_with_figure(task: AnalysisTask, figure: Path) -> Generator[AnalysisOutcome]:
-    """Analyse a run here, and draw it."""
     path = Path(task.path)
     try:
         with out.progress_bar(path.name, total=1.0) as update:

@@ -44,7 +44,6 @@ def check(options: CheckOptions) -> None:
 
 
 def _step(known: StepOptions) -> ReferenceStep:
-    """Return the step in SI units or counts. Raises CommandError."""
     options = {
         "--displacement": known.displacement,
         "--shunt": known.shunt,

@@ -30,7 +30,6 @@ class CommandEntry(NamedTuple):
     group: type[TyperGroup] | None = None  # group of the commands below this one
 
     def load(self) -> Any:
-        """Import the options, and return the Click command."""
         example = _EXAMPLES.get(self.target)
         function = command_function(_load(self.options), self._run)
         commands = _typer()
@@ -57,11 +56,9 @@ class LazyGroup(TyperGroup):
     entries: ClassVar[tuple[CommandEntry, ...]] = ()
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as Click calls it
-        """Return the names, those of groups below this one last."""
         return [*(entry.name for entry in self.entries), *self.commands]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of this name; None if there is none."""
         for entry in self.entries:
             if entry.name == cmd_name:
                 return entry.load()

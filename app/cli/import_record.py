@@ -36,7 +36,6 @@ def import_record(options: ImportOptions) -> None:
 
 
 def _plan(source: FileOptions) -> CsvImport:
-    """Return how to read the file. Raises CommandError."""
     if source.relative is not None and source.plate is not None:
         raise CommandError("--relative and --plate are both gauge 2. Give one of them")
     if source.offset is not None and source.gain is None:

@@ -253,7 +253,7 @@ class WriterClient:
     def _settle(self, waiting: "deque[Future[T]]", result: T) -> None:
         with self._guard:
             answer = waiting.popleft() if waiting else None
-        if answer:  # none where it was given up before
+        if answer:  # None where it was given up before
             answer.set_result(result)
 
     def _fail(self, error: RunError) -> None:

@@ -72,7 +72,6 @@ def check_compiled_code(package: Path) -> Finding:
 
 
 def _is_writable(folder: Path) -> bool:
-    """Tell whether a folder can be written, or made."""
     there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
     return there.is_dir() and os.access(there, os.W_OK | (0 if sys.platform == "win32" else os.X_OK))
 
