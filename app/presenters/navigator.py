@@ -57,26 +57,18 @@ class Navigator(Protocol):
     def show_runs(self, folder: str, series: str) -> None:
         """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
 
-    def open_run(self, path: str) -> None:
-        """Show a run on Identify."""
-
-    def fill_connection(self, form: ConnectForm) -> None:
-        """Show Start with `form` filled in."""
-
-    def fill_second_port(self, url: str) -> None:
-        """Show Start with the port of gauge 2's own device filled in."""
+    def open_run(self, path: str) -> None: ...
+    def fill_connection(self, form: ConnectForm) -> None: ...
+    def fill_second_port(self, url: str) -> None: ...
 
     def open_simulated(self, series: str) -> None:
         """Start the simulated stand with its usual options, and record from it."""
 
     def open_stand(self, options: SimulatedStandOptions) -> None: ...
     def open_port(self, port: PortSettings) -> None: ...
-
-    def reconnect(self) -> None:
-        """Connect to the same device again."""
+    def reconnect(self) -> None: ...
 
     def close_connection(self) -> None:
         """Disconnect, unless a run is being recorded."""
 
-    def set_gauges(self, gauges: Gauges) -> None:
-        """Use these calibrations from now on."""
+    def set_gauges(self, gauges: Gauges) -> None: ...

@@ -1,10 +1,12 @@
 """View of the Simulated stand screen: options, faults on demand, true values."""
 
-from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
+from functools import partial
+
+from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QWidget
 
 from app.presenters.stand_screen import StandForm, StandPresenter, StandState
 from app.qt.theme import TextRole, set_property
-from app.qt.widgets.inputs import ComboBox, show_texts
+from app.qt.widgets.inputs import ComboBox, make_button, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
@@ -37,10 +39,13 @@ class StandScreen(QWidget):
         self._presenter = presenter
         self._series = ComboBox()
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._start = QPushButton(gettext("Start and connect"))
+        self._start = make_button(gettext("Start and connect"), presenter.start)
         self._message = label(wrap=True)
         self._seconds = QLineEdit()
-        self._faults = {kind: QPushButton(gettext(text)) for kind, (text, _) in _FAULTS.items()}
+        self._faults = {
+            kind: make_button(gettext(text), partial(presenter.inject_fault, kind))
+            for kind, (text, _) in _FAULTS.items()
+        }
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
         self._truth = ValueGrid()
@@ -71,11 +76,9 @@ class StandScreen(QWidget):
         self._series.activated.connect(lambda _: presenter.set_form(self._read()))
         for field in self._fields.values():
             field.textEdited.connect(lambda _: presenter.set_form(self._read()))
-        self._start.clicked.connect(lambda _: presenter.start())
         self._seconds.textEdited.connect(presenter.set_fault_duration)
         bind_button(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
-            button.clicked.connect(lambda _checked, kind=kind: presenter.inject_fault(kind))
             bind_button(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:

@@ -1,6 +1,7 @@
 """View of the Start screen: simulated stand, amplifier and recordings side by side."""
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
@@ -10,7 +11,7 @@ from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
 from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import ComboBox, show_texts
+from app.qt.widgets.inputs import ComboBox, make_button, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -33,15 +34,16 @@ class StartScreen(QWidget):
         super().__init__()
         self._presenter = presenter
         self._series = ComboBox()
-        self._try = _button(gettext("Try with the simulated stand"), presenter.start_simulation)
+        large_button = partial(make_button, large=True)
+        self._try = large_button(gettext("Try with the simulated stand"), presenter.start_simulation)
         self._form = _Form(presenter)
-        self._connect = _button(gettext("Connect my amplifier"), presenter.connect)
+        self._connect = large_button(gettext("Connect my amplifier"), presenter.connect)
         self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
-        self._open = _button(gettext("Open a recording"), ask_for_run)
+        self._open = large_button(gettext("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
         self._status = label(role=TextRole.HEADING)
-        self._disconnect = _button(gettext("Disconnect"), presenter.navigator.close_connection)
+        self._disconnect = large_button(gettext("Disconnect"), presenter.navigator.close_connection)
         self._series.activated.connect(lambda _: presenter.set_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
@@ -206,13 +208,6 @@ def _card(title: str, hint: str, *parts: Item) -> QFrame:
     card.setMinimumWidth(_CARD_WIDTHS[0])
     card.setMaximumWidth(_CARD_WIDTHS[1])
     return card
-
-
-def _button(text: str, act: Callable[[], None]) -> QPushButton:
-    button = QPushButton(text)
-    button.setProperty("scale", "large")
-    button.clicked.connect(lambda _checked: act())
-    return button
 
 
 def _centred(text: str, role: TextRole) -> QLabel:

@@ -8,8 +8,6 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from analysis.formatting import with_unit
-from app.presenters import number_text
 from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
@@ -89,9 +87,8 @@ class LivePlots(QWidget):
     def _read_out(self) -> None:
         for row, line in enumerate((self._traces.table, self._traces.relative)):
             value = value_at(line.time_s, line.value, self._pointed_s)
-            at, read = number_text.format_fixed(self._pointed_s, 3), number_text.format_fixed(value, 3)
-            text = f"{with_unit(at, 's')}   {with_unit(read, 'mm')}"
-            self._stack.set_readout(row, "" if math.isnan(value) else text)
+            at_s = math.nan if math.isnan(value) else self._pointed_s
+            self._stack.show_values(row, at_s, [value], "mm")
 
 
 def _limits(traces: Traces) -> tuple[float, float]:

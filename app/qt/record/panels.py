@@ -27,9 +27,7 @@ _BAR_RADIUS = 6.0
 class GuidancePanel(QWidget):
     def __init__(self, theme: Theme, connect_device: Callable[[], object]) -> None:
         super().__init__()
-        self._connect = make_button(gettext("Connect"), connect_device)
-        self._connect.setProperty("scale", "large")
-        self._connect.setProperty("primary", "true")
+        self._connect = make_button(gettext("Connect"), connect_device, large=True, primary=True)
         self._instruction = label(role=TextRole.INSTRUCTION, wrap=True)
         self._detail = label(role=TextRole.HEADING, wrap=True)
         self._instruction.setAlignment(Qt.AlignmentFlag.AlignTop)

@@ -1,12 +1,13 @@
 """Dialog of the series plan, as text and as progress of each series. It does not block the window."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QGridLayout, QPlainTextEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QDialog, QGridLayout, QPlainTextEdit, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import PlanEdited, PlanState
 from app.qt.theme import TextRole
+from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -29,14 +30,11 @@ class PlanDialog(QDialog):
         self._text.setTabChangesFocus(True)
         self._message = label(wrap=True)
         self._series = QGridLayout()
-        self._save = QPushButton(gettext("Use this plan"))
+        hint = gettext("Plan anew; runs that are there count (Ctrl+Enter)")
+        self._save = make_button(gettext("Use this plan"), self._use, hint, primary=True)
         self._save.setDefault(True)
-        self._save.setProperty("primary", "true")
-        self._save.setToolTip(gettext("Plan anew; runs that are there count (Ctrl+Enter)"))
         self._save.setShortcut("Ctrl+Return")
-        self._close = QPushButton(gettext("Close"))
-        self._save.clicked.connect(self._use)
-        self._close.clicked.connect(self.close)
+        self._close = make_button(gettext("Close"), self.close)
         self._lay_out()
         self.setWindowTitle(gettext("Series plan"))
         self.resize(560, 520)

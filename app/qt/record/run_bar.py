@@ -126,8 +126,7 @@ class RunBar(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, description = _BUTTONS[action]
-        button = make_button(f"{gettext(text)}   {key}", lambda: self._dispatch(action))
-        button.setProperty("scale", "large")
+        button = make_button(f"{gettext(text)}   {key}", lambda: self._dispatch(action), large=True)
         button.setMinimumWidth(108)
         bind_button(button, ("Return", "Enter") if key == "Enter" else key, gettext(description), self)
         return button

@@ -72,9 +72,15 @@ class ProgressBar(QProgressBar):
             self.setValue(round(1000 * (progress.fraction or 0.0)))
 
 
-def make_button(text: str, act: Callable[[], object], hint: str = "") -> QPushButton:
+def make_button(
+    text: str, act: Callable[[], object], hint: str = "", *, large: bool = False, primary: bool = False
+) -> QPushButton:
     button = QPushButton(text)
     button.setToolTip(hint)
+    if large:
+        button.setProperty("scale", "large")
+    if primary:
+        button.setProperty("primary", "true")
     button.clicked.connect(lambda _checked: act())
     return button
 
