@@ -87,7 +87,7 @@ class Stage:
         scan = self.presenter.state.scan
         if scan is None:
             raise SystemExit("the run has no scan")
-        painted = Painted(self.screen._sides.curves._stack._canvas.viewport())
+        painted = Painted(self.screen._plots.curves._stack._canvas.viewport())
         handle = self.screen._scan._handle
         phase = np.linspace(0.0, 6.0 * np.pi, count + WARM)
         low, high = float(scan.friction[0]), float(scan.friction[-1])

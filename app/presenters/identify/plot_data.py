@@ -35,8 +35,7 @@ def curves(run: AnalysedRun) -> Curves:
         time_label=gettext(
             "time in the record, s" if run.events.release_s is None else "time from release, s"
         ),
-        table=_channel(run.table),
-        relative=None if run.relative is None else _channel(run.relative),
+        channels=tuple(_channel(channel) for channel in (run.table, run.relative) if channel is not None),
         no_relative_reason="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
         noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
@@ -45,8 +44,7 @@ def curves(run: AnalysedRun) -> Curves:
 
 def measured_lines(shown: Curves) -> tuple[PlottedQuantity, ...]:
     """Records of the gauges, then the residuals."""
-    both = ((_TABLE, shown.table), (_RELATIVE, shown.relative))
-    gauges = [(symbol, channel) for symbol, channel in both if channel is not None]
+    gauges = list(zip((_TABLE, _RELATIVE), shown.channels, strict=False))
     records = [PlottedQuantity(symbol, "mm", shown.time_s, channel.record_mm) for symbol, channel in gauges]
     residuals = [
         PlottedQuantity(gettext("residual {symbol}", symbol=symbol), "µm", shown.time_s, channel.residual_um)

@@ -31,10 +31,9 @@ class Curves:
     time_s: Floats
     """(n,) float64: from the release; without one, from the start of the record."""
     time_label: str
-    table: ChannelCurves
-    relative: ChannelCurves | None = None
+    channels: tuple[ChannelCurves, ...]
+    """Of the table, then of gauge 2 if there is one."""
     no_relative_reason: str = ""
-    """Empty if there is a second gauge."""
     slips: tuple[tuple[float, float], ...] = ()
     """Start and end of each slip, in the times of `time_s`."""
     noise_um: float | None = None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from app.presenters import number_text
 from app.presenters.base import Chip, Tone, run_count_text
 from app.presenters.results import sentence
-from app.presenters.runs.state import BatchOutcome
+from app.presenters.runs.state import METADATA_FIELDS, BatchOutcome
 from app.presenters.worker import LazyModule
 from messages.i18n import N_, gettext, ngettext
 
@@ -17,12 +17,6 @@ else:
     tasks = LazyModule("app.presenters.runs.tasks")
 
 Paths = tuple[str, ...]
-_FIELD_NAMES = {
-    "series": N_("series"),
-    "operator": N_("operator"),
-    "note": N_("note"),
-    "plate_mass_kg": N_("plate mass"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +34,7 @@ class Change:
 
 
 def edit(paths: Paths, field: str, value: object, author: str) -> Change:
-    name = gettext(_FIELD_NAMES[field])
+    name = gettext(METADATA_FIELDS[field].name)
     return Change(
         tasks.edit_runs,
         (paths, field, value, author),

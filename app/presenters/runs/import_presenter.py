@@ -18,7 +18,7 @@ from app.presenters.runs.import_form import (
 )
 from app.presenters.runs.state import ImportPreview, Overlay
 from app.presenters.worker import LazyModule, Worker
-from messages.i18n import N_, gettext, ngettext
+from messages.i18n import N_, gettext
 from messages.message import Message, message, options_in, replace_options
 
 if TYPE_CHECKING:
@@ -40,9 +40,8 @@ class ImportState:
     """State of the dialog."""
 
     path: str = ""
-    """The current file; empty without one."""
+    """The current file; empty without one. `pending` others wait."""
     pending: int = 0
-    """Number of files after it."""
     columns: tuple[str, ...] = ()
     column_labels: tuple[str, ...] = ()
     first_rows: str = ""
@@ -50,13 +49,11 @@ class ImportState:
     """Whether delimiter and decimal sign apply."""
     form: Form = field(default_factory=make_form)
     faults: dict[str, str] = field(default_factory=dict)
-    """Faults by name of the field."""
     overlay: Overlay | None = None
-    """The record as it would be imported."""
+    """The record as it would be imported; `summary` has its length and rate."""
     summary: str = ""
-    """Its length and rate."""
     busy: str = ""
-    """Work in progress; empty without any."""
+    """Work in progress."""
     message: Chip = EMPTY_CHIP
     can_import: bool = False
     """Whether the file was read with the current form."""
@@ -188,8 +185,7 @@ class ImportPresenter(Presenter[ImportState]):
 
     def _show_fault(self, fault: Message) -> None:
         words = sentence(replace_options(fault, _LABELS))
-        faults = dict.fromkeys(_named_field(fault), words)
-        self._update(faults=faults, message=Chip(words, Tone.BAD))
+        self._update(faults=dict.fromkeys(_named_fields(fault), words), message=Chip(words, Tone.BAD))
 
     def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; keep those that were chosen if the file has them."""
@@ -218,19 +214,11 @@ class ImportPresenter(Presenter[ImportState]):
         )  # fmt: skip
 
 
-def pending_text(state: ImportState) -> str:
-    """Number of files after the current one."""
-    return ngettext("{count} more file", "{count} more files", state.pending) if state.pending else ""
-
-
 def _format_rows(found: "FilePreview") -> str:
     """First rows as a table; long cells are cut."""
     lines = [found.titles, *found.rows] if found.options.header else list(found.rows)
-    return "\n".join("  ".join(_cell(cell) for cell in cells).rstrip() for cells in lines)
-
-
-def _cell(text: str) -> str:
-    return f"{text if len(text) <= _CELL else text[: _CELL - 1] + '…':<{_CELL}}"
+    cut = [[cell if len(cell) <= _CELL else cell[: _CELL - 1] + "…" for cell in cells] for cells in lines]
+    return "\n".join("  ".join(f"{cell:<{_CELL}}" for cell in cells).rstrip() for cells in cut)
 
 
 def _correction_chip() -> Chip:
@@ -241,9 +229,9 @@ def _line_texts(form: Form) -> Form:
     return {name: form[name] for name in LINE_FIELDS}
 
 
-def _named_field(fault: Message) -> tuple[str, ...]:
+def _named_fields(fault: Message) -> set[str]:
     """Name of the field that a message names, if it names exactly one."""
     named = {_OPTIONS[option].name for option in options_in(fault) if option in _OPTIONS}
     if "field" in fault.values:
         named.add(str(fault.values["field"]))
-    return tuple(named) if len(named) == 1 else ()
+    return named if len(named) == 1 else set()

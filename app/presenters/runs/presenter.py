@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone, run_count_text
 from app.presenters.results import sentence
 from app.presenters.runs import changes
-from app.presenters.runs.analysis_queue import AnalysisQueue, AnalysisSummary
+from app.presenters.runs.analysis_queue import AnalysisQueue
 from app.presenters.runs.changes import Change
 from app.presenters.runs.export_presenter import ExportPresenter
 from app.presenters.runs.import_presenter import ImportPresenter
@@ -47,7 +47,7 @@ class RunsPresenter(Presenter[RunsState]):
         self._open_run = open_run
         self._library = RunList()
         self._undos: list[Change] = []
-        self._analyses = AnalysisQueue(analysis_worker, self._on_analyses_ended)
+        self._analyses = AnalysisQueue(analysis_worker, self._on_runs_changed)
         self._progress: Progress | None = None
         self._is_listing = False
 
@@ -110,7 +110,7 @@ class RunsPresenter(Presenter[RunsState]):
         """Set a field in all selected runs; an invalid text changes nothing."""
         before = self.state.metadata
         paths = self._readable()
-        if before is None or not paths or (text == getattr(before, field) and field not in before.mixed):
+        if before is None or not paths or (text == before.texts[field] and field not in before.mixed):
             return
         try:
             value = changes.parse_field(field, text, self.state.all_series)
@@ -210,9 +210,6 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _on_imported(self, path: str) -> None:
         self._on_runs_changed(BatchOutcome((path,)), gettext("Imported {name}", name=Path(path).stem))
-
-    def _on_analyses_ended(self, summary: AnalysisSummary) -> None:
-        self._on_runs_changed(BatchOutcome(summary.done, tuple(summary.faults)), summary.text())
 
     def _show_rows(self) -> None:
         """Filter and sort again; runs that are still shown stay selected."""

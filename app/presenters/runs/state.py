@@ -54,30 +54,47 @@ class RunRow:
 
 
 @dataclass(frozen=True, slots=True)
+class MetadataField:
+    """An editable field: its title, its hint, and its name in a sentence."""
+
+    title: str
+    hint: str
+    name: str
+
+
+METADATA_FIELDS = {
+    "series": MetadataField(
+        N_("Series"),
+        N_("Series code, for example 1FFM0: it brings its pullback and plate mass"),
+        N_("series"),
+    ),
+    "plate_mass_kg": MetadataField(
+        N_("Plate mass, kg"), N_("Mass of the upper plate with its weights"), N_("plate mass")
+    ),
+    "operator": MetadataField(N_("Operator"), N_("Who recorded"), N_("operator")),
+    "note": MetadataField(N_("Note"), N_("A remark kept with the run"), N_("note")),
+}
+
+
+@dataclass(frozen=True, slots=True)
 class MetadataForm:
-    """Editable metadata of the selected runs, as typed.
+    """Metadata of the selected runs, as typed, by `METADATA_FIELDS`."""
 
-    Fields in which the runs differ are empty and named in `mixed`.
-    """
-
-    series: str = ""
-    operator: str = ""
-    note: str = ""
-    plate_mass_kg: str = ""
+    texts: dict[str, str]
+    """Empty in fields of `mixed`."""
     mixed: frozenset[str] = frozenset()
+    """Fields in which the runs differ."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
-    """One run of the overlay: both gauges (mm), decimated for drawing; NaN breaks the line."""
+    """One run of the overlay: both gauges (mm), (n,) each, decimated for drawing; NaN breaks the line."""
 
     name: str
     time_s: NDArray[np.float64]
-    """(n,) float64: from release; from the start of the record where no release is known."""
+    """From release; from the start of the record where no release is known."""
     table: NDArray[np.float64]
-    """(n,) float64."""
     relative: NDArray[np.float64] | None
-    """(n,) float64 or None."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

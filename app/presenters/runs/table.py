@@ -44,14 +44,12 @@ class RunList:
         return tuple(self._row(run) for run in kept)
 
     def metadata(self, paths: Sequence[str]) -> MetadataForm | None:
-        """Editable metadata of runs; None if none of them can be read."""
         return metadata_form([self._by_path[path] for path in paths])
 
     def readable(self, paths: Sequence[str]) -> tuple[str, ...]:
         return tuple(path for path in paths if not self._by_path[path].fault)
 
     def fault(self, path: str) -> Message:
-        """Why a run cannot be read; empty if it can."""
         return self._by_path[path].fault
 
     def _row(self, run: "RunSummary") -> RunRow:
@@ -78,7 +76,6 @@ def select_runs(
 
 
 def make_row(run: "RunSummary") -> RunRow:
-    """Format the row of a run."""
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
         return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
@@ -111,16 +108,14 @@ def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
     texts = [
         {
             "series": run.series or "",
+            "plate_mass_kg": "" if run.plate_mass_kg is None else f"{run.plate_mass_kg:g}",
             "operator": run.operator,
             "note": run.note,
-            "plate_mass_kg": "" if run.plate_mass_kg is None else f"{run.plate_mass_kg:g}",
         }
         for run in readable
     ]
     mixed = frozenset(name for name in texts[0] if len({text[name] for text in texts}) > 1)
-    return MetadataForm(
-        **{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed
-    )
+    return MetadataForm(texts[0] | dict.fromkeys(mixed, ""), mixed)
 
 
 def _cells(known: dict[Column, str]) -> tuple[str, ...]:
@@ -129,21 +124,16 @@ def _cells(known: dict[Column, str]) -> tuple[str, ...]:
 
 def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     if not run.analyses:
-        return (
-            gettext("not analysed"),
-            Tone.PLAIN,
-            gettext("Select it and press R to identify it and keep the result."),
-        )
+        hint = gettext("Select it and press R to identify it and keep the result.")
+        return gettext("not analysed"), Tone.PLAIN, hint
     if run.stale:
         hint = gettext("Calibration, masses or pullback were changed since: press R to identify it anew.")
         return "▲ " + gettext("stale"), Tone.WARN, hint
     if run.adequate is None:
         return "▲ " + gettext("no motion to fit"), Tone.WARN, ""
-    return (
-        ("✓ " + gettext("fits"), Tone.OK, "")
-        if run.adequate
-        else ("■ " + gettext("does not fit"), Tone.BAD, "")
-    )
+    if run.adequate:
+        return "✓ " + gettext("fits"), Tone.OK, ""
+    return "■ " + gettext("does not fit"), Tone.BAD, ""
 
 
 def _friction(run: "RunSummary") -> str:

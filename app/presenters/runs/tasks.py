@@ -21,16 +21,8 @@ from app.runs.blocks import RunBlock
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields, undo_edit
 from app.runs.errors import RunError
+from app.runs.exchange import importing
 from app.runs.exchange.exporting import ExportRequest, export_runs
-from app.runs.exchange.importing import (
-    CsvImport,
-    FilePreview,
-    ParseOptions,
-    even_rate_hz,
-    import_csv,
-    preview_file,
-    read_record,
-)
 from app.runs.file_operations import copy_run_into, move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
 from app.runs.reader import open_run
@@ -38,7 +30,7 @@ from app.runs.summary import RunSummary
 from app.runs.validator import shared_validator
 from config.files import load_stand
 from config.schema import ConfigError, SeriesError
-from messages.i18n import gettext, ngettext, translate
+from messages.i18n import N_, gettext, ngettext, translate
 
 MAX_OVERLAID_RUNS = 8
 """More curves over one another cannot be told apart by eye."""
@@ -55,11 +47,8 @@ def list_folder(folder: str, report: ReportProgress) -> tuple[RunSummary, ...]:
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run
         return ()
-    return tuple(
-        list_runs(
-            path, progress=lambda done, count: report(Progress(gettext("Looking at new files"), done / count))
-        )
-    )
+    text = gettext("Looking at new files")
+    return tuple(list_runs(path, progress=lambda done, count: report(Progress(text, done / count))))
 
 
 def edit_runs(
@@ -149,21 +138,15 @@ def _first_lines(path: Path) -> str:
 def load_overlay(paths: tuple[str, ...]) -> Overlay:
     """Read and decimate runs, aligned at their releases; say which could not be read."""
     overviews, faults = [], []
+    options: dict[str, Any] = {"before_release_s": _BEFORE_RELEASE_S, "validator": shared_validator()}
     for path in paths[:MAX_OVERLAID_RUNS]:
         try:
-            overviews.append(
-                open_decimated(
-                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, validator=shared_validator()
-                )
-            )
+            overviews.append(open_decimated(path, _DRAWN_SPANS, **options))
         except RunError as error:
             faults.append(str(error))
     if len(paths) > MAX_OVERLAID_RUNS:
-        faults.append(
-            gettext(
-                "The first {shown} of {all} selected runs are drawn", shown=MAX_OVERLAID_RUNS, all=len(paths)
-            )
-        )
+        template = N_("The first {shown} of {all} selected runs are drawn")
+        faults.append(gettext(template, shown=MAX_OVERLAID_RUNS, all=len(paths)))
     units = {overview.unit for overview in overviews}
     unit = units.pop() if len(units) == 1 else gettext("mixed units")
     aligned = all(overview.release_s is not None for overview in overviews)
@@ -185,8 +168,8 @@ def _run_trace(overview: DecimatedRun) -> Trace:
 def preview_import(path: str, form: Form) -> ImportPreview:
     """Read a file as it would be imported; `form` is valid, also below."""
     plan = csv_import(form)
-    _, _, block = read_record(Path(path), plan)
-    rate_hz = even_rate_hz(block.time_s)
+    _, _, block = importing.read_record(Path(path), plan)
+    rate_hz = importing.even_rate_hz(block.time_s)
     rate = gettext("uneven times") if rate_hz is None else with_unit(f"{rate_hz:.6g}", "Hz")
     length = with_unit(format_fixed(float(block.time_s[-1]), 3), "s")
     summary = ngettext("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
@@ -219,7 +202,7 @@ def import_file(path: str, form: Form, folder: str) -> str:
         "conditions": parse_conditions(form, dict(parse_pairs(form["other"]))),
     }
     try:
-        return str(import_csv(Path(path), csv_import(form), target, load_stand(), **metadata).path)
+        return str(importing.import_csv(Path(path), csv_import(form), target, load_stand(), **metadata).path)
     except SeriesError as error:
         raise RunError("{reason}", reason=error, field="series") from None
 
@@ -232,13 +215,13 @@ def _free_path(folder: Path, stem: str) -> Path:
     return path
 
 
-def survey_file(path: str, form: Form) -> FilePreview:
+def survey_file(path: str, form: Form) -> importing.FilePreview:
     """Read the columns and first lines of a file."""
     options = {name: form[name] or None for name in ("delimiter", "decimal")}
-    return preview_file(Path(path), convert(options | _lines(form), ParseOptions))
+    return importing.preview_file(Path(path), convert(options | _lines(form), importing.ParseOptions))
 
 
-def csv_import(form: Form) -> CsvImport:
+def csv_import(form: Form) -> importing.CsvImport:
     """Request for the import, as `slipstand import` makes it."""
     number = {name: field.parse(form) for name, field in FIELDS.items() if field.rule}
     unit: dict[str, Any] = {"unit": form["unit"]}
@@ -263,7 +246,7 @@ def csv_import(form: Form) -> CsvImport:
         **{name: form[name] for name in ("measures", "time_unit", "quantity")},
         **{name: number[name] for name in ("gain_uncertainty", "from_s", "until_s", "segment")},
     }
-    return convert(request, CsvImport)
+    return convert(request, importing.CsvImport)
 
 
 def _lines(form: Form) -> dict[str, Any]:

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from app.presenters.identify.state import Cursor, Cursors
 from app.qt.theme import TextRole, Tokens
-from app.qt.widgets.layouts import make_column
+from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.plots import Plot, pen, shade
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, padded, set_text_or_hide
 from messages.i18n import gettext
 
 _ABOVE = 15
 
 
 class CursorLines(QObject):
-    """Shows `Cursors`; `drawn` tells which line the mouse has moved, and to where."""
+    """Shows `Cursors`; `moved` has the line that the mouse has moved, and its time."""
 
     moved = Signal(Cursor, float)
 
@@ -50,10 +50,10 @@ class CursorLines(QObject):
         line = pg.InfiniteLine(angle=90, movable=True, **named)
         line.setZValue(_ABOVE)
         line.hide()
-        line.sigDragged.connect(partial(self._tell, cursor))
+        line.sigDragged.connect(partial(self._report, cursor))
         return plot.add(line)
 
-    def _tell(self, cursor: Cursor, line: Any) -> None:
+    def _report(self, cursor: Cursor, line: Any) -> None:
         at_s = float(line.value())
         for other in self._lines[cursor]:
             if other is not line:
@@ -61,7 +61,8 @@ class CursorLines(QObject):
         self.moved.emit(cursor, at_s)
 
 
-_RIGHT = Qt.AlignmentFlag.AlignRight
+_MOST_CELLS = 6
+"""Columns of `Cursors.cells`: name, time, and four values on the phase plane."""
 
 
 class CursorBar(QWidget):
@@ -74,12 +75,9 @@ class CursorBar(QWidget):
         self._grid.setVerticalSpacing(0)
         self._grid.setColumnStretch(0, 1)
         self._period = label(role=TextRole.STRONG)
-        self._hint = label(gettext("← → move, with Shift by ten; A and B choose"), TextRole.LABEL, muted=True)
-        below = QHBoxLayout()
-        below.addWidget(self._hint, 1)
-        below.addWidget(self._period)
-        make_column(self._grid, below, margins=(16, 4), of=self)
-        self._labels: dict[tuple[int, int], QLabel] = {}
+        hint = label(gettext("← → move, with Shift by ten; A and B choose"), TextRole.LABEL, muted=True)
+        make_column(self._grid, make_row((hint, 1), self._period), margins=(16, 4), of=self)
+        self._cells = [[self._cell(row, column) for column in range(_MOST_CELLS)] for row in range(4)]
         self.hide()
 
     def show_cursors(self, cursors: Cursors | None) -> None:
@@ -87,23 +85,16 @@ class CursorBar(QWidget):
         if cursors is None:
             return
         rows = (("", "t", *cursors.symbols), *cursors.cells)
-        for place in self._labels.keys() - {(r, c) for r, row in enumerate(rows) for c in range(len(row))}:
-            self._labels[place].hide()
-        for number, texts in enumerate(rows):
-            for column, text in enumerate(texts):
-                cell = self._cell(number, column)
-                cell.setText(text)
-                cell.show()
+        for cells, texts in zip(self._cells, rows, strict=True):
+            for cell, text in zip(cells, padded(texts, _MOST_CELLS, ""), strict=True):
+                set_text_or_hide(cell, text)
         self._period.setText(cursors.period)
 
     def _cell(self, row: int, column: int) -> QLabel:
-        if (row, column) not in self._labels:
-            made = label(role=TextRole.STRONG if column == 0 else TextRole.TEXT)
-            if row == 0:
-                made = label(role=TextRole.LABEL, muted=True)
-            self._labels[row, column] = made
-            self._grid.addWidget(made, row, column + 1, _RIGHT)
-        return self._labels[row, column]
+        role = TextRole.LABEL if row == 0 else TextRole.TEXT if column else TextRole.STRONG
+        cell = label(role=role, muted=row == 0)
+        self._grid.addWidget(cell, row, column + 1, Qt.AlignmentFlag.AlignRight)
+        return cell
 
 
 _SIZE = 9
@@ -120,13 +111,12 @@ class CursorPoints:
         for row, points in enumerate(self._points.values()):
             for number, point in enumerate(points):
                 place = (np.nan, np.nan) if cursors is None else cursors.values[row][2 * number :][:2]
-                point.put(*place)
+                point.show_at(*place)
 
     def restyle(self, tokens: Tokens) -> None:
-        for point in self._points[Cursor.A]:
-            point.restyle(tokens.text, tokens.surface)
-        for point in self._points[Cursor.B]:
-            point.restyle(tokens.text, tokens.text)
+        for cursor, fill in ((Cursor.A, tokens.surface), (Cursor.B, tokens.text)):
+            for point in self._points[cursor]:
+                point.restyle(tokens.text, fill)
 
 
 class _Point:
@@ -135,15 +125,15 @@ class _Point:
     def __init__(self, plot: Plot, cursor: Cursor) -> None:
         self._mark = plot.add(pg.ScatterPlotItem(size=_SIZE, symbol=_MARKS[cursor]))
         self._letter: Any = plot.add(pg.TextItem(cursor.value, anchor=(-0.3, 1.1)))
-        for item in (self._mark, self._letter):
-            item.setZValue(_ABOVE)
+        self._mark.setZValue(_ABOVE)
+        self._letter.setZValue(_ABOVE)
 
-    def put(self, across: float, up: float) -> None:
-        is_somewhere = bool(np.isfinite(across) and np.isfinite(up))
-        self._mark.setData([across] if is_somewhere else [], [up] if is_somewhere else [])
-        self._letter.setVisible(is_somewhere)
-        if is_somewhere:
-            self._letter.setPos(across, up)
+    def show_at(self, x: float, y: float) -> None:
+        is_visible = bool(np.isfinite(x) and np.isfinite(y))
+        self._mark.setData([x] if is_visible else [], [y] if is_visible else [])
+        self._letter.setVisible(is_visible)
+        if is_visible:
+            self._letter.setPos(x, y)
 
     def restyle(self, line: str, ground: str) -> None:
         self._mark.setPen(pen(line))

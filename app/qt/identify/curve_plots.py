@@ -21,6 +21,7 @@ from app.qt.widgets.plots import (
     shaded_region,
     value_at,
 )
+from app.qt.widgets.text import padded
 from messages.i18n import N_, gettext
 
 _NAMES = (
@@ -75,15 +76,14 @@ class CurvePlots(QWidget):
     def show_curves(self, curves: Curves) -> None:
         self._curves = curves
         self._stack.set_time_title(curves.time_label)
-        channels = (curves.table, curves.relative)
-        for row, channel in enumerate(channels):
+        for row, channel in enumerate(padded(curves.channels, 2, None)):
             _set(self._records[row], curves.time_s, channel.record_mm if channel else None)
             _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
         self.show_manual_fit(None)
         for plot, lines in zip(self._stack.plots, _lines(curves), strict=True):
             plot.fit_values(*lines)
-        self._set_titles(channels, curves.no_relative_reason)
+        self._set_titles(curves)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
@@ -106,14 +106,18 @@ class CurvePlots(QWidget):
     def _report_span(self) -> None:
         self.span_changed.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
 
-    def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
-        fitted = any(c is not None and c.residual_um is not None for c in channels)
-        keys = [gettext(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
-        of_residual = _OF_TABLE if channels[1] is None else _OF_RESIDUAL
-        said = [keys[0], no_relative or keys[1], gettext(of_residual if fitted else _NO_RESIDUAL)]
-        shown = [True, channels[1] is not None, fitted]
-        for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
-            self._stack.set_title(row, f"{gettext(name)} &nbsp; {words}")
+    def _set_titles(self, curves: Curves) -> None:
+        table, relative = padded(curves.channels, 2, None)
+        is_fitted = any(channel.residual_um is not None for channel in curves.channels)
+        of_residual = gettext(_OF_TABLE if relative is None else _OF_RESIDUAL)
+        texts = (
+            _key(table),
+            curves.no_relative_reason or _key(relative),
+            of_residual if is_fitted else gettext(_NO_RESIDUAL),
+        )
+        shown = (True, relative is not None, is_fitted)
+        for row, (name, text) in enumerate(zip(_NAMES, texts, strict=True)):
+            self._stack.set_title(row, f"{gettext(name)} &nbsp; {text}")
             self._stack.set_plot_visible(row, shown=shown[row])
 
     def _restyle(self) -> None:
@@ -143,12 +147,16 @@ class CurvePlots(QWidget):
             self._stack.show_values(row, at_s, values, _UNITS[row], 3 if row < 2 else 0)
 
 
+def _key(channel: ChannelCurves | None) -> str:
+    return gettext(_RECORD_ONLY if channel is None or channel.simulation_mm is None else _KEY)
+
+
 def _lines(curves: Curves) -> tuple[list[Floats], ...]:
     """Lines of each plot: record and simulation of each gauge, and the residuals."""
-    channels = (curves.table, curves.relative)
-    gauges = [(c.record_mm, c.simulation_mm) if c is not None else () for c in channels]
-    residuals = [c.residual_um for c in channels if c is not None]
-    return tuple([line for line in lines if line is not None] for lines in (*gauges, residuals))
+    gauges = [(channel.record_mm, channel.simulation_mm) for channel in curves.channels]
+    residuals = [channel.residual_um for channel in curves.channels]
+    rows = (*padded(gauges, 2, ()), residuals)
+    return tuple([line for line in lines if line is not None] for lines in rows)
 
 
 def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:

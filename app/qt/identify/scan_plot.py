@@ -4,20 +4,21 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy
+from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from app.presenters.analysed_run import Objective
 from app.presenters.identify.state import ManualFit
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.layouts import make_column
+from app.qt.widgets.inputs import make_button
+from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
 from app.qt.widgets.shortcuts import describe_shortcut
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
 
 _HEIGHT = 176
-_STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
-"""Of the range of the scan, by an arrow key, and by one with Shift."""
+_STEP, _LONG_STEP = 1.0 / 400.0, 1.0 / 40.0
+"""Shares of the range of the scan by which an arrow key moves the handle, and one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
 _WORDS = N_("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
 _POLL_MS = 1
@@ -45,8 +46,11 @@ class ScanPlot(QFrame):
         self._handle = draggable_line(plot)
         self._words = label(gettext(_WORDS), TextRole.LABEL, muted=True, wrap=True)
         self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing())
-        self._back = QPushButton(gettext("Back to the fit"))
-        self._back.setToolTip(gettext("Take the handle back to the fitted value (Home)"))
+        self._back = make_button(
+            gettext("Back to the fit"),
+            self.reset_requested.emit,
+            gettext("Take the handle back to the fitted value (Home)"),
+        )
         self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setProperty("role", "plots")
@@ -60,8 +64,7 @@ class ScanPlot(QFrame):
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll_again)
-        self._handle.sigDragged.connect(self._tell)
-        self._back.clicked.connect(self.reset_requested)
+        self._handle.sigDragged.connect(self._report)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -96,12 +99,12 @@ class ScanPlot(QFrame):
         elif direction is None or self._scan is None:
             super().keyPressEvent(event)
         else:
-            step = _LEAP if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else _STEP
+            step = _LONG_STEP if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else _STEP
             reach = float(self._scan.friction[-1] - self._scan.friction[0])
             self._handle.setValue(self._handle.value() + direction * step * reach)
-            self._tell()
+            self._report()
 
-    def _tell(self, *_: object) -> None:
+    def _report(self, *_: object) -> None:
         self.friction_set.emit(float(self._handle.value()))
         self._timer.start()
 
@@ -121,8 +124,6 @@ class ScanPlot(QFrame):
 
     def _lay_out(self) -> None:
         self._stack.setFixedHeight(_HEIGHT)
-        below = QHBoxLayout()
+        below = make_row((self._words, 1), self._back)
         below.setContentsMargins(16, 0, 16, 4)
-        below.addWidget(self._words, 1)
-        below.addWidget(self._back)
         make_column(self._stack, below, spacing=4, of=self)

@@ -1,17 +1,9 @@
-"""The Identify screen: curves at the left, what was found at the right; or what is missing, in words."""
+"""The Identify screen: curves at the left, results at the right; or what is missing."""
 
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QPushButton,
-    QSplitter,
-    QStackedWidget,
-    QTabBar,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QPushButton, QSplitter, QStackedWidget, QTabBar, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.identify.presenter import IdentifyPresenter
@@ -22,7 +14,7 @@ from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ProgressBar, make_button
-from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_scroll_area
+from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from app.qt.window_geometry import persist_layout
@@ -31,7 +23,8 @@ from messages.i18n import N_, gettext
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
 _NO_MOTION = N_("The other tabs need the fitted motion of both masses; this run has none.")
-_OTHER_KINDS = {"one-mass": N_("Analyse as one mass"), "two-mass": N_("Analyse as two masses")}
+_EMPTY = N_("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
+_OTHER_KINDS = {None: "", "one-mass": N_("Analyse as one mass"), "two-mass": N_("Analyse as two masses")}
 
 
 class IdentifyScreen(QWidget):
@@ -39,137 +32,122 @@ class IdentifyScreen(QWidget):
 
     def __init__(self, theme: Theme, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
+        self._presenter = presenter
+        self._shown = IdentifyState()
+        self._shown_tab: tuple[PlotTab, Cursors | None] | None = None
         self._title = label(role=TextRole.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._open = make_button(gettext("Open another recording"), ask_for_run)
-        self._kind = QPushButton()
-        self._kind.clicked.connect(presenter.analyse_as_alternative)
+        self._kind = make_button("", presenter.analyse_as_alternative)
         self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
         bind_button(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
-        self._presenter = presenter
-        self._shown: IdentifyState | None = None
-        self._side: tuple[PlotTab, Cursors | None] | None = None
         self._tabs = QTabBar()
         self._no_motion = label(gettext(_NO_MOTION), TextRole.LABEL, muted=True, wrap=True)
         self._no_motion.setContentsMargins(16, 0, 16, 0)
-        self._sides = PlotTabs(theme)
+        self._plots = PlotTabs(theme)
         self._readings = CursorBar()
         self._scan = ScanPlot(theme, presenter.poll)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
         self._column = make_scroll_area(name=gettext("What was found"))
-        self._waiting = _Waiting(presenter, ask_for_run)
+        self._waiting = _WaitingPage(presenter, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
-        self._stack.addWidget(self._filled())
-        self._lay_out()
+        self._stack.addWidget(self._results_page())
+        top = make_row((self._title, 1), self._cursors, self._kind, self._open, spacing=8)
+        top.setContentsMargins(4, 0, 0, 0)
+        make_column(top, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
         self._connect(presenter)
 
     def show_state(self, state: IdentifyState) -> None:
-        self._title.setText(state.title or gettext("No recording is open"))
         old, self._shown = self._shown, state
-        filled = state.curves is not None and state.progress is None
-        self._open.setVisible(filled)
-        self._cursors.setVisible(filled)
-        self._kind.setVisible(filled and state.alternative_kind is not None)
-        if not filled:
+        self._title.setText(state.title or gettext("No recording is open"))
+        has_run = state.curves is not None and state.progress is None
+        self._open.setVisible(has_run)
+        self._cursors.setVisible(has_run)
+        self._kind.setVisible(has_run and state.alternative_kind is not None)
+        if not has_run:
             self._waiting.show_state(state)
             self._stack.setCurrentIndex(0)
             return
-        if old is None or state.curves is not old.curves:
+        if state.curves is not old.curves:
             self._show_run(state)
         elif state.manual_fit is not old.manual_fit:
-            self._sides.curves.show_manual_fit(state.manual_fit)
+            self._plots.curves.show_manual_fit(state.manual_fit)
             self._scan.show_manual_fit(state.manual_fit, state.manual_fit_text)
         elif state.model_note != old.model_note:
-            self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
+            self._show_results(state)
         elif state.classical != old.classical:
-            self._findings().show_classical(state.classical)
-        if (state.tab, state.cursors) != self._side:
-            self._show_side_of(state)
+            self._results.show_classical(state.classical)
+        if (state.tab, state.cursors) != self._shown_tab:  # not for each step of a dragged handle
+            self._show_tab(state)
         self._stack.setCurrentIndex(1)
 
     def _show_run(self, state: IdentifyState) -> None:
         if state.curves is None:
             return
-        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
-        self._sides.curves.show_curves(state.curves)
+        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind]))
+        self._plots.curves.show_curves(state.curves)
         for index in range(1, len(PlotTab)):
             self._tabs.setTabEnabled(index, state.motion is not None)
             self._tabs.setTabToolTip(index, "" if state.motion is not None else gettext(_NO_MOTION))
         self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
-            self._sides.show_motion(state.motion, state.curves.slips)
+            self._plots.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
         set_text_or_hide(self._no_scan, state.no_scan_reason)
-        self._column.setWidget(ResultsPanel(state, self._presenter.select_model))
+        self._show_results(state)
 
-    def _show_side_of(self, state: IdentifyState) -> None:
-        """Draw what changes with the tab or the cursors; while the handle is drawn neither does."""
-        self._side = state.tab, state.cursors
+    def _show_results(self, state: IdentifyState) -> None:
+        self._results = ResultsPanel(state, self._presenter.select_model)
+        self._column.setWidget(self._results)
+
+    def _show_tab(self, state: IdentifyState) -> None:
+        self._shown_tab = state.tab, state.cursors
         self._tabs.setCurrentIndex(list(PlotTab).index(state.tab))
-        self._sides.show_tab(state.tab, state.cursors)
+        self._plots.show_tab(state.tab, state.cursors)
         self._cursors.setChecked(state.cursors is not None)
         self._readings.show_cursors(state.cursors)
 
-    def _findings(self) -> ResultsPanel:
-        found = self._column.widget()
-        if not isinstance(found, ResultsPanel):
-            raise TypeError(f"the column holds a {type(found).__name__}, not the findings of a run")
-        return found
-
-    def _show_side(self, index: int) -> None:
-        self._presenter.set_tab(list(PlotTab)[index])
-
     def _toggle_cursors(self) -> None:
-        self._presenter.toggle_cursors(self._sides.span())
+        self._presenter.toggle_cursors(self._plots.span())
         if self._cursors.isChecked():
-            self._sides.setFocus()
+            self._plots.setFocus()
 
     def _connect(self, presenter: IdentifyPresenter) -> None:
-        self._tabs.currentChanged.connect(self._show_side)
+        self._tabs.currentChanged.connect(lambda index: presenter.set_tab(list(PlotTab)[index]))
         self._cursors.clicked.connect(self._toggle_cursors)
-        self._sides.curves.span_changed.connect(presenter.set_visible_span)
-        self._sides.cursor_moved.connect(presenter.move_cursor)
-        self._sides.cursor_stepped.connect(presenter.step_cursor)
-        self._sides.cursor_activated.connect(presenter.activate_cursor)
+        self._plots.curves.span_changed.connect(presenter.set_visible_span)
+        self._plots.cursor_moved.connect(presenter.move_cursor)
+        self._plots.cursor_stepped.connect(presenter.step_cursor)
+        self._plots.cursor_activated.connect(presenter.activate_cursor)
         self._scan.friction_set.connect(presenter.set_friction)
         self._scan.reset_requested.connect(presenter.reset_friction)
 
-    def _filled(self) -> QWidget:
+    def _results_page(self) -> QWidget:
         page = QSplitter(Qt.Orientation.Horizontal)
         for title in PlotTab:
             self._tabs.addTab(gettext(title.value))
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName(gettext("What is drawn"))
-        card = make_frame(self._tabs, self._no_motion, self._readings, self._sides, spacing=6)
+        page.addWidget(make_frame(self._tabs, self._no_motion, self._readings, self._plots, spacing=6))
         side = make_frame(self._scan, self._no_scan, self._column, spacing=6)
         side.setMinimumWidth(_COLUMN_WIDTH)
         side.setMaximumWidth(_WIDEST_COLUMN)
+        page.addWidget(side)
         page.setChildrenCollapsible(False)
         page.setHandleWidth(8)
-        for frame in (card, side):
-            page.addWidget(frame)
         page.setStretchFactor(0, 1)
         page.setStretchFactor(1, 0)
         page.setSizes([_USUAL_PLOTS, _COLUMN_WIDTH])
         persist_layout(page, "identify")
         return page
 
-    def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setContentsMargins(4, 0, 0, 0)
-        top.addWidget(self._title, 1)
-        top.addWidget(self._cursors)
-        top.addWidget(self._kind)
-        top.addWidget(self._open)
-        make_column(top, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
 
-
-class _Waiting(QFrame):
-    """In place of the curves: what goes on, what went wrong, or what will be here."""
+class _WaitingPage(QFrame):
+    """In place of the curves: progress, a failure, or what will be here."""
 
     def __init__(self, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
@@ -179,8 +157,7 @@ class _Waiting(QFrame):
         self._bar = ProgressBar()
         self._bar.setFixedWidth(320)
         self._cancel = make_button(gettext("Cancel"), presenter.cancel)
-        self._kind = QPushButton()
-        self._kind.clicked.connect(presenter.analyse_as_alternative)
+        self._kind = make_button("", presenter.analyse_as_alternative)
         self._open = make_button(gettext("Open a recording"), ask_for_run)
         layout = make_column(STRETCH, self._words, spacing=16, margins=(24, 24), of=self)
         for widget in (self._bar, self._cancel, self._kind, self._open):
@@ -189,19 +166,10 @@ class _Waiting(QFrame):
 
     def show_state(self, state: IdentifyState) -> None:
         progress = state.progress
-        show_chip(self._words, _words(state))
+        chip = Chip(state.failure or gettext(_EMPTY), Tone.BAD if state.failure else Tone.PLAIN)
+        show_chip(self._words, chip if progress is None else Chip(progress.text))
         self._open.setVisible(progress is None)
         self._kind.setVisible(progress is None and state.alternative_kind is not None)
-        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
+        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind]))
         self._bar.show_progress(progress)
         self._cancel.setVisible(progress is not None)
-
-
-def _words(state: IdentifyState) -> Chip:
-    if state.progress is not None:
-        return Chip(state.progress.text)
-    if state.failure:
-        return Chip(state.failure, Tone.BAD)
-    return Chip(
-        gettext("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
-    )

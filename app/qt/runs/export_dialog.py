@@ -1,23 +1,14 @@
-"""The export dialog: what, how, where, with a preview. It stays open beside the window and stops nothing."""
+"""The export dialog: format, content and target, with a preview. It does not block the window."""
 
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import (
-    QDialog,
-    QFileDialog,
-    QGridLayout,
-    QLineEdit,
-    QPlainTextEdit,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QWidget
 
 from app.presenters.base import Chip
 from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportPresenter, ExportState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox, ProgressBar, ask_for_folder, make_choice
+from app.qt.widgets import inputs
 from app.qt.widgets.layouts import make_column, make_form_grid, make_row
 from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import gettext, ngettext
@@ -31,17 +22,17 @@ class ExportDialog(QDialog):
         self._presenter = presenter
         self._shown = ExportState()
         self._title = label(role=TextRole.HEADING)
-        self._format = make_choice(FORMATS)
-        self._content = ComboBox()
+        self._format = inputs.make_choice(FORMATS)
+        self._content = inputs.ComboBox()
         self._output = QLineEdit()
-        self._browse = QPushButton(gettext("Browse…"))
-        self._replace = CheckBox(gettext("Replace existing files"))
-        self._preview = QPlainTextEdit()
-        self._bar = ProgressBar()
+        self._browse = inputs.make_button(gettext("Browse…"), self._choose_output)
+        self._replace = inputs.CheckBox(gettext("Replace existing files"))
+        self._preview = inputs.make_text_view(gettext("Preview"))
+        self._bar = inputs.ProgressBar()
         self._message = label(wrap=True)
         self._details = label(muted=True, wrap=True)
-        self._export = QPushButton(gettext("Export"))
-        self._close = QPushButton(gettext("Close"))
+        self._export = inputs.make_primary_button(gettext("Export"))
+        self._export.setDefault(True)
         self._lay_out()
         self._connect()
 
@@ -73,7 +64,7 @@ class ExportDialog(QDialog):
 
     def _choose_output(self) -> None:
         if self._shown.is_folder:
-            ask_for_folder(self, gettext("Export to"), self._shown.output, self._presenter.set_output)
+            inputs.ask_for_folder(self, gettext("Export to"), self._shown.output, self._presenter.set_output)
             return
         dialog = QFileDialog(self, gettext("Export to"), self._shown.output)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
@@ -86,16 +77,14 @@ class ExportDialog(QDialog):
         self._format.activated.connect(lambda _: self._presenter.set_format(self._format.currentData()))
         self._content.activated.connect(lambda _: self._presenter.set_content(self._content.currentData()))
         self._output.textEdited.connect(self._presenter.set_output)
-        self._browse.clicked.connect(self._choose_output)
         self._replace.toggled.connect(self._presenter.set_replace)
         self._export.clicked.connect(lambda _checked: self._presenter.export())
-        self._close.clicked.connect(self.close)
 
     def _lay_out(self) -> None:
         self.setWindowTitle(gettext("Export"))
         self.resize(720, 560)
-        self._set_up_fields()
-        buttons = make_row((self._bar, 1), self._export, self._close, spacing=8)
+        close = inputs.make_button(gettext("Close"), self.close)
+        buttons = make_row((self._bar, 1), self._export, close, spacing=8)
         buttons.insertStretch(1, 0)
         make_column(
             self._title,
@@ -109,15 +98,6 @@ class ExportDialog(QDialog):
             margins=(16, 16),
             of=self,
         )
-
-    def _set_up_fields(self) -> None:
-        self._preview.setReadOnly(True)
-        self._preview.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
-        self._preview.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        self._preview.setTabChangesFocus(True)
-        self._export.setDefault(True)
-        self._export.setProperty("primary", "true")
-        self._preview.setAccessibleName(gettext("Preview"))
 
     def _form(self) -> QGridLayout:
         place = QWidget()

@@ -60,11 +60,9 @@ class RunsPreview(QWidget):
 
     def _draw(self) -> None:
         traces = self._overlay.traces
-        self._stack.set_time_title(self._overlay.time_label)
-        for number in range(_MOST):
+        for number, curves in enumerate(zip(*self._curves, strict=True)):
             trace = traces[number] if number < len(traces) else None
-            for row, line in enumerate(_lines(trace)):
-                curve = self._curves[row][number]
+            for curve, line in zip(curves, _lines(trace), strict=True):
                 if trace is None or line is None:
                     curve.setData([], [])
                 else:

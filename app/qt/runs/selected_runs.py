@@ -8,12 +8,12 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QPushButton, QSizePolicy, QWidg
 
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import MetadataForm, RunsState
+from app.presenters.runs.state import METADATA_FIELDS, MetadataForm, RunsState
 from app.qt.widgets.inputs import ProgressBar, make_button
 from app.qt.widgets.layouts import make_column, make_form_grid, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import N_, gettext
+from messages.i18n import gettext
 
 
 class ActionBar(QFrame):
@@ -39,15 +39,14 @@ class ActionBar(QFrame):
 
     def add_keys(self, screen: QWidget, table: QWidget) -> None:
         """Bind keys to the buttons; single letters only in the table, where nothing is typed."""
-        for button, keys, words in (
-            (self._open, ("Return", "Enter"), gettext("Show the run on Identify")),
-            (
-                self._analyse,
-                "R",
-                gettext("Identify what is not up to date of the selected runs, and keep it"),
+        in_table = {
+            self._open: (("Return", "Enter"), gettext("Show the run on Identify")),
+            self._analyse: (
+                "R", gettext("Identify what is not up to date of the selected runs, and keep it")
             ),
-            (self._trash, "Del", gettext("Put the selected runs aside; undo brings them back")),
-        ):
+            self._trash: ("Del", gettext("Put the selected runs aside; undo brings them back")),
+        }  # fmt: skip
+        for button, (keys, words) in in_table.items():
             bind_button(button, keys, words, table, focused=True)
         anew = gettext("Identify the selected runs anew, also those that are up to date")
         add_shortcut(table, "Shift+R", anew, self._analyse_anew, focused=True)
@@ -61,12 +60,8 @@ class ActionBar(QFrame):
         for button in (self._analyse, self._export):
             button.setEnabled(state.metadata is not None)
         self._undo.setEnabled(bool(state.undo_text))
-        set_button_hint(
-            self._undo,
-            gettext("Take back: {what}", what=state.undo_text)
-            if state.undo_text
-            else gettext("Nothing to undo"),
-        )
+        undo = gettext("Take back: {what}", what=state.undo_text)
+        set_button_hint(self._undo, undo if state.undo_text else gettext("Nothing to undo"))
         self._show_words(state.message, state.progress)
         self._details.setVisible(bool(state.details))
         self._list.setText("\n".join(state.details))
@@ -98,14 +93,6 @@ def _button(text: str, act: Callable[[], None]) -> QPushButton:
     return button
 
 
-_FIELDS = {
-    "series": (N_("Series"), N_("Series code, for example 1FFM0: it brings its pullback and plate mass")),
-    "plate_mass_kg": (N_("Plate mass, kg"), N_("Mass of the upper plate with its weights")),
-    "operator": (N_("Operator"), N_("Who recorded")),
-    "note": (N_("Note"), N_("A remark kept with the run")),
-}
-
-
 class MetadataEditor(QWidget):
     """Fields that take effect when the focus leaves them, or on Enter; Escape restores the old text."""
 
@@ -114,22 +101,22 @@ class MetadataEditor(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._metadata: MetadataForm | None = None
-        self._fields = {name: QLineEdit() for name in _FIELDS}
-        grid = make_form_grid((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
+        self._fields = {name: QLineEdit() for name in METADATA_FIELDS}
+        titles = [gettext(described.title) for described in METADATA_FIELDS.values()]
+        grid = make_form_grid(zip(titles, self._fields.values(), strict=True))
         grid.setContentsMargins(12, 4, 12, 12)
         self.setLayout(grid)
         for name, field in self._fields.items():
-            field.setToolTip(gettext(_FIELDS[name][1]))
+            field.setToolTip(gettext(METADATA_FIELDS[name].hint))
             field.editingFinished.connect(lambda name=name: self._on_edited(name))
 
     def show_metadata(self, metadata: MetadataForm | None) -> None:
         self._metadata = metadata
         for name, field in self._fields.items():
             field.setEnabled(metadata is not None)
-            field.setText("" if metadata is None else getattr(metadata, name))
-            field.setPlaceholderText(
-                gettext("several values") if metadata is not None and name in metadata.mixed else ""
-            )
+            field.setText("" if metadata is None else metadata.texts[name])
+            is_mixed = metadata is not None and name in metadata.mixed
+            field.setPlaceholderText(gettext("several values") if is_mixed else "")
             field.setModified(False)
             field.setCursorPosition(0)  # the beginning of a long note in sight
 

@@ -23,17 +23,8 @@ from messages.i18n import gettext
 Index = QModelIndex | QPersistentModelIndex
 _COLUMNS = tuple(Column)
 _RIGHT = {Column.FRICTION, Column.DURATION}
-_WIDTHS = {
-    Column.NAME: 220,
-    Column.DATE: 128,
-    Column.SERIES: 84,
-    Column.FRICTION: 148,
-    Column.VERDICT: 124,
-    Column.NOTE: 180,
-    Column.OPERATOR: 104,
-    Column.DURATION: 84,
-    Column.ENDED: 92,
-}
+_WIDTHS = (220, 128, 84, 148, 124, 180, 104, 84, 92)
+"""Of `Column` in this order."""
 _LINE_HEIGHT = 28
 
 
@@ -69,8 +60,8 @@ class RunsTable(QTableView):
         titles.setSortIndicatorShown(True)
         titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         persist_layout(titles, "runs")
-        for number, column in enumerate(_COLUMNS):
-            self.setColumnWidth(number, _WIDTHS[column])
+        for number, width in enumerate(_WIDTHS):
+            self.setColumnWidth(number, width)
         titles.sortIndicatorChanged.connect(self._want_order)
         self.selectionModel().selectionChanged.connect(self._tell_selected)
         self.doubleClicked.connect(lambda _: self.open_requested.emit())

@@ -4,12 +4,13 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
+from PySide6.QtGui import QFontDatabase, QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QFileDialog,
     QLineEdit,
+    QPlainTextEdit,
     QProgressBar,
     QPushButton,
     QStyle,
@@ -83,6 +84,23 @@ def make_button(
         button.setProperty("primary", "true")
     button.clicked.connect(lambda _checked: act())
     return button
+
+
+def make_primary_button(text: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setProperty("primary", "true")
+    return button
+
+
+def make_text_view(name: str) -> QPlainTextEdit:
+    """Make a read-only view of unwrapped lines in a fixed font, with an accessible name."""
+    view = QPlainTextEdit()
+    view.setReadOnly(True)
+    view.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+    view.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+    view.setTabChangesFocus(True)
+    view.setAccessibleName(name)
+    return view
 
 
 def make_choice(items: Mapping[Any, str]) -> ComboBox:

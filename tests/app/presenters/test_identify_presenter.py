@@ -57,10 +57,10 @@ def test_curves_begin_at_release_with_slip_marked_and_residual_in_micrometres(st
     assert curves.time_s[0] == pytest.approx(-4.0)
     assert curves.slips == (pytest.approx((0.0, 2.5)),)
     assert curves.noise_um == pytest.approx(20.0)
-    assert curves.relative is not None
-    assert curves.relative.residual_um is not None
-    assert np.std(curves.relative.residual_um) == pytest.approx(20.0, rel=0.05)
-    np.testing.assert_allclose(curves.table.record_mm, 1e3 * run.table.record_m)
+    table, relative = curves.channels
+    assert relative.residual_um is not None
+    assert np.std(relative.residual_um) == pytest.approx(20.0, rel=0.05)
+    np.testing.assert_allclose(table.record_mm, 1e3 * run.table.record_m)
 
 
 def test_slips_are_those_of_the_fitted_motion_where_there_is_one(stage: Stage) -> None:
@@ -82,7 +82,7 @@ def test_a_record_without_release_is_drawn_from_its_start(stage: Stage) -> None:
     stage.show(events=Events(), model=None, relative=None)
     curves = stage.presenter.state.curves
     assert curves is not None
-    assert (curves.time_s[0], curves.slips, curves.noise_um, curves.relative) == (0.0, (), None, None)
+    assert (curves.time_s[0], curves.slips, curves.noise_um, len(curves.channels)) == (0.0, (), None, 1)
 
 
 def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:

@@ -9,7 +9,7 @@ from stage import Call, FakeWorker
 from app.cli.commands import SlipstandGroup
 from app.presenters.base import TaskFailure, Tone
 from app.presenters.runs.import_form import FIELDS, GAIN, Form, make_form, validate
-from app.presenters.runs.import_presenter import ImportPresenter, pending_text
+from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportPreview, Overlay
 from app.presenters.runs.tasks import csv_import, import_file, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
@@ -102,7 +102,7 @@ def test_what_is_said_about_the_test_reads_nothing_anew() -> None:
 
 def test_files_come_one_after_another_with_the_same_columns() -> None:
     desk = Desk("/a.csv", "/b.csv", "/c.csv")
-    assert pending_text(desk.presenter.state) == "2 more files"
+    assert desk.presenter.state.pending == 2
     desk.make_ready()
     desk.set_form(second="", note="first")
     desk.answer(PREVIEW)

@@ -151,7 +151,7 @@ def test_selected_runs_are_previewed_and_their_common_facts_shown(desk: Desk) ->
     assert (call.name, call.arguments) == ("load_overlay", ((A.path, C.path),))
     facts = desk.runs.state.metadata
     assert facts is not None
-    assert (facts.series, facts.operator, facts.plate_mass_kg) == ("", "A. Berger", "")
+    assert facts.texts == {"series": "", "plate_mass_kg": "", "operator": "A. Berger", "note": ""}
     assert facts.mixed == {"series", "plate_mass_kg"}
     drawn = Overlay(message="two")
     desk.select(A)

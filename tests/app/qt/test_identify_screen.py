@@ -35,7 +35,7 @@ class Stage:
         self.presenter.attach(self.screen)
         self.screen.show()
         qtbot.waitExposed(self.screen)
-        self.curves = self.screen._sides.curves
+        self.curves = self.screen._plots.curves
 
     def calls(self, name: str) -> list[Call]:
         return [call for call in self.worker.calls if call.name == name]
@@ -205,16 +205,16 @@ def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     assert "The other tabs" not in stage.words()
     stage.screen._tabs.setCurrentIndex(1)
     assert stage.presenter.state.tab is PlotTab.VELOCITY
-    assert "velocities" in stage.screen._sides.motions[PlotTab.VELOCITY]._stack.plots[0].title.text
+    assert "velocities" in stage.screen._plots.motions[PlotTab.VELOCITY]._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(3)
-    assert "relative acceleration" in stage.screen._sides.motions[PlotTab.RELATIVE]._stack.plots[0].title.text
+    assert "relative acceleration" in stage.screen._plots.motions[PlotTab.RELATIVE]._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(4)
-    assert stage.screen._sides.motions[PlotTab.PHASE].isVisible()
+    assert stage.screen._plots.motions[PlotTab.PHASE].isVisible()
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
     assert "The other tabs need the fitted motion" in stage.words()
-    assert stage.screen._sides.curves.isVisible()
+    assert stage.screen._plots.curves.isVisible()
 
 
 def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stage) -> None:
@@ -300,7 +300,7 @@ def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     at_s = stage.presenter.state.cursors
     assert at_s is not None
-    motions = stage.screen._sides.motions
+    motions = stage.screen._plots.motions
     pages = (motions[PlotTab.VELOCITY], motions[PlotTab.ACCELERATION], motions[PlotTab.RELATIVE])
     for index, (page, unit) in enumerate(zip(pages, ("mm/s", "m/s²", "m/s²"), strict=True), start=1):
         stage.screen._tabs.setCurrentIndex(index)
@@ -310,11 +310,11 @@ def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
     line = motions[PlotTab.RELATIVE].cursors._lines[Cursor.A][1]
     line.setValue(3.0)
     line.sigDragged.emit(line)
-    qtbot.keyClick(stage.screen._sides, Qt.Key.Key_Left)
+    qtbot.keyClick(stage.screen._plots, Qt.Key.Key_Left)
     cursors = stage.presenter.state.cursors
     assert cursors is not None
     assert cursors.a_s == pytest.approx(2.999)
-    assert cursors.cells[0][1] in stage.screen._sides.accessibleDescription()
+    assert cursors.cells[0][1] in stage.screen._plots.accessibleDescription()
     stage.screen._tabs.setCurrentIndex(0)
     assert stage.curves.cursors._lines[Cursor.A][0].value() == pytest.approx(2.999)
     assert clipped_words(stage.screen) == []
@@ -327,7 +327,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
     assert cursors is not None
-    points = stage.screen._sides.motions[PlotTab.PHASE].cursors._points[Cursor.B]
+    points = stage.screen._plots.motions[PlotTab.PHASE].cursors._points[Cursor.B]
     placed = [[float(values[0]) for values in point._mark.getData()] for point in points]
     assert [*placed[0], *placed[1]] == pytest.approx(list(cursors.values[1]))
     assert all(point._letter.isVisible() for point in points)
@@ -376,7 +376,7 @@ def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBo
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
-    stage.screen._sides.motions[PlotTab.VELOCITY]._stack.set_time_range(6.0, 8.0)
+    stage.screen._plots.motions[PlotTab.VELOCITY]._stack.set_time_range(6.0, 8.0)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
     assert cursors is not None
