@@ -1,7 +1,5 @@
 """Plot data of an analysed run: curves, lines of the fitted motion, and words about f_d set by hand."""
 
-import numpy as np
-
 from analysis.formatting import typeset, with_unit
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
@@ -90,11 +88,6 @@ def manual_fit_text(friction: float, objective: Objective) -> str:
         off=with_unit(typeset(f"{off_percent:+.2f}"), "%"),
         residual=results.format_micrometres(objective.residual_at(friction)),
     )
-
-
-def missing_share(run: AnalysedRun) -> float:
-    """Share of missing samples of the table gauge."""
-    return float(np.isnan(run.table.record_m).mean())
 
 
 def _channel(channel: Channel) -> ChannelCurves:

@@ -134,7 +134,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     def reset_friction(self) -> None:
         self._pending = self._next_friction = None
-        self._update(manual_fit=None)
+        self._update(manual_fit=None, manual_fit_text="")
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
         if self._shown is None or self.state.cursors is not None:
@@ -170,28 +170,22 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         run, cursors, before = shown.run, self.state.cursors, self._shown
         self._shown = shown
         self._pending = self._next_friction = None
-        self._update(
+        state = IdentifyState(
             title=run.path.name,
             curves=plot_data.curves(run),
             result=results.make_result(run, shown.true_friction),
             rows=results.all_rows(run),
-            models=result_tables.model_rows(shown.first_analysis.model, run.model)
-            if run.kind == "two-mass"
-            else (),
+            models=result_tables.model_rows(shown.first_analysis, run),
             model_note=_model_note(shown),
-            classical=(),
             budget=result_tables.budget_rows(run),
             missing_data=result_tables.missing_data(run),
             no_scan_reason=result_tables.no_scan_reason(run),
             tab=self.state.tab if run.kinematics is not None else PlotTab.DISPLACEMENT,
             motion=plot_data.motion(run),
             scan=run.objective,
-            manual_fit=None,
-            cursors=None,
             alternative_kind="one-mass" if run.kind == "two-mass" else "two-mass",
-            progress=None,
-            failure="",
         )
+        self._set_state(state)
         if cursors is not None and before is not None:
             self._set_cursors(cursor_values.shift_cursors(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
@@ -249,7 +243,6 @@ def _model_of(run: AnalysedRun) -> str:
 
 
 def _model_note(shown: _Shown) -> Chip:
-    """Note if another law than the likeliest is shown."""
     likeliest = _model_of(shown.first_analysis)
     if shown.run is shown.first_analysis or not likeliest:
         return EMPTY_CHIP

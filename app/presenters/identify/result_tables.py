@@ -4,14 +4,15 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import uncertainty_decimals, with_unit
 from analysis.identification import FittedModel, ModelSelection
-from analysis.quantities import Quantity
+from analysis.quantities import BudgetLine, Quantity
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.identify.plot_data import missing_share
 from app.presenters.identify.state import BudgetRow, ClassicalRow, ModelRow
 from messages.i18n import gettext, translate
 
@@ -26,9 +27,10 @@ _RESIDUALS_SHOWN = 4
 _PAPER_DECIMALS = 3
 
 
-def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
-    """Every fitted law, the likeliest first; laws ruled out early are fitted to the end only in `shown`."""
-    if model is None or shown is None:
+def model_rows(first: AnalysedRun, run: AnalysedRun) -> tuple[ModelRow, ...]:
+    """Every fitted law, the likeliest first; laws that the first analysis ruled out early are as in `run`."""
+    model, shown = first.model, run.model
+    if model is None or shown is None or run.kind != "two-mass":
         return ()
     anew = {tried.name: tried for tried in shown.tried}
     all_tried = [anew.get(tried.name, tried) for tried in model.tried]
@@ -64,48 +66,40 @@ def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     shown = definition(results.headline_key(run))
     lines = [line for line in run.budget if line.contribution_to == shown.name]
     stated = [line for line in lines if math.isfinite(line.standard_uncertainty)]
+    not_stated = [line for line in lines if line not in stated]
+    stated = [line for line in stated if line.standard_uncertainty > 0.0]
     stated.sort(key=lambda line: -line.standard_uncertainty)
-    largest = max((line.standard_uncertainty for line in stated), default=0.0)
     rows = [
         BudgetRow(
             translate(line.source.label),
-            _contribution(line.standard_uncertainty, largest, shown),
-            line.standard_uncertainty / largest,
+            _contribution(line, stated[0], shown),
+            line.standard_uncertainty / stated[0].standard_uncertainty,
         )
         for line in stated
-        if line.standard_uncertainty > 0.0
     ]
-    return (
-        *rows,
-        *(
-            BudgetRow(translate(line.source.label), gettext("not stated"), 0.0)
-            for line in lines
-            if line not in stated
-        ),
-    )
+    absent = gettext("not stated")
+    rows += [BudgetRow(translate(line.source.label), absent, 0.0) for line in not_stated]
+    return tuple(rows)
 
 
-def _contribution(standard_uncertainty: float, largest: float, row: QuantityDefinition) -> str:
+def _contribution(line: BudgetLine, largest: BudgetLine, row: QuantityDefinition) -> str:
     """Write a contribution in the unit of its quantity, to the last digit of the largest one."""
     unit = row.unit_at(Place.WINDOW)
-    decimals = uncertainty_decimals(largest * unit.scale)
+    decimals = uncertainty_decimals(largest.standard_uncertainty * unit.scale)
     last_digit = 10.0**-decimals
-    size = standard_uncertainty * unit.scale
-    text = number_text.format_fixed(size, decimals)
-    if size < 0.5 * last_digit:
-        text = f"< {number_text.format_fixed(last_digit, decimals)}"
-    return with_unit(text, unit.symbol)
+    size = line.standard_uncertainty * unit.scale
+    text = number_text.format_fixed(max(size, last_digit), decimals)
+    return with_unit(f"< {text}" if size < 0.5 * last_digit else text, unit.symbol)
 
 
 def missing_data(run: AnalysedRun) -> Chip:
     """Share of missing samples; empty if none are missing."""
-    share = missing_share(run)
+    share = float(np.isnan(run.table.record_m).mean())
     if share == 0.0:
         return EMPTY_CHIP
     absent = with_unit(number_text.format_fixed(100.0 * share, 1 if share > 1e-3 else 3), "%")
-    return Chip(
-        gettext("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
-    )
+    text = gettext("{share} of the readings are missing: the curves are broken there.", share=absent)
+    return Chip(text, Tone.WARN)
 
 
 def no_scan_reason(run: AnalysedRun) -> str:
@@ -132,9 +126,8 @@ def _judged(tried: FittedModel, above_best: float, model: ModelSelection) -> Chi
     if above_best <= _AS_LIKELY:
         return Chip(gettext("as likely"), hint=hint)
     if tried.residual_rms_m <= _NO_BETTER * model.residual_rms_m:
-        return Chip(
-            gettext("not needed"), hint=gettext("It leaves as much over with more parameters. ") + hint
-        )
+        hint = gettext("It leaves as much over with more parameters. ") + hint
+        return Chip(gettext("not needed"), hint=hint)
     return Chip(gettext("less likely") if above_best <= _RULED_OUT else gettext("ruled out"), hint=hint)
 
 

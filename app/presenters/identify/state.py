@@ -128,7 +128,6 @@ class ModelRow:
     """Residual rms over noise rms."""
     status: Chip
     is_shown: bool = False
-    """Whether its curves and results are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +154,6 @@ class IdentifyState:
     classical: tuple[ClassicalRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
     missing_data: Chip = EMPTY_CHIP
-    """Share of missing samples."""
     no_scan_reason: str = ""
     """Why f_d cannot be varied."""
     tab: PlotTab = PlotTab.DISPLACEMENT

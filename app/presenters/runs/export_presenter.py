@@ -91,12 +91,8 @@ class ExportPresenter(Presenter[ExportState]):
     def export(self) -> None:
         state = self.state
         if not state.output.strip():
-            missing = (
-                gettext("Choose the folder to write")
-                if state.is_folder
-                else gettext("Choose the file to write")
-            )
-            self._update(message=Chip(missing, Tone.BAD))
+            missing = N_("Choose the folder to write") if state.is_folder else N_("Choose the file to write")
+            self._update(message=Chip(gettext(missing), Tone.BAD))
         elif state.progress is None:
             self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
             self._worker.submit(
@@ -109,9 +105,9 @@ class ExportPresenter(Presenter[ExportState]):
                 progress=lambda progress: self._update(progress=progress),
             )
 
-    def _on_preview(self, run: str, choice: dict[str, str], preview: str) -> None:
+    def _on_preview(self, asked: ExportState, preview: str) -> None:
         state = self.state
-        if (run, choice) == (state.runs[0], {"format": state.format, "content": state.content}):
+        if (asked.runs, asked.format, asked.content) == (state.runs, state.format, state.content):
             self._update(preview=preview)
 
     def _on_done(self, outcome: BatchOutcome) -> None:
@@ -141,12 +137,11 @@ class ExportPresenter(Presenter[ExportState]):
             self._is_output_typed = False
             self._update(output=str(self._folder / name))
         self._update(is_folder=is_folder, preview="")
-        run, choice = state.runs[0], {"format": state.format, "content": state.content}
         self._worker.submit(
             tasks.preview_export,
-            run,
-            choice,
-            done=partial(self._on_preview, run, choice),
+            state.runs[0],
+            {"format": state.format, "content": state.content},
+            done=partial(self._on_preview, state),
             failed=self._on_failed,
         )
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QFrame, QLabel, QLineEdit, QPushButton, QStackedWidget, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QStackedWidget, QWidget
 
 from app.presenters.runs.import_presenter import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
@@ -14,7 +14,7 @@ from app.qt.runs.preview import RunsPreview
 from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_choice
+from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_button, make_choice
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
@@ -40,14 +40,16 @@ class RunsScreen(QWidget):
         self._series = ComboBox()
         self._status = make_choice({status: status.value for status in StatusFilter})
         self._count = label(muted=True)
-        self._import = QPushButton(gettext("Import…"))
-        self._folder = QPushButton(gettext("Folder…"))
+        self._import = make_button(gettext("Import…"), self._choose_files)
+        self._folder = make_button(gettext("Folder…"), self._choose_folder)
         self._table = RunsTable(theme)
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
         self._preview = RunsPreview(theme)
         self._metadata = MetadataEditor()
-        self._side = self._make_side()
+        side = QWidget()
+        make_column((self._preview, 1), self._metadata, spacing=6, of=side)
+        self._side = make_frame(side)
         self._actions = ActionBar(presenter, dialogs.ask_for_export)
         self._lay_out()
         self._connect()
@@ -70,8 +72,8 @@ class RunsScreen(QWidget):
         self._actions.show_state(state)
 
     def _show_wanted(self, wanted: RunFilter) -> None:
-        self._series.setCurrentText(wanted.series or _ALL_SERIES)
-        self._status.setCurrentText(wanted.status.value)
+        self._series.setCurrentText(wanted.series or gettext(_ALL_SERIES))
+        self._status.setCurrentText(gettext(wanted.status.value))
         if self._text.text() != wanted.text:
             self._text.setText(wanted.text)
 
@@ -115,9 +117,8 @@ class RunsScreen(QWidget):
         if state.filter != RunFilter():
             count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
-        self._folder.setToolTip(
-            gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
-        )
+        hint = gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
+        self._folder.setToolTip(hint)
         self._empty.setText(_empty_text(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
@@ -126,21 +127,17 @@ class RunsScreen(QWidget):
 
     def _apply_filter(self) -> None:
         series = self._series.currentText() if self._series.currentIndex() > 0 else ""
-        self._presenter.set_filter(
-            RunFilter(self._text.text(), series, StatusFilter(self._status.currentData()))
-        )
+        status = StatusFilter(self._status.currentData())
+        self._presenter.set_filter(RunFilter(self._text.text(), series, status))
 
     def _choose_folder(self) -> None:
         folder = self._shown.folder if self._shown else ""
         ask_for_folder(self, gettext("Show the runs of a folder"), folder, self._presenter.choose_folder)
 
     def _connect(self) -> None:
-        self._text.textChanged.connect(lambda _: self._apply_filter())
-        self._series.activated.connect(lambda _: self._apply_filter())
-        self._status.activated.connect(lambda _: self._apply_filter())
-        self._import.clicked.connect(lambda _checked: self._choose_files())
+        for changed in (self._text.textChanged, self._series.activated, self._status.activated):
+            changed.connect(lambda _: self._apply_filter())
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
-        self._folder.clicked.connect(lambda _checked: self._choose_folder())
         self._table.selected.connect(self._presenter.select)
         self._table.sort_requested.connect(self._presenter.sort_by)
         self._table.open_requested.connect(self._presenter.open_selected)
@@ -160,21 +157,11 @@ class RunsScreen(QWidget):
             (self._text, 1), self._series, self._status, self._count, self._import, self._folder, spacing=8
         )
         self._middle.addWidget(self._table)
-        self._middle.addWidget(_centred(self._empty))
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._empty.setContentsMargins(24, 24, 24, 24)
+        self._middle.addWidget(self._empty)
         middle = make_row((make_frame(self._middle), 1), self._side, spacing=8)
         make_column(top, (middle, 1), self._actions, spacing=8, margins=(8, 8), of=self)
-
-    def _make_side(self) -> QFrame:
-        content = QWidget()
-        make_column((self._preview, 1), self._metadata, spacing=6, of=content)
-        return make_frame(content)
-
-
-def _centred(words: QLabel) -> QWidget:
-    page = QWidget()
-    words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    make_column(words, margins=(24, 24), of=page)
-    return page
 
 
 def _empty_text(state: RunsState) -> str:
