@@ -55,10 +55,8 @@ class Kinematics:
 class Objective:
     """Residual for other values of f_d, with all other parameters as fitted."""
 
-    friction: Floats
-    """Rising."""
-    residual_m: Floats
-    """Root mean square of the residual, relative to the noise of each gauge."""
+    friction: Floats  # rising
+    residual_m: Floats  # root mean square of the residual, relative to the noise of each gauge
     fitted: float
     interval_95: tuple[float, float]
 
@@ -84,8 +82,7 @@ class AnalysedRun:
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None
     """None where no law without a running-in velocity was fitted."""
-    objective: Objective | None = None
-    """None where no f_d was found."""
+    objective: Objective | None = None  # None where no f_d was found
     kind: AnalysisKind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""

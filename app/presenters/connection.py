@@ -35,8 +35,7 @@ class Connection:
     with errors of ending engine and stand.
     """
 
-    CLOSE_S = 240.0
-    """Longer than an engine takes to give up storing a run: three minutes."""
+    CLOSE_S = 240.0  # longer than an engine takes to give up storing a run: three minutes
 
     def __init__(
         self,

@@ -49,8 +49,7 @@ class _Level:
         self._high = np.empty((capacity, CHANNELS), np.float32)
         self.first = 0
         """Number of the oldest span held, counted from the first ever."""
-        self.end = 0
-        """Number of the next span."""
+        self.end = 0  # number of the next span
 
     @property
     def time_s(self) -> NDArray[np.float64]:

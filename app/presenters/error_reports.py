@@ -16,8 +16,7 @@ from app.version import __version__
 from config.schema import ConfigError
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
-_REPEATED_S = 10.0
-"""An error that repeats, as one of a timer does, is reported this often."""
+_REPEATED_S = 10.0  # an error that repeats, as one of a timer does, is reported this often
 _log = logging.getLogger(__name__)
 
 

@@ -29,8 +29,7 @@ class GaugeHealthState:
     verdict: HealthGrade
     symptoms: tuple[SymptomText, ...]
     """The worst first."""
-    figures: tuple[LabelledValue, ...]
-    """The same lines for each gauge."""
+    figures: tuple[LabelledValue, ...]  # the same lines for each gauge
     frequency_hz: np.ndarray
     density_um: np.ndarray
     """Noise spectrum (µm/√Hz)."""

@@ -44,8 +44,7 @@ class ConnectForm:
     parity: str = "N"
     settings: str = ""
     """Settings of the device, `KEY=VALUE KEY=VALUE`."""
-    relative_port: str = ""
-    """Port of gauge 2 if each gauge has a device of its own."""
+    relative_port: str = ""  # port of gauge 2 if each gauge has a device of its own
 
 
 class Navigator(Protocol):

@@ -13,8 +13,7 @@ class Screen(StrEnum):
     """
 
     label: str
-    icon: str
-    """Phosphor name."""
+    icon: str  # Phosphor name
 
     START = "start", N_("Start"), "house"
     RECORD = "record", N_("Record"), "record"

@@ -23,8 +23,7 @@ CHOICES: dict[str, dict[Any, str]] = {
     },
 }
 """Values of settings and their titles."""
-_AT_START = ("language", "scale", "recordings", "log_level")
-"""Settings that take effect after a restart."""
+_AT_START = ("language", "scale", "recordings", "log_level")  # settings that take effect after a restart
 
 
 @dataclass(frozen=True, slots=True)

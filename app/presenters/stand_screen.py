@@ -56,10 +56,8 @@ class StandState:
     message: Chip = EMPTY_CHIP
 
 
-_MAX_LISTED: Final = 8
-"""Injected faults on the screen: more do not fit into the lowest window."""
-_TRUTH_EVERY: Final = 30
-"""Ticks between two updates of the truth: about half a second."""
+_MAX_LISTED: Final = 8  # injected faults on the screen: more do not fit into the lowest window
+_TRUTH_EVERY: Final = 30  # ticks between two updates of the truth: about half a second
 
 
 class StandPresenter(Presenter[StandState]):

@@ -28,8 +28,7 @@ _PROCESS_DIED = message(
 )
 _GRACE_S = 3.0
 """An aborted process has this long to end the processes that it has started itself."""
-_END_S = 4.0
-"""A process that has not ended after this time is killed: a little more than `_GRACE_S`."""
+_END_S = 4.0  # a process that has not ended after this time is killed: a little more than `_GRACE_S`
 _log = logging.getLogger(__name__)
 
 
@@ -112,9 +111,7 @@ class Worker:
     """
 
     def __init__(
-        self,
-        report_error: Callable[[ErrorReport], None] = _ignore,
-        pool: WorkerPool | None = None,
+        self, report_error: Callable[[ErrorReport], None] = _ignore, pool: WorkerPool | None = None
     ) -> None:
         self._report_error = report_error
         self._pool = pool

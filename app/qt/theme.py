@@ -61,11 +61,7 @@ LIGHT = Tokens(**{name: light for name, (light, _) in _SCHEMES.items()})
 DARK = Tokens(**{name: dark for name, (_, dark) in _SCHEMES.items()})
 
 
-SCHEMES = {
-    "system": Qt.ColorScheme.Unknown,
-    "light": Qt.ColorScheme.Light,
-    "dark": Qt.ColorScheme.Dark,
-}
+SCHEMES = {"system": Qt.ColorScheme.Unknown, "light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
 """By the names of `Settings.theme`."""
 
 
@@ -147,26 +143,22 @@ def _load_typeface() -> None:
         QFontDatabase.addApplicationFont(str(file))
 
 
+_ROLES = {
+    "bg": "Window AlternateBase",
+    "surface": "Base Button ToolTipBase",
+    "text": "WindowText Text ButtonText ToolTipText",
+    "muted": "PlaceholderText",
+    "accent": "Highlight Link Accent",
+    "on_accent": "HighlightedText",
+}
+"""Roles of the palette by token."""
+
+
 def _palette(tokens: Tokens) -> QPalette:
-    roles = {
-        QPalette.ColorRole.Window: tokens.bg,
-        QPalette.ColorRole.Base: tokens.surface,
-        QPalette.ColorRole.AlternateBase: tokens.bg,
-        QPalette.ColorRole.Button: tokens.surface,
-        QPalette.ColorRole.WindowText: tokens.text,
-        QPalette.ColorRole.Text: tokens.text,
-        QPalette.ColorRole.ButtonText: tokens.text,
-        QPalette.ColorRole.ToolTipBase: tokens.surface,
-        QPalette.ColorRole.ToolTipText: tokens.text,
-        QPalette.ColorRole.PlaceholderText: tokens.muted,
-        QPalette.ColorRole.Highlight: tokens.accent,
-        QPalette.ColorRole.HighlightedText: tokens.on_accent,
-        QPalette.ColorRole.Link: tokens.accent,
-        QPalette.ColorRole.Accent: tokens.accent,
-    }
     palette = QPalette()
-    for role, token in roles.items():
-        palette.setColor(role, QColor(token))
+    for token, names in _ROLES.items():
+        for name in names.split():
+            palette.setColor(QPalette.ColorRole[name], QColor(getattr(tokens, token)))
     for role in (QPalette.ColorRole.WindowText, QPalette.ColorRole.Text, QPalette.ColorRole.ButtonText):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(tokens.muted))
     return palette

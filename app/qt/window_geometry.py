@@ -53,7 +53,9 @@ class WindowGeometry:
                 _set_widths(part, widths)
             if isinstance(part, QHeaderView) and name in self._place.sorted_by:
                 column, descending = self._place.sorted_by[name]
-                _sort(part, column, descending=descending)
+                if 0 <= column < part.count():
+                    orders = Qt.SortOrder.DescendingOrder, Qt.SortOrder.AscendingOrder
+                    part.setSortIndicator(column, orders[0 if descending else 1])
 
     def capture(self, window: QMainWindow, screen: str) -> WindowLayout:
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
@@ -85,12 +87,6 @@ def _set_widths(part: QHeaderView | QSplitter, widths: tuple[int, ...]) -> None:
         return
     for number, width in enumerate(widths):
         part.resizeSection(number, max(width, part.minimumSectionSize()))
-
-
-def _sort(titles: QHeaderView, column: int, *, descending: bool) -> None:
-    if 0 <= column < titles.count():
-        order = Qt.SortOrder.DescendingOrder if descending else Qt.SortOrder.AscendingOrder
-        titles.setSortIndicator(column, order)
 
 
 def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, bool]]:

@@ -24,18 +24,14 @@ from messages.i18n import gettext
 
 Floats = NDArray[np.float64]
 
-ROLLING_S = 10.0
-"""Time span before release: a pull takes a few seconds."""
-BEFORE_RELEASE_S = 1.0
-"""Shown before the release afterwards: as long as the usual pretrigger of a run."""
+ROLLING_S = 10.0  # time span before release: a pull takes a few seconds
+BEFORE_RELEASE_S = 1.0  # shown before the release afterwards: as long as the usual pretrigger of a run
 _TARE_S, _TARE_PARTS = 1.0, 10
 _STILL_M = 50e-6
 """Largest difference of the means over tenths of a second at rest: above the noise and drift of a sound
 gauge, below the motion of a hand."""
-_MEAN_S = 0.05
-"""Readings are means over this time: noise is suppressed, a pull by hand is followed."""
-_READINGS_EVERY_S = 0.1
-"""Digits that change more often cannot be read."""
+_MEAN_S = 0.05  # readings are means over this time: noise is suppressed, a pull by hand is followed
+_READINGS_EVERY_S = 0.1  # digits that change more often cannot be read
 PIXELS_MIN = 64
 _SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
 _LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
@@ -44,16 +40,11 @@ _AFTER_RELEASE = (PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.T
 _RUN_BEGINS = (PullbackState.RECENTRE, PullbackState.ZERO, PullbackState.RECORDING)
 _TABLE_PULLED = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
-DISK_SCARCE_BYTES = 2_000_000_000
-"""Warn: some hours of recording at 10 kHz are left."""
-DISK_CRITICAL_BYTES = 200_000_000
-"""Alarm: less than a long run at a high rate."""
-_SILENT_S = 2.0
-"""The engine reports twice a second; a busy computer delays it."""
-_OVERLOAD_SHOWN_S = 1.0
-"""An overload of a single sample stays visible this long."""
-_NEAR_LIMIT = 0.95
-"""Part of a gauge's range beyond which a reading is near its limit."""
+DISK_SCARCE_BYTES = 2_000_000_000  # warn: some hours of recording at 10 kHz are left
+DISK_CRITICAL_BYTES = 200_000_000  # alarm: less than a long run at a high rate
+_SILENT_S = 2.0  # the engine reports twice a second; a busy computer delays it
+_OVERLOAD_SHOWN_S = 1.0  # an overload of a single sample stays visible this long
+_NEAR_LIMIT = 0.95  # part of a gauge's range beyond which a reading is near its limit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,8 +69,7 @@ class LiveTraces:
     slip_s: Span | None = None
     end_s: float | None = None
     """On the time axis of the samples; None as long as they have not happened."""
-    is_pulled: bool = False
-    """The table is being pulled or held."""
+    is_pulled: bool = False  # the table is being pulled or held
     is_held: bool = False
     read_s: float = float("-inf")
     traces: Traces = field(default_factory=Traces)
@@ -326,8 +316,7 @@ def device_chip(name: str, loss_reason: str = "", silent_s: float = 0.0) -> Chip
 class GaugeMonitor:
     """Status of one gauge: overload, nearness of its limit, age of its calibration."""
 
-    channel: int
-    """0 table, 1 relative."""
+    channel: int  # 0 table, 1 relative
     gauge: Gauge
     overload_s: float = float("-inf")
 

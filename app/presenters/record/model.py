@@ -12,12 +12,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.navigator import StandContext
 from app.presenters.record.live import GaugeMonitor, LiveTraces
 from app.presenters.record.next_runs import NextRuns
-from app.presenters.record.state import (
-    Action,
-    LiveEstimate,
-    StatusBar,
-    Traces,
-)
+from app.presenters.record.state import Action, LiveEstimate, StatusBar, Traces
 from app.presenters.results import FRICTION, Result, make_row
 from config.schema import Gauges
 from messages.i18n import gettext
@@ -71,8 +66,7 @@ class RunDecisions:
     """Is being moved out of the trash."""
     to_keep: frozenset[str] = frozenset()
     """Paths of runs to keep once they are identified: the operator went on before."""
-    storing: Mapping[str, RecordedRun] = field(default_factory=dict)
-    """Runs that are being kept, by path."""
+    storing: Mapping[str, RecordedRun] = field(default_factory=dict)  # runs that are being kept, by path
 
     def undo_text(self, *, is_free: bool) -> str:
         """What undo does; a kept run is decided about again only if the screen `is_free`."""
@@ -94,16 +88,13 @@ class ArmedRun:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    engine: PullbackState | None = None
-    """State that the engine reported last; None without an engine."""
-    is_command_pending: bool = False
-    """The engine has not yet answered a command."""
+    engine: PullbackState | None = None  # state that the engine reported last; None without an engine
+    is_command_pending: bool = False  # the engine has not yet answered a command
     position: StandPosition = field(default_factory=StandPosition)
     note: str = ""
     loss_reason: str = ""
     """Why the device is lost; empty while it is there."""
-    waiting_for: str = ""
-    """Process that is started before the engine reports."""
+    waiting_for: str = ""  # process that is started before the engine reports
     simulated: bool = False
     true_friction: float | None = None
     device: str = ""

@@ -19,8 +19,7 @@ from app.runs.next_tests import REPEATS_MAX, NextTests, PlannedSeries
 from messages.i18n import N_, gettext
 from messages.message import MessageError, message
 
-REPEATS_DEFAULT = 3
-"""Repeats of a planned series without a number: the fewest that show an outlier."""
+REPEATS_DEFAULT = 3  # repeats of a planned series without a number: the fewest that show an outlier
 _PLAN_PART = re.compile(r"([0-9A-Z*?]+)(?:\s*[X×]\s*(\d+))?")
 _CONDITION_NAMES = {
     "temperature_c": message("temperature in °C"),
@@ -46,8 +45,7 @@ class NextRuns:
     is_requested: bool = False
     is_loaded: bool = False
     """The stored plan was requested; was read."""
-    is_edited: bool = False
-    """The operator has changed form or plan before the stored ones were read."""
+    is_edited: bool = False  # the operator has changed form or plan before the stored ones were read
     completed: CompletedRuns = ()
     undecided_path: str = ""
     """Run that waits for a decision, and does not count until then; empty without one."""

@@ -50,8 +50,7 @@ class RecordPresenter(Presenter[state.RecordState]):
     `files` carries out tasks with run files, and is closed by `close`. `author` decides about runs.
     """
 
-    CLOSE_S = 30.0
-    """Time for tasks that are under way when the window is closed; an analysis takes a second."""
+    CLOSE_S = 30.0  # time for tasks that are under way when the window is closed; an analysis takes a second
 
     def __init__(self, connection: Connection, stand: StandContext, files: Worker, author: str) -> None:
         self._model = RecordModel.of_stand(stand, author)

@@ -27,8 +27,7 @@ from config.schema import Gauges, Settings
 from messages.i18n import gettext
 from messages.message import Message
 
-Effect = engine.Command | state.RecordTask
-"""A command for the engine, or a task for the worker."""
+Effect = engine.Command | state.RecordTask  # a command for the engine, or a task for the worker
 
 _NEW_MOTION = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
 """States that end the live estimate: it was of another run, or of a table that was let down."""

@@ -191,10 +191,8 @@ class Action(StrEnum):
     UNTARE = "untare"
     ARM = "arm"
     STOP = "stop"
-    NEXT = "next"
-    """Keep the run, if one waits for a decision, and prepare the next."""
-    REPEAT = "repeat"
-    """Move the run to the trash and record the same series again."""
+    NEXT = "next"  # keep the run, if one waits for a decision, and prepare the next
+    REPEAT = "repeat"  # move the run to the trash and record the same series again
     DISCARD = "discard"
     UNDO = "undo"
 
@@ -317,8 +315,7 @@ class Notification(Enum):
 
     SCREEN_ENTERED = auto()
     DISCONNECTED = auto()
-    RUNS_CHANGED = auto()
-    """Runs were added to the folder or removed from it."""
+    RUNS_CHANGED = auto()  # runs were added to the folder or removed from it
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,7 @@ from PySide6.QtWidgets import (
 from app.presenters.base import Progress
 from messages.i18n import gettext
 
-_MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))
-"""Corners of the mark, in parts of the box."""
+_MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))  # corners of the mark, in parts of the box
 
 
 class CheckBox(QCheckBox):

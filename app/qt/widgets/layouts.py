@@ -18,8 +18,7 @@ from PySide6.QtWidgets import (
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label
 
-STRETCH: Final = object()
-"""Item of a row or column: empty space that takes what is left."""
+STRETCH: Final = object()  # item of a row or column: empty space that takes what is left
 Item: TypeAlias = QWidget | QLayout | tuple[QWidget | QLayout, int] | object
 """A widget or layout, one with its stretch factor, or `STRETCH`."""
 _Box = TypeVar("_Box", bound=QBoxLayout)

@@ -83,10 +83,8 @@ class PlotStack(QWidget):
     `titles` are rich text and colour token of each plot, from the top. `heights` are relative.
     """
 
-    hovered = Signal(float)
-    """Time under the pointer (s); NaN when it has left."""
-    resized = Signal(int)
-    """Width of the plots in pixels."""
+    hovered = Signal(float)  # time under the pointer (s); NaN when it has left
+    resized = Signal(int)  # width of the plots in pixels
 
     def __init__(
         self,
