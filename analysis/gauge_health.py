@@ -265,122 +265,88 @@ def diagnose(health: GaugeHealth) -> tuple[Symptom, ...]:
 
     Noise, drift and hum of a gauge that is dead, overloaded or in motion mean nothing and are not judged.
     """
-    found = [*_signal_faults(health), *_dead_channel(health)]
+    symptoms = list(_signal_faults(health))
     if health.distinct_values > 1 and health.oscillation_amplitude_m > _OSCILLATION_M:
         text = message(
             "the table swings by {amplitude}, so noise and drift cannot be told",
             amplitude=format_length(health.oscillation_amplitude_m),
         )
         remedy = message("Let the stand come to rest, and look again")
-        found.append(Symptom("moves", HealthGrade.DOUBTFUL, text, remedy))
-    elif not any(symptom.grade is HealthGrade.BAD for symptom in found):
-        found += _disturbances(health)
-    return tuple(sorted(found, key=lambda symptom: -_ORDER.index(symptom.grade)))
+        symptoms.append(Symptom("moves", HealthGrade.DOUBTFUL, text, remedy))
+    elif not any(symptom.grade is HealthGrade.BAD for symptom in symptoms):
+        symptoms += _disturbances(health)
+    return tuple(sorted(symptoms, key=lambda symptom: -_ORDER.index(symptom.grade)))
 
 
 def _signal_faults(health: GaugeHealth) -> Iterator[Symptom]:
-    if health.missing_fraction > _MISSING[0]:
-        yield Symptom(
-            "absent",
-            _grade(health.missing_fraction, _MISSING),
-            message("{share:.1%} of the samples are missing or damaged", share=health.missing_fraction),
-            message("Check cable and plugs, take a shorter cable, or a lower rate"),
-        )
-    if health.overload_fraction > _OVERLOADED[0]:
-        yield Symptom(
-            "overloaded",
-            _grade(health.overload_fraction, _OVERLOADED),
-            message(
-                "the amplifier is overloaded in {share:.1%} of the samples", share=health.overload_fraction
-            ),
-            message(
-                "Move the gauge back into its range, or choose a wider input range; check for a broken wire"
-            ),
-        )
-    if health.clipped_fraction > _CLIPPED[0]:
-        yield Symptom(
-            "clipped",
-            _grade(health.clipped_fraction, _CLIPPED),
-            message("{share:.0%} of the readings stand at the very same end", share=health.clipped_fraction),
-            message("Move the gauge back into its range, or choose a wider input range"),
-        )
-    if health.range_fraction is not None and health.range_fraction > _RANGE[0]:
-        yield Symptom(
-            "off-centre",
-            _grade(health.range_fraction, _RANGE),
-            message(
-                "it rests at {mean_mm:.2f} mm, {share:.0%} of the range from its middle",
-                mean_mm=health.mean_m * 1e3,
-                share=health.range_fraction,
-            ),
-            message("Re-centre the gauge, so that a test has room to both sides"),
-        )
-
-
-def _dead_channel(health: GaugeHealth) -> Iterator[Symptom]:
+    """Yield faults that suppress or falsify readings, and signs that no gauge is connected."""
+    yield from _graded(
+        "absent", health.missing_fraction, _MISSING,
+        message("{share:.1%} of the samples are missing or damaged", share=health.missing_fraction),
+        message("Check cable and plugs, take a shorter cable, or a lower rate"),
+    )  # fmt: skip
+    yield from _graded(
+        "overloaded", health.overload_fraction, _OVERLOADED,
+        message("the amplifier is overloaded in {share:.1%} of the samples", share=health.overload_fraction),
+        message("Move the gauge back into its range, or choose a wider input range; check for a broken wire"),
+    )  # fmt: skip
+    yield from _graded(
+        "clipped", health.clipped_fraction, _CLIPPED,
+        message("{share:.0%} of the readings stand at the very same end", share=health.clipped_fraction),
+        message("Move the gauge back into its range, or choose a wider input range"),
+    )  # fmt: skip
+    mean_mm, share = health.mean_m * 1e3, health.range_fraction or 0.0
+    text = message(
+        "it rests at {mean_mm:.2f} mm, {share:.0%} of the range from its middle", mean_mm=mean_mm, share=share
+    )
+    remedy = message("Re-centre the gauge, so that a test has room to both sides")
+    yield from _graded("off-centre", share, _RANGE, text, remedy)
     if health.distinct_values == 1:
-        yield Symptom(
-            "dead",
-            HealthGrade.BAD,
-            message(
-                "all readings are {mean_mm:.4f} mm: the channel is dead or stuck", mean_mm=health.mean_m * 1e3
-            ),
-            message(
-                "Touch the table: if nothing changes, check plug, bridge supply and the choice of channels"
-            ),
+        text = message("all readings are {mean_mm:.4f} mm: the channel is dead or stuck", mean_mm=mean_mm)
+        remedy = message(
+            "Touch the table: if nothing changes, check plug, bridge supply and the choice of channels"
         )
+        yield Symptom("dead", HealthGrade.BAD, text, remedy)
     elif health.range_m is not None and health.noise_rms_m < _QUIET * health.range_m:
-        yield Symptom(
-            "too-quiet",
-            HealthGrade.DOUBTFUL,
-            message(
-                "noise of {noise_nm} nm is less than any strain gauge has",
-                noise_nm=format_number(health.noise_rms_m * 1e9, 2),
-            ),
-            message("Touch the table: if nothing changes, the input is open, shorted or another one"),
-        )
+        noise_nm = format_number(health.noise_rms_m * 1e9, 2)
+        text = message("noise of {noise_nm} nm is less than any strain gauge has", noise_nm=noise_nm)
+        remedy = message("Touch the table: if nothing changes, the input is open, shorted or another one")
+        yield Symptom("too-quiet", HealthGrade.DOUBTFUL, text, remedy)
     if health.repeated_fraction > _REPEATED:
-        yield Symptom(
-            "repeats",
-            HealthGrade.DOUBTFUL,
-            message("{share:.0%} of the readings repeat the one before", share=health.repeated_fraction),
-            message("The converter is slower than the device sends: ask for a lower rate"),
-        )
+        text = message("{share:.0%} of the readings repeat the one before", share=health.repeated_fraction)
+        remedy = message("The converter is slower than the device sends: ask for a lower rate")
+        yield Symptom("repeats", HealthGrade.DOUBTFUL, text, remedy)
 
 
 def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
-    if health.noise_rms_m > NOISE_M[0]:
-        yield Symptom(
-            "noisy",
-            _grade(health.noise_rms_m, NOISE_M),
-            message("noise of {noise} rms", noise=format_length(health.noise_rms_m)),
-            message(
-                "Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower"
-            ),
-        )
+    """Yield what adds to the readings."""
+    yield from _graded(
+        "noisy", health.noise_rms_m, NOISE_M,
+        message("noise of {noise} rms", noise=format_length(health.noise_rms_m)),
+        message("Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower"),
+    )  # fmt: skip
     drift = abs(health.drift_m_per_min)
-    if drift > max(DRIFT_M_PER_MIN[0], _DRIFT_SIGMAS * health.drift_standard_uncertainty_m_per_min):
-        yield Symptom(
-            "drifts",
-            _grade(drift, DRIFT_M_PER_MIN),
-            message("it drifts by {drift} a minute", drift=format_length(health.drift_m_per_min)),
-            message("Let the amplifier warm up for half an hour, and keep draughts and sun off the stand"),
+    if drift > _DRIFT_SIGMAS * health.drift_standard_uncertainty_m_per_min:
+        text = message("it drifts by {drift} a minute", drift=format_length(health.drift_m_per_min))
+        remedy = message(
+            "Let the amplifier warm up for half an hour, and keep draughts and sun off the stand"
         )
+        yield from _graded("drifts", drift, DRIFT_M_PER_MIN, text, remedy)
     for hum in health.hum:
-        if hum.amplitude_m is not None and hum.amplitude_m > HUM_M[0]:
-            yield Symptom(
-                "hums",
-                _grade(hum.amplitude_m, HUM_M),
-                message(
-                    "{frequency_hz:g} Hz of the mains with an amplitude of {amplitude}",
-                    frequency_hz=hum.frequency_hz,
-                    amplitude=format_length(hum.amplitude_m),
-                ),
-                message(
-                    "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere"
-                ),
-            )
+        text = message(
+            "{frequency_hz:g} Hz of the mains with an amplitude of {amplitude}",
+            frequency_hz=hum.frequency_hz,
+            amplitude=format_length(hum.amplitude_m or 0.0),
+        )
+        remedy = message(
+            "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere"
+        )
+        yield from _graded("hums", hum.amplitude_m or 0.0, HUM_M, text, remedy)
 
 
-def _grade(value: float, bounds: tuple[float, float]) -> HealthGrade:
-    return HealthGrade.BAD if value > bounds[1] else HealthGrade.DOUBTFUL
+def _graded(
+    code: str, value: float, bounds: tuple[float, float], text: Message, remedy: Message
+) -> Iterator[Symptom]:
+    """Yield the symptom of a value above the first bound, bad above the second."""
+    if value > bounds[0]:
+        yield Symptom(code, HealthGrade.BAD if value > bounds[1] else HealthGrade.DOUBTFUL, text, remedy)

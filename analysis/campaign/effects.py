@@ -1,7 +1,7 @@
 """Effects of plate mass, pullback, velocity and contact on f_d, with the detectable size of each."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
@@ -147,23 +147,22 @@ def _sentence(
 ) -> Message:
     chance = "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
     numbers = joined([*map(_size, named), chance], "; ")
-    power = message("{change:.2g} %", change=100.0 * seen)
-    if len(named) > 1:
-        power = joined([power, first.step])
-    would = (
-        message("A change of {power} would be found with a chance of 80 %", power=power)
-        if seen < 1.0
-        else message("Even twice f_d might not be found")
+    template, power = (
+        N_("f_d depends on the {cause}: {numbers}. {power}."),
+        message("Even twice f_d might not be found"),
     )
-    if found:
-        template = N_("f_d depends on the {cause}: {numbers}. {power}.")
-    elif seen < 1.0:
-        template = N_(
-            "No effect of the {cause} on f_d is found: {numbers}. {power}, a smaller one may be there."
-        )
-    else:
+    if not found:
         template = N_("No effect of the {cause} on f_d is found: {numbers}. {power}.")
-    return message(template, cause=message(cause.value), numbers=numbers, power=would)
+    if seen < 1.0:
+        change = message("{change:.2g} %", change=100.0 * seen)
+        if len(named) > 1:
+            change = joined([change, first.step])
+        power = message("A change of {power} would be found with a chance of 80 %", power=change)
+        if not found:
+            template = N_(
+                "No effect of the {cause} on f_d is found: {numbers}. {power}, a smaller one may be there."
+            )
+    return message(template, cause=message(cause.value), numbers=numbers, power=power)
 
 
 def _size(size: EffectSize) -> Message:
@@ -179,7 +178,7 @@ def _size(size: EffectSize) -> Message:
 def _mass(laid: DesignMatrix) -> _Hypothesis | Message:
     if laid.mass is None:
         return message("it is the same in all series of a contact and pullback. Add tests with other masses")
-    weights = laid.form(mass=_MASS_STEP_KG)
+    weights = laid.form(laid.mass, _MASS_STEP_KG)
     step = message("per {step_kg:g} kg more", step_kg=_MASS_STEP_KG)
     return _Hypothesis(weights[None], np.ones((1, 1)), ((step, weights),))
 
@@ -192,7 +191,7 @@ def _velocity(laid: DesignMatrix) -> _Hypothesis | Message:
         )
     if laid.velocity is None:
         return message("it is the same in all series. Add tests with other pullbacks")
-    weights = laid.form(velocity=_VELOCITY_STEP_M_PER_S)
+    weights = laid.form(laid.velocity, _VELOCITY_STEP_M_PER_S)
     low, high = laid.velocities
     step = message(
         "per {step:g} m/s more, over {low:.2f} to {high:.2f} m/s",
@@ -229,39 +228,22 @@ def _pullback(laid: DesignMatrix) -> _Hypothesis | Message:
 def _contact(laid: DesignMatrix) -> _Hypothesis | Message:
     if len(laid.contacts) < 2:
         return message("there is one contact only. Add tests with another one")
-    tested, marks = [], []
-    for contact, pullback, base in _beside(laid):
-        tested.append(laid.difference((contact, pullback), (base, pullback)))
-        marks.append((contact, base))
-    pairs = [pair for pair in combinations(laid.contacts, 2) if _common(laid, *pair)]
-    if not pairs:
+    tested, marks, steps = [], [], []
+    for pullback in laid.pullbacks_m:
+        base, *others = [contact for contact, u0 in laid.cells if u0 == pullback]
+        tested += [laid.difference((contact, pullback), (base, pullback)) for contact in others]
+        marks += [(contact, base) for contact in others]
+    for one, other in combinations(laid.contacts, 2):
+        common = [u0 for u0 in laid.pullbacks_m if (one, u0) in laid.cells and (other, u0) in laid.cells]
+        if common:
+            mean = np.mean([laid.difference((other, u0), (one, u0)) for u0 in common], axis=0)
+            steps.append((message("from {one} to {other}", one=one, other=other), mean))
+    if not steps:
         return message("no two contacts were tested with the same pullback. Add such tests")
-    steps = tuple(
-        (message("from {one} to {other}", one=one, other=other), _mean_difference(laid, one, other))
-        for one, other in pairs
-    )
     patterns = np.array(
         [[float(mark[0] == odd) - float(mark[1] == odd) for mark in marks] for odd in laid.contacts]
     )
-    return _Hypothesis(np.array(tested), patterns[np.any(patterns != 0.0, axis=1)], steps)
-
-
-def _beside(laid: DesignMatrix) -> Iterator[tuple[str, float, str]]:
-    """Contacts beside the first one of the same pullback."""
-    for pullback in laid.pullbacks_m:
-        base, *others = [contact for contact, u0 in laid.cells if u0 == pullback]
-        for contact in others:
-            yield contact, pullback, base
-
-
-def _common(laid: DesignMatrix, one: str, other: str) -> list[float]:
-    return [u0 for u0 in laid.pullbacks_m if (one, u0) in laid.cells and (other, u0) in laid.cells]
-
-
-def _mean_difference(laid: DesignMatrix, one: str, other: str) -> Floats:
-    """Ln f_d of another contact less that of one, on average over the pullbacks of both."""
-    differences = [laid.difference((other, u0), (one, u0)) for u0 in _common(laid, one, other)]
-    return np.asarray(np.mean(differences, axis=0), dtype=np.float64)
+    return _Hypothesis(np.array(tested), patterns[np.any(patterns != 0.0, axis=1)], tuple(steps))
 
 
 def _mm(length_m: float) -> str:

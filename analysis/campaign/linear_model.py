@@ -170,11 +170,10 @@ class DesignMatrix:
     def pullbacks_m(self) -> tuple[float, ...]:
         return tuple(sorted({pullback for _, pullback in self.cells}))
 
-    def form(self, **shares: float) -> Floats:
-        """Weights (p,) of one coefficient: `mass=10.0` or `velocity=0.1`."""
+    def form(self, place: int, share: float) -> Floats:
+        """Weights (p,) of one coefficient."""
         weights = np.zeros(self.matrix.shape[1])
-        for name, share in shares.items():
-            weights[getattr(self, name)] = share
+        weights[place] = share
         return weights
 
     def difference(self, one: tuple[str, float], other: tuple[str, float]) -> Floats:

@@ -137,10 +137,7 @@ def fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool = True
 
 
 def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
-    """Readings up to the first turning point inside 3 x_k, from which one more half cycle may end the motion.
-
-    All of them where that leaves less than two periods.
-    """
+    """Readings up to the first turning point inside 3 x_k: one more half cycle may end the motion."""
     return readings_before_amplitude(3.0 * parameters.coulomb, channel, parameters)
 
 
@@ -183,10 +180,7 @@ def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> O
     from scipy.optimize import least_squares  # late: a quarter of the time that an analysis takes to start
 
     found = least_squares(misfit, np.zeros(len(free)), slopes, method="lm", x_scale="jac", max_nfev=100)
-    return _finished(channel, unpack(found.x), order, free)
-
-
-def _finished(channel: Channel, parameters: Parameters, order: int, free: list[int]) -> OneMassFit:
+    parameters = unpack(found.x)
     residual = channel.value_m - curve(parameters, channel.time_s, order)
     cost = float(residual @ residual)
     scale = _scales(parameters, order)[free]

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import kolmogorov
 
 from analysis.arrays import Floats
@@ -23,6 +24,7 @@ from analysis.preparation.oscillation import check_gap, median_of_three
 from analysis.quantities import ResultWarning
 from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient
+from messages.i18n import N_
 from messages.message import message
 
 _RARE = 1e-3
@@ -71,12 +73,13 @@ def assess_residuals(residual: Floats, interval_s: float, step: float, swing: fl
     noise = math.sqrt(0.5 * float(np.mean(np.diff(residual) ** 2)))
     if rms < _COMPUTED * swing:
         return ResidualAssessment(adequate=True, rms=rms, noise=noise, line=None)
-    line = _strongest_line(residual, interval_s)
+    power = _ordinates(residual)
+    line = _strongest_line(residual, power, interval_s)
     if is_rounding(rms, step):
         line = line if line is not None and line.amplitude > _ROUNDED_LINE * step else None
         return ResidualAssessment(line is None, rms, noise, line)
     small = rms**2 <= noise**2 * (1.0 + _BAND / math.sqrt(len(residual)))
-    adequate = small and line is None and _is_flat(residual) and _is_even(residual)
+    adequate = small and line is None and _is_flat(power) and _is_even(residual)
     return ResidualAssessment(adequate, rms, noise, line)
 
 
@@ -102,8 +105,7 @@ def _ordinates(residual: Floats) -> Floats:
     return np.asarray(power / max(float(power.mean()), 1e-300))
 
 
-def _strongest_line(residual: Floats, interval_s: float) -> SpectralLine | None:
-    power = _ordinates(residual)
+def _strongest_line(residual: Floats, power: Floats, interval_s: float) -> SpectralLine | None:
     peak = int(np.argmax(power))
     if power[peak] < math.log(len(power) / _RARE):
         return None
@@ -111,10 +113,8 @@ def _strongest_line(residual: Floats, interval_s: float) -> SpectralLine | None:
     return SpectralLine((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
 
 
-def _is_flat(residual: Floats) -> bool:
-    power = _ordinates(residual)
-    share = np.cumsum(power) / power.sum()
-    even = np.arange(1, len(power) + 1) / len(power)
+def _is_flat(power: Floats) -> bool:
+    share, even = np.cumsum(power) / power.sum(), np.arange(1, len(power) + 1) / len(power)
     distance = float(np.abs(share - even).max())
     return bool(kolmogorov(distance * math.sqrt(len(power))) > _RARE)
 
@@ -184,7 +184,14 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     viscous = fit(found.channel, found.parameters, order, coulomb=False)
     quiet = _quiet_after(readings, found, step, unit, warnings)
     if verdict.line is not None:
-        warnings.append(_second_mode(found, verdict.line, unit))
+        text = message(
+            "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at"
+            " {period_s} Hz: a second mode, hum, or damping of another law.",
+            frequency_hz=format_number(verdict.line.frequency_hz),
+            amplitude=format_with_unit(verdict.line.amplitude, unit),
+            period_s=format_number(1.0 / found.parameters.period_s),
+        )
+        warnings.append(ResultWarning("second-mode", text))
     return FreeDecayFit(found, viscous, verdict, verdict.adequate and quiet, unit, warnings)
 
 
@@ -236,15 +243,10 @@ def _refit_without_spikes(found: OneMassFit, warnings: list[ResultWarning]) -> O
     return fit(_left_out(found.channel, spikes, warnings), found.parameters, found.order)
 
 
-def _left_out(
-    readings: Channel, spikes: "np.ndarray[tuple[int], np.dtype[np.bool_]]", warnings: list[ResultWarning]
-) -> Channel:
+def _left_out(readings: Channel, spikes: NDArray[np.bool_], warnings: list[ResultWarning]) -> Channel:
     if spikes.any():
-        text = message(
-            "{sum} spikes were left out of {count} readings. Check cable and supply.",
-            sum=int(spikes.sum()),
-            count=len(spikes),
-        )
+        template = N_("{sum} spikes were left out of {count} readings. Check cable and supply.")
+        text = message(template, sum=int(spikes.sum()), count=len(spikes))
         warnings.append(ResultWarning("spikes-left-out", text))
     return Channel(readings.time_s[~spikes], readings.value_m[~spikes])
 
@@ -338,14 +340,3 @@ def _quiet_after(
     )
     warnings.append(ResultWarning("moves-again", text))
     return False
-
-
-def _second_mode(found: OneMassFit, line: SpectralLine, unit: str) -> ResultWarning:
-    text = message(
-        "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at"
-        " {period_s} Hz: a second mode, hum, or damping of another law.",
-        frequency_hz=format_number(line.frequency_hz),
-        amplitude=format_with_unit(line.amplitude, unit),
-        period_s=format_number(1.0 / found.parameters.period_s),
-    )
-    return ResultWarning("second-mode", text)

@@ -18,6 +18,7 @@ from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
+from messages.message import message
 
 MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
 
@@ -61,7 +62,16 @@ def identify_one_mass(
     AnalysisError
         Unknown `quantity`, or a mass that is not positive.
     """
-    _check_asked(quantity, mass)
+    if quantity not in _ORDERS:
+        raise AnalysisError(
+            "quantity {quantity!r} is unknown. Choose one of {orders}.",
+            quantity=quantity,
+            orders=", ".join(_ORDERS),
+        )
+    if mass is not None and not 0.0 < mass.value < math.inf:
+        raise AnalysisError(
+            "mass {mass!r} kg is not a positive number. Give the moving mass.", mass=mass.value
+        )
     channels, warnings = read_channels(record.replace(relative_displacement_m=None))
     order = _ORDERS[quantity]
     solution = fit_free_decay(channels.table, order, unit + _PER_TIME[order])
@@ -107,9 +117,8 @@ def mass_from_added_mass(
             added_kg=point[2],
         )
     deviations = np.array([quantity.standard_uncertainty for quantity in given])
-    return Quantity.normal(
-        mass(point), float(np.linalg.norm(numerical_gradient(mass, point) * deviations)), "kg"
-    )
+    combined = float(np.linalg.norm(numerical_gradient(mass, point) * deviations))
+    return Quantity.normal(mass(point), combined, "kg")
 
 
 def _is_significant(solution: FreeDecayFit) -> bool:
@@ -129,19 +138,6 @@ def _noise_factor(found: OneMassFit) -> float:
     return max(1.0, noise_variance_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
 
 
-def _check_asked(quantity: str, mass: Quantity | None) -> None:
-    if quantity not in _ORDERS:
-        raise AnalysisError(
-            "quantity {quantity!r} is unknown. Choose one of {orders}.",
-            quantity=quantity,
-            orders=", ".join(_ORDERS),
-        )
-    if mass is not None and not (math.isfinite(mass.value) and mass.value > 0.0):
-        raise AnalysisError(
-            "mass {mass!r} kg is not a positive number. Give the moving mass.", mass=mass.value
-        )
-
-
 def _identification(
     record: Record,
     channels: Channels,
@@ -150,13 +146,24 @@ def _identification(
     warnings: list[ResultWarning],
 ) -> Identification:
     significant, parameters = _is_significant(solution), solution.fit.parameters
-    _clip_coulomb(budget, significant)
+    if not significant:
+        _clip_coulomb(budget)
     warnings += _classical_figures(channels.table, solution, budget, significant)
+    verdict = solution.verdict
+    if not solution.adequate:
+        text = message(
+            "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
+            " or a pattern in it: period and damping may be biased.",
+            rms=format_with_unit(verdict.rms, solution.unit),
+            noise=format_with_unit(verdict.noise, solution.unit),
+        )
+        warnings.append(ResultWarning("model-inadequate", text))
+    law = "viscous+coulomb" if significant else "viscous"
     return Identification(
         "one-mass",
         budget.results,
         {"coulomb_significant": significant},
-        _verdict(solution, significant, warnings),
+        ModelSelection(law, solution.adequate, verdict.rms, verdict.noise),
         budget.lines,
         _events(channels, solution.fit, significant),
         warnings,
@@ -210,10 +217,8 @@ def _sources(found: OneMassFit, record: Record) -> dict[Source, Floats]:
     }
 
 
-def _clip_coulomb(budget: UncertaintyBudget, significant: bool) -> None:
+def _clip_coulomb(budget: UncertaintyBudget) -> None:
     """Without significance, x_k is not below zero and its interval begins there."""
-    if significant:
-        return
     coulomb = budget.results[_COULOMB]
     ends = 0.0, max(coulomb.interval_95[1], 0.0)
     budget.results[_COULOMB] = replace(coulomb, value=max(coulomb.value, 0.0), interval_95=ends)
@@ -250,34 +255,13 @@ def _classical_figures(
     ]
 
 
-def _verdict(solution: FreeDecayFit, significant: bool, warnings: list[ResultWarning]) -> ModelSelection:
-    verdict = solution.verdict
-    if not solution.adequate:
-        warnings.append(
-            result_warning(
-                "model-inadequate",
-                "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
-                " or a pattern in it: period and damping may be biased.",
-                rms=format_with_unit(verdict.rms, solution.unit),
-                noise=format_with_unit(verdict.noise, solution.unit),
-            )
-        )
-    name = "viscous+coulomb" if significant else "viscous"
-    return ModelSelection(name, solution.adequate, verdict.rms, verdict.noise)
-
-
 def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:
     """When the mass comes to rest, where friction stops it within the record."""
     parameters = found.parameters
     if not significant or parameters.damping_n_per_s < 0.0:
         return Events()
-    decay = OneMassDecay(
-        parameters.period_s,
-        parameters.damping_n_per_s,
-        parameters.coulomb,
-        parameters.turning_s,
-        parameters.turning,
-    )
+    start = parameters.turning_s, parameters.turning
+    decay = OneMassDecay(parameters.period_s, parameters.damping_n_per_s, parameters.coulomb, *start)
     stop_s = simulate(decay, channels.table.time_s[-1:]).stop_s
     return Events(rest_s=None if stop_s is None else channels.to_record_time(stop_s))
 

@@ -423,7 +423,7 @@ def find_slip_end(joint: JointFit) -> SlipEnd | None:
             return None
     if not chosen.law.has_static_friction:
         _, largest = largest_static_friction(joint)
-    fitted = _fitted_slip_end(chosen, joint.candidates, end_s, largest)
+    fitted = _fitted_slip_end(joint, largest)
     if fitted is not None and not chosen.law.has_static_friction:
         fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
@@ -434,19 +434,20 @@ def find_slip_end(joint: JointFit) -> SlipEnd | None:
     return SlipEnd(max(fitted.time_s, decay.slip_end_s), uncertainty_s)
 
 
-def _fitted_slip_end(chosen: Fit, candidates: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
+def _fitted_slip_end(joint: JointFit, largest: float) -> SlipEnd | None:
     """End of the fitted slip, and how far it scatters when the parameters do, over every plausible law.
 
     A last small slip comes or goes with small changes of f_s, so that its end has no useful derivative:
     parameters are drawn from the fit's distribution. A law with more parameters that fits hardly better
     may be the true one, and gives another end; its f_s, which the fit may leave open, is `largest` at most.
     """
+    chosen, end_s = joint.chosen, joint.end_s
     end = _end_of(chosen.parameters, chosen.law, end_s)
     if end is None:
         return None
     price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
-    scatters = [_scatter(fit, end, end_s, largest) for fit in candidates if fit.bic <= chosen.bic + price]
-    return SlipEnd(end, max(scatters))
+    plausible = [fit for fit in joint.candidates if fit.bic <= chosen.bic + price]
+    return SlipEnd(end, max(_scatter(fit, end, end_s, largest) for fit in plausible))
 
 
 def build_events(joint: JointFit, slip_end: SlipEnd | None) -> Events:
@@ -493,9 +494,9 @@ def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float
     points[:, Parameter.FRICTION_STATIC] = np.linspace(
         chosen.value(Parameter.FRICTION_DYNAMIC), largest, _DRAWS
     )
-    ends = [_end_of(project_to_bounds(point, law), law, end_s) for point in points]
-    away = np.array([(end_s if end is None else end) - fitted.time_s for end in ends])
-    return SlipEnd(fitted.time_s, float(np.hypot(fitted.uncertainty_s, np.sqrt(np.mean(away**2)))))
+    return SlipEnd(
+        fitted.time_s, float(np.hypot(fitted.uncertainty_s, _rms_distance(points, law, fitted.time_s, end_s)))
+    )
 
 
 def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
@@ -506,6 +507,11 @@ def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
     drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root.T
     drawn[:, Parameter.FRICTION_STATIC] = np.minimum(drawn[:, Parameter.FRICTION_STATIC], largest)
-    ends = [_end_of(project_to_bounds(point, fit.law), fit.law, end_s) for point in (fit.parameters, *drawn)]
+    return _rms_distance(np.vstack((fit.parameters, drawn)), fit.law, about_s, end_s)
+
+
+def _rms_distance(points: Floats, law: FrictionLaw, about_s: float, end_s: float) -> float:
+    """Root mean square distance from `about_s` of the ends of slip at points (n, p)."""
+    ends = [_end_of(project_to_bounds(point, law), law, end_s) for point in points]
     away = np.array([(end_s if end is None else end) - about_s for end in ends])
     return float(np.sqrt(np.mean(away**2)))

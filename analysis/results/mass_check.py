@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.problem import FitProblem, covariance
+from analysis.fitting.problem import covariance
 from analysis.fitting.search import Fit, Search, build_problem, fit_at_minimum, initial_guess
 from analysis.formatting import format_number
 from analysis.laws.catalogue import COMPARED_LAWS, WIDEST_LAW
@@ -49,7 +49,10 @@ def mass_warnings(joint: JointFit) -> list[ResultWarning]:
         fits = search.fit_all(COMPARED_LAWS, search.find_minima(points))
     except RecordError:  # nor with other masses
         return []
-    best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
+    best = min(fits, key=lambda fit: fit.bic)
+    mass = best.value(Parameter.TABLE_MASS)
+    loose = search.problem.with_prior(Parameter.TABLE_MASS, mass, _LOOSE * mass)
+    best = fit_at_minimum(loose, best.law, loose.minimise(best.parameters, best.law))
     deviation = _deviation(best)
     excess = [fit.chi_square - search.problem.sample_count for fit in (joint.chosen, best)]
     found = best.value(Parameter.TABLE_MASS)
@@ -68,12 +71,6 @@ def mass_warnings(joint: JointFit) -> list[ResultWarning]:
             swapped=message(", they look swapped") if swapped else "",
         )
     ]
-
-
-def _loosened(problem: FitProblem, fit: Fit) -> Fit:
-    mass = fit.value(Parameter.TABLE_MASS)
-    loose = problem.with_prior(Parameter.TABLE_MASS, mass, _LOOSE * mass)
-    return fit_at_minimum(loose, fit.law, loose.minimise(fit.parameters, fit.law))
 
 
 def _deviation(fit: Fit) -> float:

@@ -58,15 +58,14 @@ class MonteCarloModel:
         """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
         rng = np.random.default_rng(seed)
         made, truth = self._made(rng)
-        found = made.minimise(self.joint.chosen.parameters, self.joint.chosen.law, _STEPS).parameters
+        chosen, tail = self.joint.chosen, self.joint.decay.tail
+        found = made.minimise(chosen.parameters, chosen.law, _STEPS).parameters
         constants = period_and_damping(found)
-        if self.joint.decay.tail is not None:
-            tail = refit_damped_cosine(
-                made.table.between(self.joint.decay.tail.start_s, np.inf), self.joint.decay.tail
-            )
+        if tail is not None:
+            tail = refit_damped_cosine(made.table.between(tail.start_s, np.inf), tail)
             constants = tail.period_s, tail.damping_per_s
         away = np.subtract(constants, period_and_damping(truth))
-        return np.asarray(self.values - np.concatenate((found - self.joint.chosen.parameters, away)))
+        return np.asarray(self.values - np.concatenate((found - chosen.parameters, away)))
 
     def _made(self, rng: np.random.Generator) -> tuple[FitProblem, Floats]:
         """The problem with readings of a test that differs in all that is not known exactly; its truth."""
@@ -77,14 +76,13 @@ class MonteCarloModel:
         masses: StandMasses = self.joint.record.masses
         truth[Parameter.GRAVITY] += masses.gravity_uncertainty_m_per_s2 * rng.standard_normal()
         stretch = 1.0 + self.joint.record.clock_scale_uncertainty * rng.standard_normal()
-        table = predict_gauge_1(truth, problem.table.time_s * stretch, self.joint.chosen.law)
-        table = table + _rms(self.joint.chosen.table_residual_m) * rng.standard_normal(len(table))
+        chosen = self.joint.chosen
+        table = predict_gauge_1(truth, problem.table.time_s * stretch, chosen.law)
+        table = table + _rms(chosen.table_residual_m) * rng.standard_normal(len(table))
         relative = problem.relative
         if relative is not None:
-            second = predict_gauge_2(
-                truth, relative.time_s * stretch, self.joint.chosen.law, problem.gauge_2_absolute
-            )
-            second = second + _rms(self.joint.chosen.relative_residual_m) * rng.standard_normal(len(second))
+            second = predict_gauge_2(truth, relative.time_s * stretch, chosen.law, problem.gauge_2_absolute)
+            second = second + _rms(chosen.relative_residual_m) * rng.standard_normal(len(second))
             relative = Channel(relative.time_s, second)
         return replace(problem, table=Channel(problem.table.time_s, table), relative=relative), truth
 
@@ -117,7 +115,10 @@ def run_monte_carlo(
     drawn, refitted = summarise(linear), summarise(full) if len(full) > 1 else {}
     compared, count = (refitted, len(full)) if refitted else (drawn, LINEAR_DRAWS)
     tolerances = {name: _tolerance(results[name], quantity, count) for name, quantity in compared.items()}
-    agrees = {name: _distance(results[name], compared[name]) <= tolerances[name] for name in compared}
+    agrees = {}
+    for name, quantity in compared.items():
+        ends = zip(results[name].interval_95, quantity.interval_95, strict=True)
+        agrees[name] = max(abs(a - b) for a, b in ends) <= tolerances[name]
     return MonteCarlo(LINEAR_DRAWS, len(full), drawn, refitted, agrees, tolerances)
 
 
@@ -154,11 +155,6 @@ def _rms(residual_m: Floats) -> float:
 def _quantity(draws: Floats, unit: str) -> Quantity:
     low, high = np.quantile(draws, (0.025, 0.975))
     return Quantity(float(draws.mean()), float(draws.std(ddof=1)), (float(low), float(high)), unit)
-
-
-def _distance(budget: Quantity, drawn: Quantity) -> float:
-    """How far the ends of the two intervals lie apart, at most."""
-    return max(abs(a - b) for a, b in zip(budget.interval_95, drawn.interval_95, strict=True))
 
 
 def _tolerance(budget: Quantity, drawn: Quantity, count: int) -> float:

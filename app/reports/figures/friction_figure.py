@@ -37,16 +37,23 @@ def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str
         return None
     figure, axes = new_figure(height_in=2.8)
     for place, contact in enumerate(shown):
-        _bar(axes, place - _WIDTH / 2, contact.static, contact.static_of_series, TABLE, _STATIC_SHADE)
-        _least(axes, place - _WIDTH / 2, list(contact.static_at_least.values()))
-        _bar(axes, place + _WIDTH / 2, contact.dynamic, contact.dynamic_of_series, PLATE, _DYNAMIC_SHADE)
+        left, right, least = place - _WIDTH / 2, place + _WIDTH / 2, list(contact.static_at_least.values())
+        _bar(axes, left, contact.static, contact.static_of_series, TABLE, _STATIC_SHADE)
+        axes.plot(_beside(left, len(least)), least, color=TABLE, linestyle="", marker="^", markersize=4.0)
+        _bar(axes, right, contact.dynamic, contact.dynamic_of_series, PLATE, _DYNAMIC_SHADE)
     axes.set_xticks(range(len(shown)), [_label(one.contact, names) for one in shown])
     axes.tick_params(axis="x", length=0)
     axes.set_xlim(-0.6, len(shown) - 0.4)
     axes.set_ylim(bottom=0.0)
     axes.grid(visible=False, axis="x")
     axes.set_ylabel("friction coefficient")
-    _legend(axes, least=any(one.static_at_least for one in shown))
+    handles: list[Patch | Line2D] = [
+        Patch(**_look(TABLE, _STATIC_SHADE), label="static $f_s$"),
+        Patch(**_look(PLATE, _DYNAMIC_SHADE), label="dynamic $f_d$"),
+    ]
+    if any(one.static_at_least for one in shown):
+        handles.append(Line2D([], [], color=TABLE, linestyle="", marker="^", label="$f_s$ at least"))
+    place_legend_above(axes, handles=handles, ncols=3)
     return figure
 
 
@@ -68,12 +75,6 @@ def _with_interval(axes: Axes, place: float, found: Quantity, mark: str, size: f
         place, found.value, yerr=reach, fmt=mark or "none", color=SIMULATION, ecolor=SIMULATION,
         markersize=size, elinewidth=width, capsize=3.0 if not mark else 1.5, capthick=width,
     )  # fmt: skip
-
-
-def _least(axes: Axes, place: float, least: Sequence[float]) -> None:
-    """An arrow from the least f_s of each series that nothing bounds above."""
-    for at, low in zip(_beside(place, len(least)), least, strict=True):
-        axes.plot([at], [low], color=TABLE, linestyle="", marker="^", markersize=4.0)
 
 
 def _beside(place: float, count: int) -> list[float]:
@@ -99,13 +100,3 @@ def _label(contact: str, names: Mapping[str, str]) -> str:
         else:
             lines.append(word)
     return "\n".join(lines)
-
-
-def _legend(axes: Axes, *, least: bool) -> None:
-    handles: list[Patch | Line2D] = [
-        Patch(**_look(TABLE, _STATIC_SHADE), label="static $f_s$"),
-        Patch(**_look(PLATE, _DYNAMIC_SHADE), label="dynamic $f_d$"),
-    ]
-    if least:
-        handles.append(Line2D([], [], color=TABLE, linestyle="", marker="^", label="$f_s$ at least"))
-    place_legend_above(axes, handles=handles, ncols=3)

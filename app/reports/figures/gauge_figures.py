@@ -6,25 +6,20 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from analysis.calibration.calibrate import Calibration
 from analysis.catalogue import MICROMETRE, MILLIMETRE
 from analysis.gauge_health import GaugeHealth
 from analysis.preparation.channels import MAINS_HZ
-from app.reports.figures.style import DASHED, MUTED, PLATE, SIMULATION, TABLE, print_style, save_figure
+from app.reports.figures.style import DASHED, MUTED, PLATE, SIMULATION, TABLE, titled_figure
 
 _BRANCHES = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))
 
 
 def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
     """Draw readings, curve and residuals to a PNG, SVG or PDF file. Raises OSError."""
-    with print_style():
-        figure = Figure(figsize=(7.2, 5.6), layout="constrained")
-        curve, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        _draw_calibration(curve, residual, found)
-        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-        save_figure(figure, path)
+    with titled_figure(path, title, height_in=5.6) as figure:
+        _draw_calibration(*figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), found)
 
 
 def _draw_calibration(curve: Axes, residual: Axes, found: Calibration) -> None:
@@ -47,11 +42,8 @@ def _draw_calibration(curve: Axes, residual: Axes, found: Calibration) -> None:
 
 def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:
     """Draw the amplitude density of each gauge to a PNG, SVG or PDF file. Raises OSError."""
-    with print_style():
-        figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+    with titled_figure(path, title, height_in=4.2) as figure:
         _draw_spectra(figure.subplots(), gauges, names)
-        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-        save_figure(figure, path)
 
 
 def _draw_spectra(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.catalogue import MICROMETRE, MILLIMETRE
-from analysis.identification import Curves, Identification
+from analysis.identification import Identification
 from analysis.record import Record
 from app.reports.figures.style import PLATE, SIMULATION, TABLE, decimate_for_print, print_style, save_figure
 
@@ -41,20 +41,29 @@ def record_figure(record: Record, identification: Identification) -> Figure:
     label = "plate $u_2$" if record.gauge_2_measures_plate else "relative $u_2 - u_1$"
     fits = (curves.table_displacement_m, curves.relative_displacement_m) if curves else (None, None)
     channels = [
-        ("table $u_1$", TABLE, record.table_displacement_m, fits[0]),
-        (label, PLATE, record.relative_displacement_m, fits[1]),
+        (TABLE, "table", "table $u_1$", record.table_displacement_m, fits[0]),
+        (PLATE, "relative", label, record.relative_displacement_m, fits[1]),
     ]
-    panels = [(name, colour, read[shown], fit) for name, colour, read, fit in channels if read is not None]
+    panels = [
+        (colour, name, label, read[shown], fit)
+        for colour, name, label, read, fit in channels
+        if read is not None
+    ]
     count = len(panels) + (curves is not None)
     figure = Figure(figsize=(7.2, 0.4 + 2.0 * count), layout="constrained")
     every: list[Axes] = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
-    for axes, (name, colour, reading_m, fit_m) in zip(every, panels, strict=False):
-        _channel(axes, name, colour, time_s[shown], reading_m, fit_m)
+    for axes, (colour, name, label, reading_m, fit_m) in zip(every, panels, strict=False):
+        _channel(axes, label, colour, time_s[shown], reading_m, fit_m)
+        if fit_m is not None:
+            residual = decimate_for_print(time_s[shown], MICROMETRE.scale * (reading_m - fit_m))
+            every[-1].plot(*residual, color=colour, linewidth=0.5, label=name)
     if curves is not None:
-        _residual(every[-1], time_s[shown], record, shown, curves, identification)
-    for axes in every:
-        _shade_slip(axes, identification)
-    every[-1].set_xlabel("time since release (s)" if identification.events.release_s else "time (s)")
+        _label_residuals(every[-1], identification)
+    release_s, slip_end_s = identification.events.release_s, identification.events.slip_end_s
+    if release_s is not None and slip_end_s is not None:
+        for axes in every:
+            axes.axvspan(0.0, slip_end_s - release_s, color=PLATE, alpha=0.07, linewidth=0)
+    every[-1].set_xlabel("time since release (s)" if release_s else "time (s)")
     return figure
 
 
@@ -79,22 +88,8 @@ def _channel(
     axes.set_ylabel(MILLIMETRE.labelled(label))
 
 
-def _residual(
-    axes: Axes,
-    time_s: FloatArray,
-    record: Record,
-    shown: NDArray[np.bool_],
-    curves: Curves,
-    identification: Identification,
-) -> None:
+def _label_residuals(axes: Axes, identification: Identification) -> None:
     axes.set_ylabel(MICROMETRE.labelled("record − simulation"))
-    for reading_m, fit_m, colour, label in (
-        (record.table_displacement_m, curves.table_displacement_m, TABLE, "table"),
-        (record.relative_displacement_m, curves.relative_displacement_m, PLATE, "relative"),
-    ):
-        if reading_m is not None and fit_m is not None:
-            residual = decimate_for_print(time_s, MICROMETRE.scale * (reading_m[shown] - fit_m))
-            axes.plot(*residual, color=colour, linewidth=0.5, label=label)
     if identification.model:
         noise_um = MICROMETRE.scale * identification.model.noise_rms_m
         for level, text in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):
@@ -102,12 +97,6 @@ def _residual(
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
     axes.legend(loc="upper right", ncols=3)
-
-
-def _shade_slip(axes: Axes, identification: Identification) -> None:
-    release_s, slip_end_s = identification.events.release_s, identification.events.slip_end_s
-    if release_s is not None and slip_end_s is not None:
-        axes.axvspan(0.0, slip_end_s - release_s, color=PLATE, alpha=0.07, linewidth=0)
 
 
 def _title(title: str, identification: Identification) -> str:

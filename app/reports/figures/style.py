@@ -73,6 +73,16 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure.savefig(path, metadata=_REPRODUCIBLE[path.suffix[1:].lower()])
 
 
+@contextmanager
+def titled_figure(path: Path, title: str, height_in: float) -> Iterator[Figure]:
+    """Figure over the full width of a page, written to a file with its title. Raises OSError."""
+    with print_style():
+        figure = Figure(figsize=(7.2, height_in), layout="constrained")
+        yield figure
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+        save_figure(figure, path)
+
+
 def figure_svg(figure: Figure) -> str:
     """The figure as SVG, reproducible."""
     buffer = StringIO()

@@ -8,7 +8,13 @@ from analysis.campaign.campaign import Campaign, PublishedComparison
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place, QuantityDefinition, table_columns
-from analysis.formatting import format_concise, format_fixed, format_signed, uncertainty_decimals
+from analysis.formatting import (
+    format_concise,
+    format_fixed,
+    format_signed,
+    format_value,
+    uncertainty_decimals,
+)
 from analysis.quantities import Quantity, ResultWarning
 from app.runs.campaign.collect import CollectedRuns
 
@@ -63,25 +69,22 @@ def table_headers() -> tuple[str, ...]:
 
 
 def row_cells(row: SeriesRow) -> tuple[str, ...]:
-    """Cells of a row; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
+    """Cells of a row, `0.10030(64)`, bounds for f_s without a value, "" where undetermined.
+
+    `*` marks a quantity with an outlier, `!` a series with a run that no law fits.
+    """
     doubt = INADEQUATE if has_inadequate_run(row) else ""
-    values = (row_cell(row, column) for column in table_quantities())
+    values = (_cell(row, column) for column in table_quantities())
     return (row.label + doubt, str(len(row.runs)), *values)
 
 
-def row_cell(row: SeriesRow, column: QuantityDefinition) -> str:
-    """Cell of a quantity; bounds for f_s without a value; "" where undetermined."""
+def _cell(row: SeriesRow, column: QuantityDefinition) -> str:
     pooled = row.quantities.get(column.name)
     if pooled is None:
         return _bounds(row) if column.name == "friction_static" else ""
-    shown = format_in_column(pooled.quantity, column)
+    scale, quantity = column.unit_at(Place.TABLE).scale, pooled.quantity
+    shown = format_concise(scale * quantity.value, scale * quantity.standard_uncertainty)
     return shown + (OUTLIER if pooled.outliers else "")
-
-
-def format_in_column(quantity: Quantity, column: QuantityDefinition) -> str:
-    """A quantity in the unit of its column: `0.10030(64)`."""
-    scale = column.unit_at(Place.TABLE).scale
-    return format_concise(scale * quantity.value, scale * quantity.standard_uncertainty)
 
 
 def format_difference(found: Quantity, reference: float, column: QuantityDefinition) -> str:
@@ -106,12 +109,10 @@ def _decimals(uncertainty: float) -> int:
 
 def _bounds(row: SeriesRow) -> str:
     """`0.130..0.132`; one number where the bounds meet."""
-    ends = [row.quantities.get(name) for name in (STATIC_LOWER, STATIC_UPPER)]
-    low, high = (None if one is None else _value(one.quantity) for one in ends)
+    bounds = [row.quantities.get(name) for name in (STATIC_LOWER, STATIC_UPPER)]
+    low, high = (
+        one and format_value(one.quantity.value, one.quantity.standard_uncertainty).value for one in bounds
+    )
     if low and high:
         return low if float(high) <= float(low) else f"{low}..{high}"
     return f">={low}" if low else f"<={high}" if high else ""
-
-
-def _value(quantity: Quantity) -> str:
-    return format_concise(quantity.value, quantity.standard_uncertainty).partition("(")[0]

@@ -35,7 +35,11 @@ _UNLIMITED_WIDTH: Final = 1_000_000
 def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:
     """The table in one of `TEXTS`; `width` is that of the terminal."""
     if name == "csv":
-        return _csv(*flat_table(content))
+        header, rows = flat_table(content)
+        file = io.StringIO()
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows([header, *([csv_cell(value) for value in row] for row in rows)])
+        return file.getvalue()
     if name == "json":
         document = msgspec.json.encode(table_document(content))
         return msgspec.json.format(document, indent=2).decode() + "\n"
@@ -80,14 +84,6 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
         write_sheets(sheets, made)
 
 
-def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([csv_cell(value) for value in row] for row in rows)
-    return file.getvalue()
-
-
 def _markdown(content: TableContent, with_repeats: bool) -> str:
     lines = [*_markdown_table(table_headers(), [row_cells(row) for row in content.campaign.rows]), "", LEGEND]
     if with_repeats:
@@ -110,25 +106,22 @@ def _marked(text: str) -> str:
 
 
 def _latex(content: TableContent) -> str:
+    columns = [column.latex_heading(Place.TABLE) for column in table_quantities()]
     lines = [
         "% by slipstand, for \\usepackage{booktabs}; in parentheses: standard uncertainty of the last digits",
         "% as wide as a page of A4 is high: for \\usepackage{rotating} and \\begin{sidewaystable}",
         r"\begingroup\footnotesize\setlength{\tabcolsep}{4pt}",
-        rf"\begin{{tabular}}{{l{'r' * (len(table_quantities()) + 1)}}}",
+        rf"\begin{{tabular}}{{l{'r' * (len(columns) + 1)}}}",
         r"\toprule",
-        " & ".join(("Series", "$n$", *(one.latex_heading(Place.TABLE) for one in table_quantities())))
-        + r" \\",
+        " & ".join(("Series", "$n$", *columns)) + r" \\",
         r"\midrule",
         *(" & ".join(_latex_cell(one) for one in row_cells(row)) + r" \\" for row in content.campaign.rows),
         r"\bottomrule",
         r"\end{tabular}",
         r"\endgroup",
-        *(
-            f"% {title}: {' '.join(sentence.split())}"
-            for title, sentences in note_sections(content)
-            for sentence in sentences
-        ),
     ]
+    for title, sentences in note_sections(content):
+        lines += [f"% {title}: {' '.join(sentence.split())}" for sentence in sentences]
     return "\n".join(lines) + "\n"
 
 
@@ -163,28 +156,20 @@ def _names() -> tuple[str, ...]:
 def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
     key = row.series
     yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
-    for name in _names():
-        yield from _flat_quantity(row.quantities.get(name))
+    for pooled in (row.quantities.get(name) for name in _names()):
+        if pooled is None:
+            yield from [None] * len(_SUFFIXES)
+        else:
+            quantity = pooled.quantity
+            yield from (quantity.value, quantity.standard_uncertainty, *quantity.interval_95, pooled.runs)
+            yield from (pooled.between_runs, pooled.scatter, pooled.birge_ratio, " | ".join(pooled.outliers))
     yield from (row.msk64_degree, " | ".join(str(warning.message) for warning in row.warnings))
     if content.published is not None:
-        yield from _flat_comparison(content.published.get(row.label))
-
-
-def _flat_quantity(pooled: PooledQuantity | None) -> Iterator[Any]:
-    if pooled is None:
-        yield from [None] * len(_SUFFIXES)
-        return
-    quantity = pooled.quantity
-    yield from (quantity.value, quantity.standard_uncertainty, *quantity.interval_95, pooled.runs)
-    yield from (pooled.between_runs, pooled.scatter, pooled.birge_ratio, " | ".join(pooled.outliers))
-
-
-def _flat_comparison(printed: PublishedRowComparison | None) -> Iterator[Any]:
-    figures = {one.name: one for one in printed.figures} if printed else {}
-    for column in table_quantities():
-        one = figures.get(column.name)
-        yield from (None, None) if one is None else (one.published, one.difference)
-    yield ", ".join(printed.flags) if printed else None
+        printed = content.published.get(row.label)
+        figures = {one.name: (one.published, one.difference) for one in printed.figures} if printed else {}
+        for column in table_quantities():
+            yield from figures.get(column.name, (None, None))
+        yield ", ".join(printed.flags) if printed else None
 
 
 SCHEMA: Final = "slipstand-table/1"

@@ -7,10 +7,8 @@ from typing import Final
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import ContactRatio
 from analysis.campaign.effects import Effects
-from analysis.campaign.rows import SeriesRow
 from analysis.formatting import format_concise
 from app.reports.table.content import (
-    PublishedRowComparison,
     TableContent,
     format_difference,
     repeats,
@@ -88,11 +86,11 @@ def _warnings(content: TableContent) -> Iterator[str]:
     for row in content.campaign.rows:
         for caution in row.warnings:
             by_code.setdefault(caution.code, []).append((row.label, str(caution.message)))
-    for said in by_code.values():
-        if len(said) <= _SAID:
-            yield from (message for _, message in said)
+    for same in by_code.values():
+        if len(same) <= _SAID:
+            yield from (message for _, message in same)
         else:
-            first, others = said[0][1].rstrip("."), [label for label, _ in said[1:]]
+            first, others = same[0][1].rstrip("."), [label for label, _ in same[1:]]
             more = "" if len(others) <= _NAMED else f" and {len(others) - _NAMED} more"
             names = ", ".join(others[:_NAMED]) + more
             yield f"{first}. The same applies to {len(others)} other series: {names}"
@@ -129,8 +127,7 @@ def ratio_sentence(ratio: ContactRatio) -> str:
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Scatter of the runs of each series: header and rows."""
-    columns = table_quantities()[1:]
-    rows = []
+    columns, rows = table_quantities()[1:], []
     for row in content.campaign.rows:
         cells = (repeats(row.quantities[one.name]) if one.name in row.quantities else "" for one in columns)
         rows.append((row.label, *cells))
@@ -139,20 +136,18 @@ def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str
 
 def published_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Differences from the published table: header and rows."""
-    rows = [
-        (row.label, *_differences(row, content.published[row.label]))
-        for row in content.campaign.rows
-        if content.published and row.label in content.published
-    ]
+    rows, published = [], content.published or {}
+    for row in content.campaign.rows:
+        if row.label in published:
+            printed = {one.name: one.published for one in published[row.label].figures}
+            cells = (
+                format_difference(row.quantities[one.name].quantity, printed[one.name], one)
+                if one.name in printed
+                else ""
+                for one in table_quantities()[1:]
+            )
+            rows.append((row.label, *cells))
     return ("series", *table_headers()[3:]), rows
-
-
-def _differences(row: SeriesRow, printed: PublishedRowComparison) -> Iterator[str]:
-    by_name = {one.name: one.published for one in printed.figures}
-    for column in table_quantities()[1:]:
-        known = column.name in by_name
-        found = row.quantities.get(column.name)
-        yield format_difference(found.quantity, by_name[column.name], column) if known and found else ""
 
 
 def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> Iterator[str]:
@@ -178,12 +173,7 @@ def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
 
 def _wrapped(text: str, width: int, begin: str = "") -> list[str]:
     """Lines of a sentence, without a break before a percent sign."""
-    lines = textwrap.wrap(
-        text.replace(" %", _UNBROKEN),
-        width,
-        initial_indent=begin,
-        subsequent_indent=" " * len(begin),
-        break_long_words=False,
-        break_on_hyphens=False,
+    wrapper = textwrap.TextWrapper(
+        width, begin, " " * len(begin), break_long_words=False, break_on_hyphens=False
     )
-    return [line.replace(_UNBROKEN, " %") for line in lines]
+    return [line.replace(_UNBROKEN, " %") for line in wrapper.wrap(text.replace(" %", _UNBROKEN))]

@@ -16,18 +16,8 @@ from app.reports.figures.friction_figure import CAPTION, contact_names, friction
 from app.reports.figures.style import print_style
 from app.reports.table.content import TableContent, row_cells, table_quantities
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
-from app.reports.test_report import shared
-from app.reports.test_report.blocks import (
-    Block,
-    Cell,
-    Drawings,
-    Facts,
-    Grid,
-    Points,
-    Section,
-    Symbol,
-    Text,
-)
+from app.reports.test_report import blocks, shared
+from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
 from app.runs.campaign.collect import CollectedRuns
 from app.runs.reader import Fingerprint
@@ -59,11 +49,11 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     ]
     table: list[list[Cell]] = [[typeset_sentence(text) for text in row_cells(row)] for row in rows]
     columns = table_quantities()
-    symbols = [Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol) for row in columns]
-    results = Grid(["series", "n", *symbols], table, len(symbols) + 1, small=True, note=LEGEND)
-    no_units = [Symbol(row.symbol.markup) for row in columns[1:]]
+    symbols = [blocks.Symbol(row.symbol.markup, row.unit_at(Place.TABLE).symbol) for row in columns]
+    results = blocks.Grid(["series", "n", *symbols], table, len(symbols) + 1, small=True, note=LEGEND)
+    no_units = [blocks.Symbol(row.symbol.markup) for row in columns[1:]]
     scatter: list[list[Cell]] = [list(row) for row in repeats_grid(material.content)[1]]
-    repeats = Grid(["series", *no_units], scatter, len(no_units), small=True, note=REPEATS_LEGEND)
+    repeats = blocks.Grid(["series", *no_units], scatter, len(no_units), small=True, note=REPEATS_LEGEND)
     return [
         Section("Campaign", [_summary(material)]),
         *_notes(material),
@@ -80,7 +70,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     ]
 
 
-def _summary(material: CampaignReportInput) -> Facts:
+def _summary(material: CampaignReportInput) -> blocks.Facts:
     gathered, campaign = material.gathered, material.content.campaign
     facts = [gathered.details[run.name].metadata for run in gathered.runs]
     days = sorted(one.start_time.date().isoformat() for one in facts)
@@ -106,7 +96,7 @@ def _notes(material: CampaignReportInput) -> Iterator[Section]:
     notes = dict(note_sections(material.content))
     for title in dict.fromkeys((*notes, *_ALWAYS_SHOWN)):
         texts = [typeset_sentence(_local(text, material)) for text in notes.get(title, ())]
-        yield Section(title, [Points(texts) if texts else Text("None.")])
+        yield Section(title, [blocks.Points(texts) if texts else Text("None.")])
 
 
 def _local(text: str, material: CampaignReportInput) -> str:
@@ -114,7 +104,7 @@ def _local(text: str, material: CampaignReportInput) -> str:
     return text.replace(material.folder + os.sep, "") if material.folder else text
 
 
-def _budget(material: CampaignReportInput) -> Iterator[Block]:
+def _budget(material: CampaignReportInput) -> Iterator[blocks.Block]:
     """One row for each series, one column for each source of the uncertainty of f_d."""
     found = [row for row in material.content.campaign.rows if _FRICTION in row.quantities]
     if not found:
@@ -133,7 +123,7 @@ def _budget(material: CampaignReportInput) -> Iterator[Block]:
         rows.append([row.label, value, *parts])
     note = "Standard uncertainties. Repeats reduce the noise and the scatter between runs, and nothing else."
     header: list[Cell] = ["series", "value", "noise and repeats", *sources]
-    yield Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
+    yield blocks.Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
 
 
 def _by_source(pooled: PooledQuantity) -> dict[str, float]:
@@ -145,7 +135,7 @@ def _by_source(pooled: PooledQuantity) -> dict[str, float]:
     return shares
 
 
-def _figures(material: CampaignReportInput) -> Iterator[Block]:
+def _figures(material: CampaignReportInput) -> Iterator[blocks.Block]:
     names = contact_names(material.gathered.stands.values())
     with print_style():
         figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
@@ -153,10 +143,10 @@ def _figures(material: CampaignReportInput) -> Iterator[Block]:
         for analysis in material.shown:
             run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
             items += shared.run_drawings(analysis, _DRAWN, f"{run}. ")
-    yield Drawings(items) if items else Text("No run determined friction.")
+    yield blocks.Drawings(items) if items else Text("No run determined friction.")
 
 
-def _runs(material: CampaignReportInput) -> Grid:
+def _runs(material: CampaignReportInput) -> blocks.Grid:
     columns = "run", "series", "begun", "operator", "conditions", "note", "law", "dynamic friction"
     rows: list[list[Cell]] = []
     for run in material.gathered.runs:
@@ -166,4 +156,4 @@ def _runs(material: CampaignReportInput) -> Grid:
         value = "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print
         texts = metadata.operator, metadata.conditions.as_text(), metadata.note
         rows.append([name, run.series.label, begun, *texts, law, value])
-    return Grid(list(columns), rows, numbers=1, small=True)
+    return blocks.Grid(list(columns), rows, numbers=1, small=True)

@@ -20,20 +20,8 @@ from analysis.identification import Identification
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.style import print_style
-from app.reports.test_report import shared
-from app.reports.test_report.blocks import (
-    Block,
-    Cell,
-    Conclusion,
-    Drawings,
-    Facts,
-    Grid,
-    Notice,
-    Points,
-    Section,
-    Symbol,
-    Text,
-)
+from app.reports.test_report import blocks, shared
+from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
 from app.runs.reader import Fingerprint
@@ -66,35 +54,35 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Results", list(_results(found))),
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
-        Section("Warnings", [Points(warnings) if warnings else Text("None.")]),
+        Section("Warnings", [blocks.Points(warnings) if warnings else Text("None.")]),
         Section("Data", [*shared.fingerprint_columns([print_of_file]), shared.without_empty(columns)]),
         shared.SIGNATURES,
     ]
 
 
-def _notices(found: Identification, excluded: str) -> Iterator[Block]:
+def _notices(found: Identification, excluded: str) -> Iterator[blocks.Block]:
     """Notices above the result: an exclusion, and an expired calibration, which affects every result."""
     if excluded:
         left_out = f"This run is left out of the campaign's results: {excluded}."
-        yield Notice(f"{left_out} What follows is for information only.")
+        yield blocks.Notice(f"{left_out} What follows is for information only.")
     for warning in found.warnings:
         if warning.code == "calibration-expired":
-            yield Notice(str(warning.message), "warn")
+            yield blocks.Notice(str(warning.message), "warn")
 
 
-def _result(found: Identification) -> Iterator[Block]:
+def _result(found: Identification) -> Iterator[blocks.Block]:
     """The first of the headline quantities that has a value, with its assessment."""
     key = next((key for key in _HEADLINES if key in found.results), None)
     if key is None:
         yield Text("The record gave no result; the warnings say why.")
         return
     row, quantity = definition(key), found.results[key]
-    symbol, value = Symbol(row.symbol.markup), row.format(quantity, Place.REPORT).in_print
+    symbol, value = blocks.Symbol(row.symbol.markup), row.format(quantity, Place.REPORT).in_print
     if found.model is None:
         relation, text = row.symbol.relation, "No friction law was fitted."
         if relation:
             text = "The plate did not slip: f_s is at least so large."
-        yield Conclusion(symbol, value, text, "warn", relation or "=")
+        yield blocks.Conclusion(symbol, value, text, "warn", relation or "=")
         return
     residual, noise = (
         f"{MICROMETRE.scale * size_m:.3g} {MICROMETRE.symbol}"
@@ -102,11 +90,11 @@ def _result(found: Identification) -> Iterator[Block]:
     )
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
     text = f"The law {found.model.name} {fits} (residual {residual}, noise {noise})."
-    yield Conclusion(symbol, value, text, "ok" if found.model.adequate else "bad")
+    yield blocks.Conclusion(symbol, value, text, "ok" if found.model.adequate else "bad")
     yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(row, quantity)}.")
 
 
-def _test(analysis: Analysis) -> Facts:
+def _test(analysis: Analysis) -> blocks.Facts:
     run, metadata = analysis.run, analysis.run.metadata
     ending, events = run.end, analysis.identification.events
     device = metadata.device
@@ -144,7 +132,7 @@ def _samples(losses: Losses) -> str:
     return f"{losses.samples}, of which {', '.join(faults) if faults else 'none missing or damaged'}"
 
 
-def _conditions(metadata: RunMetadata) -> Facts:
+def _conditions(metadata: RunMetadata) -> blocks.Facts:
     conditions: Conditions = metadata.conditions
     number = conditions.run_in_number
     rows = [
@@ -157,29 +145,29 @@ def _conditions(metadata: RunMetadata) -> Facts:
         *conditions.other.items(),
     ]
     stated = shared.without_empty(rows)
-    return stated if stated.rows else Facts([("conditions", "none were noted")])
+    return stated if stated.rows else blocks.Facts([("conditions", "none were noted")])
 
 
-def _results(found: Identification) -> Iterator[Block]:
+def _results(found: Identification) -> Iterator[blocks.Block]:
     rows: list[list[Cell]] = []
     for row in CATALOGUE:
         quantity = found.results.get(row.name)
         if quantity is not None and math.isfinite(quantity.value):
             shown = row.format(quantity, Place.REPORT)
             uncertainty, unit = shown.uncertainty or "–", shown.unit or "1"
-            symbol, interval = Symbol(row.symbol.markup), _interval(row, quantity)
+            symbol, interval = blocks.Symbol(row.symbol.markup), _interval(row, quantity)
             rows.append([row.description, symbol, typeset(shown.value), uncertainty, interval, unit])
     if degree := found.labels.get("msk64_degree"):
         rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
     header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
-    yield Grid(header, rows, numbers=4)
+    yield blocks.Grid(header, rows, numbers=4)
     if found.model is not None and found.model.tried:
         laws: list[list[Cell]] = []
         for law in found.model.tried:
             friction, bic = f"{law.friction_dynamic:.6f}", typeset(f"{law.bic:.1f}")
             laws.append([law.name, friction, bic, MICROMETRE.number(law.residual_rms_m, 2)])
-        heads: list[Cell] = ["friction law", Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
-        yield Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
+        heads: list[Cell] = ["friction law", blocks.Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
+        yield blocks.Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
 
 
 def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
@@ -188,7 +176,7 @@ def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
     return typeset(format_interval(low * scale, high * scale))
 
 
-def _budget(found: Identification) -> Iterator[Block]:
+def _budget(found: Identification) -> Iterator[blocks.Block]:
     """One row for each source, one column for each result; the largest source of the first result first."""
     rows = [definition(name) for name in _BUDGETED if name in found.results]
     shown = [row.name for row in rows]
@@ -197,7 +185,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     if not sources:
         yield Text("No result has an uncertainty budget.")
         return
-    heads = [Symbol(row.symbol.markup, row.unit_at(Place.REPORT).symbol) for row in rows]
+    heads = [blocks.Symbol(row.symbol.markup, row.unit_at(Place.REPORT).symbol) for row in rows]
     body: list[list[Cell]] = []
     for source in sources:
         kind = "A" if source == str(BudgetSource.NOISE) else "B"
@@ -205,7 +193,7 @@ def _budget(found: Identification) -> Iterator[Block]:
     total = [_share(found.results[row.name].standard_uncertainty, row) for row in rows]
     body.append(["together", "", *total])
     note = "Standard uncertainty by source; A: from statistics, B: from stated values. Empty: none."
-    yield Grid(["source", "type", *heads], body, numbers=len(shown), note=note)
+    yield blocks.Grid(["source", "type", *heads], body, numbers=len(shown), note=note)
 
 
 def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
@@ -226,9 +214,9 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
     return typeset(format_uncertainty(deviation * row.unit_at(Place.REPORT).scale))
 
 
-def _figures(analysis: Analysis) -> list[Block]:
+def _figures(analysis: Analysis) -> list[blocks.Block]:
     caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
     with print_style():
         whole = shared.drawing(record_figure(analysis.record, analysis.identification), caption)
         items = shared.run_drawings(analysis, _FIGURES)
-    return [whole, Drawings(items)] if items else [whole]
+    return [whole, blocks.Drawings(items)] if items else [whole]
