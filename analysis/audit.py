@@ -14,12 +14,9 @@ from messages.message import message
 KILOGRAM_FORCE_N: Final = 9.80665
 FRICTION_RANGE: Final = (0.03, 0.3)
 """Range of f_d in which a residual displacement must be reachable: the range that the paper searched."""
-_POSITIVE: Final = ("plate_mass_kg", "stiffness_as_printed", "period_s", "damping_n1_per_s")
-"""Divisors."""
-_FRICTION_STEP: Final = 0.0005
-"""Finds the extremes of the residual displacement to some micrometres."""
-_DURATION_S: Final = 30.0
-"""First simulated duration; doubled until the last slip has ended."""
+_POSITIVE: Final = ("plate_mass_kg", "stiffness_as_printed", "period_s", "damping_n1_per_s")  # divisors
+_FRICTION_STEP: Final = 0.0005  # finds the extremes of the residual displacement to some micrometres
+_DURATION_S: Final = 30.0  # first simulated duration; doubled until the last slip has ended
 
 
 class AuditError(AnalysisError, ValueError):

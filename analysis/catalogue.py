@@ -18,10 +18,8 @@ class Place(Enum):
     """Where a quantity is shown, as far as its unit depends on it."""
 
     WINDOW = "window"
-    TERMINAL = "terminal"
-    """Lines of the command line, and the LaTeX export of single runs."""
-    TABLE = "table"
-    """The campaign's table, in all formats."""
+    TERMINAL = "terminal"  # lines of the command line, and the LaTeX export of single runs
+    TABLE = "table"  # the campaign's table, in all formats
     REPORT = "report"
 
 
@@ -33,8 +31,7 @@ class Symbol:
     index: str = ""
     ascii: str = ""
     """What a terminal shows in place of letter and index where those are not ASCII."""
-    relation: str = ""
-    """≥ or ≤ where the quantity is a bound, else ""."""
+    relation: str = ""  # ≥ or ≤ where the quantity is a bound, else ""
 
     @property
     def text(self) -> str:
@@ -76,12 +73,9 @@ _LATEX_LETTERS: Final = {"δ": r"\delta", "μ": r"\mu", "α": r"\alpha", "ζ": r
 class Unit:
     """Unit in which a quantity is shown."""
 
-    symbol: str
-    """"" for pure numbers."""
-    scale: float = 1.0
-    """Number of these units in one SI unit."""
-    latex: str = ""
-    """Symbol in LaTeX, where it differs."""
+    symbol: str  # "" for pure numbers
+    scale: float = 1.0  # number of these units in one SI unit
+    latex: str = ""  # symbol in LaTeX, where it differs
 
     @property
     def in_latex(self) -> str:
@@ -103,36 +97,27 @@ class Unit:
 class TableColumn:
     """Column of a quantity in the campaign's table."""
 
-    position: int
-    """In the paper's Table 1, from 1; columns of our own follow."""
-    published: str = ""
-    """Attribute of a published row; "" where the paper does not print the quantity."""
-    is_proportional: bool = True
-    """Runs differ by a share of the value rather than by an amount."""
-    is_of_stand: bool = False
-    """A property of the stand: its scatter does not depend on the contact."""
-    missing: str = ""
-    """Reason why no run may have determined it."""
+    position: int  # in the paper's Table 1, from 1; columns of our own follow
+    published: str = ""  # attribute of a published row; "" where the paper does not print the quantity
+    is_proportional: bool = True  # runs differ by a share of the value rather than by an amount
+    is_of_stand: bool = False  # a property of the stand: its scatter does not depend on the contact
+    missing: str = ""  # reason why no run may have determined it
 
 
 @dataclass(frozen=True, slots=True)
 class QuantityDefinition:
     """One row of the catalogue."""
 
-    name: str
-    """Key in JSON, with the SI unit."""
+    name: str  # key in JSON, with the SI unit
     symbol: Symbol
     unit: str
     """SI, as in JSON; "1" for pure numbers."""
-    description: str
-    """A few words for people; English, marked for translation."""
+    description: str  # a few words for people; English, marked for translation
     display: Unit
     display_at: dict[Place, Unit] = field(default_factory=dict)
     """Other units, by place."""
-    column: TableColumn | None = None
-    """None for quantities that the campaign's table does not hold."""
-    is_minor: bool = False
-    """Listed in reports only."""
+    column: TableColumn | None = None  # None for quantities that the campaign's table does not hold
+    is_minor: bool = False  # listed in reports only
 
     def unit_at(self, place: Place, unit: str = "") -> Unit:
         """Unit shown at a place; a `unit` other than that of the catalogue is shown as it is.

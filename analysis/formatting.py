@@ -17,8 +17,7 @@ _NEGLIGIBLE = 1e-9
 """Relative uncertainty below which only rounding errors of a simulated record remain."""
 _DIGITS, _DIGITS_OF_EXACT = 6, 9
 """Significant digits of a value without an uncertainty, and of one whose uncertainty is negligible."""
-_SMALL_M = 0.9995e-3
-"""Three digits of it are still less than 1000 µm."""
+_SMALL_M = 0.9995e-3  # three digits of it are still less than 1000 µm
 _LARGE_M = 0.5
 _FIXED_POINT = 1e-5, 1e9
 """Sizes that are written without an exponent."""
@@ -34,8 +33,7 @@ class FormattedValue:
     value: str
     uncertainty: str = ""
     """"" where it is unknown or negligible."""
-    unit: str = ""
-    """"" for pure numbers."""
+    unit: str = ""  # "" for pure numbers
 
     def __str__(self) -> str:
         """`0.10030 ± 0.00064 m/s`."""

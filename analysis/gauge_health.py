@@ -22,14 +22,11 @@ _SEGMENT_S: Final = 1.0
 _BLOCKS: Final = 10
 _LINE_HZ: Final = 2.0
 """Half width of a spectral line: the main lobe of Hann's window at 1 s, and the drift of the mains."""
-_BESIDE_HZ: Final = (3.5, 7.5)
-"""Distances from a line between which the background is measured."""
+_BESIDE_HZ: Final = (3.5, 7.5)  # distances from a line between which the background is measured
 _STANDS_OUT: Final = 3.0
 """Power of a line over that of the background: chance exceeds it rarely in a mean over segments."""
-_MOTION_HZ: Final = 25.0
-"""Stands swing below 10 Hz; mains hum begins at 50 Hz."""
-_COARSE: Final = 20
-"""With fewer distinct values, the steps of the converter look like clipping or repeats."""
+_MOTION_HZ: Final = 25.0  # stands swing below 10 Hz; mains hum begins at 50 Hz
+_COARSE: Final = 20  # with fewer distinct values, the steps of the converter look like clipping or repeats
 
 
 class GaugeHealthError(AnalysisError, ValueError):
@@ -40,8 +37,7 @@ class GaugeHealthError(AnalysisError, ValueError):
 class GaugeSamples:
     """Consecutive samples of one gauge."""
 
-    displacement_m: Floats
-    """(n,) float64: by its calibration (m); NaN where a sample is missing or damaged."""
+    displacement_m: Floats  # (n,) float64: by its calibration (m); NaN where a sample is missing or damaged
     overloaded: NDArray[np.bool_]
     rate_hz: float
     range_m: float | None = None
@@ -68,8 +64,7 @@ class Spectrum:
 class GaugeHealth:
     """Figures of a gauge at rest; all displacements in m."""
 
-    samples: int
-    """Looked at, absent ones included."""
+    samples: int  # looked at, absent ones included
     duration_s: float
     mean_m: float
     noise_rms_m: float
@@ -80,13 +75,11 @@ class GaugeHealth:
     hum: tuple[Hum, ...]
     oscillation_amplitude_m: float
     """Of the strongest line below 25 Hz if it is most of the signal (the table moves), otherwise 0."""
-    resolution_m: float
-    """Smallest difference between readings: the converter's step."""
+    resolution_m: float  # smallest difference between readings: the converter's step
     distinct_values: int
     largest_reading_m: float
     """Largest distance of a reading from the calibration's zero."""
-    range_m: float | None
-    """Of the gauge, to either side."""
+    range_m: float | None  # of the gauge, to either side
     missing_fraction: float
     overload_fraction: float
     clipped_fraction: float
@@ -214,24 +207,18 @@ NOISE_M: Final = (30e-6, 100e-6)
 """Doubtful and bad above. Releases are found within 20 ms with noise up to 20 µm (docs/benchmarks.md)."""
 DRIFT_M_PER_MIN: Final = (0.1e-3, 1e-3)
 """A test lasts half a minute: 0.1 mm/min moves the zero by half a percent of a pullback of 9 mm."""
-HUM_M: Final = (10e-6, 100e-6)
-"""A third of the noise that is still good, and a percent of a pullback of 9 mm."""
+HUM_M: Final = (10e-6, 100e-6)  # a third of the noise that is still good, and a percent of a pullback of 9 mm
 _RANGE: Final = (0.4, 0.95)
 """A zero beyond 40 % of the range leaves less room on one side than a pullback needs; 95 % clips at once."""
 _MISSING: Final = (1e-3, 0.05)
 """Set by judgement: a sound serial link loses less than one sample in a thousand."""
-_OVERLOADED: Final = (0.0, 0.01)
-"""A gauge at rest is never overloaded."""
+_OVERLOADED: Final = (0.0, 0.01)  # a gauge at rest is never overloaded
 _CLIPPED: Final = (0.02, 0.2)
 """Noise alone puts less than 2 % of the readings onto their extreme values with more than 20 steps."""
-_REPEATED: Final = 0.25
-"""White noise over 20 steps or more repeats a reading in less than one of ten samples."""
-_OSCILLATION_M: Final = 10e-6
-"""The table moves; below, the line is counted as noise."""
-_DRIFT_SIGMAS: Final = 4.0
-"""Chance lets one gauge in some thousands drift by so many standard uncertainties."""
-_QUIET: Final = 1e-7
-"""Noise below this fraction of the range is less than the last of 24 bits."""
+_REPEATED: Final = 0.25  # white noise over 20 steps or more repeats a reading in less than one of ten samples
+_OSCILLATION_M: Final = 10e-6  # the table moves; below, the line is counted as noise
+_DRIFT_SIGMAS: Final = 4.0  # chance lets one gauge in some thousands drift by so many standard uncertainties
+_QUIET: Final = 1e-7  # noise below this fraction of the range is less than the last of 24 bits
 
 
 class HealthGrade(StrEnum):

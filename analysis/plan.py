@@ -35,18 +35,13 @@ CLOCK_UNCERTAINTY = 5e-5
 _NOTHING_STATED = GaugeUncertainty()
 _RELEASE_PHASE = 0.3
 """Position of the release between two samples: a real one hardly ever coincides with a sample."""
-_SETTLED_S = 60.0
-"""Simulated at least so long, so that the motion has ended whatever is recorded."""
-_NOISE_MIN_M = 1e-7
-"""With less, rounding errors decide the normal equations."""
-_FRICTION_MIN = 1e-4
-"""The search does not look for less."""
-_PER_PERIOD = 400
-"""Points a period: extremes of a sine are then exact to 3e-5 of the amplitude."""
+_SETTLED_S = 60.0  # simulated at least so long, so that the motion has ended whatever is recorded
+_NOISE_MIN_M = 1e-7  # with less, rounding errors decide the normal equations
+_FRICTION_MIN = 1e-4  # the search does not look for less
+_PER_PERIOD = 400  # points a period: extremes of a sine are then exact to 3e-5 of the amplitude
 _READINGS_MAX, _PERIODS_MAX = 1e7, 1e4
 """More than the memory of a small computer holds, and than any test lasts."""
-_TESTS_MAX = 1000
-"""In a row without re-centring; more counts as any number."""
+_TESTS_MAX = 1000  # in a row without re-centring; more counts as any number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,8 +138,7 @@ class Plan:
     rest_s: float | None
     """Time after the release at which the swing is as small as the noise; None without damping."""
     table_use: RangeUse
-    """Gauge 2 from a centred plate."""
-    relative_use: RangeUse
+    relative_use: RangeUse  # from a centred plate
     tests_without_recentring: int | None
     """Tests that fit the range of gauge 2 without re-centring the plate; None for any number."""
     results: dict[str, Quantity]

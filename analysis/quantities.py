@@ -16,8 +16,7 @@ class Quantity:
     standard_uncertainty: float
     interval_95: tuple[float, float]
     """95 % coverage interval in `unit`, not necessarily symmetric."""
-    unit: str
-    """"1" for pure numbers."""
+    unit: str  # "1" for pure numbers
 
     @classmethod
     def normal(cls, value: float, standard_uncertainty: float, unit: str) -> "Quantity":
@@ -30,8 +29,7 @@ class Quantity:
 class ResultWarning:
     """A fact that limits the validity of a result."""
 
-    code: str
-    """Stable name, for programs."""
+    code: str  # stable name, for programs
     message: Message
 
 
@@ -43,8 +41,7 @@ def result_warning(code: str, template: str, /, **values: Any) -> ResultWarning:
 class SharedBy(Enum):
     """Which runs have the error of a source in common."""
 
-    NONE = "none"
-    """Each run has an error of its own: repeats average it."""
+    NONE = "none"  # each run has an error of its own: repeats average it
     CALIBRATION = "calibration"
     SERIES = "series"
     STAND = "stand"
@@ -67,8 +64,7 @@ class BudgetSource(Enum):
     GAUGE_1_NONLINEARITY = N_("gauge 1 non-linearity"), SharedBy.CALIBRATION, True
     GAUGE_2_NONLINEARITY = N_("gauge 2 non-linearity"), SharedBy.CALIBRATION, True
     GAUGE_2_LAG = N_("lag of gauge 2"), SharedBy.CALIBRATION
-    UNDIVIDED = N_("not broken down")
-    """The whole uncertainty of a quantity that has no budget."""
+    UNDIVIDED = N_("not broken down")  # the whole uncertainty of a quantity that has no budget
     READINGS = N_("readings"), SharedBy.NONE
     DIAL_GAUGE = N_("dial gauge")
     ZERO_DRIFT = N_("zero drift")
@@ -78,8 +74,7 @@ class BudgetSource(Enum):
     KNOWN_DISPLACEMENT = N_("known displacement")
 
     shared_by: SharedBy
-    is_rectangular: bool
-    """The error has a rectangular distribution instead of a normal one."""
+    is_rectangular: bool  # the error has a rectangular distribution instead of a normal one
 
     def __new__(cls, name: str, shared_by: SharedBy = SharedBy.STAND, is_rectangular: bool = False) -> Self:
         member = object.__new__(cls)

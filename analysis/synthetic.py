@@ -37,9 +37,8 @@ class Truth:
     pull_s: float = 0.0
     release_phase: float = 0.3
     """Where between two samples the release lies (0 to 1)."""
-    noise_m: float = 2e-5
-    """Standard deviation of white noise, and converter step (0: none)."""
-    step_m: float = 0.0
+    noise_m: float = 2e-5  # standard deviation of white noise
+    step_m: float = 0.0  # of the converter; 0: none
     offsets_m: tuple[float, float] = (3e-4, 6e-3)
     gain_errors: tuple[float, float] = (0.0, 0.0)
     """What the record does not know of: relative gain errors, lateness of gauge 2 (s), and by how much true

@@ -20,14 +20,11 @@ from analysis.record import GaugeUncertainty
 from messages.i18n import N_
 from messages.message import Message, message
 
-RATE_MAX_HZ = 100_000.0
-"""The fastest converters of two gauges."""
-_REPEATS_MAX = 100
-"""More tests than a campaign makes with one contact."""
+RATE_MAX_HZ = 100_000.0  # the fastest converters of two gauges
+_REPEATS_MAX = 100  # more tests than a campaign makes with one contact
 _PULLBACK_FACTORS = np.geomspace(1.05, 4.0, 28)
 """Pullbacks tried, over the planned one: steps of 5 %, up to more than any gauge range allows."""
-_SMALLEST_SHARE = 1e-3
-"""Smallest share of today's calibration uncertainty that is looked at."""
+_SMALLEST_SHARE = 1e-3  # smallest share of today's calibration uncertainty that is looked at
 
 
 class Measure(Enum):
@@ -47,8 +44,7 @@ class ReductionOption:
     value: float | None
     """Rate (Hz), number of tests, pullback (m), or the allowed share of today's calibration uncertainties;
     None where this measure does not suffice."""
-    standard_uncertainty: float
-    """Of f_d with that value, or the least that this measure reaches."""
+    standard_uncertainty: float  # of f_d with that value, or the least that this measure reaches
     message: Message
 
 

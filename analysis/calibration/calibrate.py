@@ -16,16 +16,14 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarnin
 from messages.i18n import N_
 from messages.message import message
 
-_REACH = 0.5
-"""A polynomial is extrapolated to its zero by this share of the span of readings at most."""
+_REACH = 0.5  # a polynomial is extrapolated to its zero by this share of the span of readings at most
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationCurve:
     """A polynomial displacement(count), fitted by least squares."""
 
-    polynomial: Polynomial
-    """m of count."""
+    polynomial: Polynomial  # m of count
     covariance: Floats
     """(p, p) float64: of the coefficients in the window of the polynomial, for a scatter of 1 m."""
     scatter_m: float
@@ -128,8 +126,7 @@ class GaugeCharacteristics:
     """Largest difference between the ways up and down at one step, averaged over the rounds."""
     repeatability_m: float | None
     """Standard deviation of readings at one step in one direction from round to round, pooled."""
-    zero_drift_m: float | None
-    """Difference between the last and the first reading at the lowest step."""
+    zero_drift_m: float | None  # difference between the last and the first reading at the lowest step
 
 
 def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> GaugeCharacteristics:
@@ -179,8 +176,7 @@ _NORMAL_95: Final = 1.959963984540054
 class DialGauge:
     """Dial gauge that measures the displacements."""
 
-    resolution_m: float = 1e-5
-    """To which it is read (m); the reading error is rectangular, ± half of it."""
+    resolution_m: float = 1e-5  # to which it is read (m); the reading error is rectangular, ± half of it
     standard_uncertainty_m: float | None = None
     """Of its certificate (m): the reproducible error at each position. None: not stated."""
 
@@ -206,13 +202,11 @@ class DialGauge:
 class Calibration:
     """displacement = x + polynomial[0] x^2 + polynomial[1] x^3, with x = gain (count - zero)."""
 
-    gain_m_per_count: Quantity
-    """The 95 % intervals count the degrees of freedom (JCGM 100, G.4)."""
+    gain_m_per_count: Quantity  # the 95 % intervals count the degrees of freedom (JCGM 100, G.4)
     zero_count: Quantity
     polynomial: tuple[float, ...]
     """1/m, 1/m^2; empty for a line."""
-    zero_standard_uncertainty_m: float
-    """Of the displacement at `zero_count`."""
+    zero_standard_uncertainty_m: float  # of the displacement at `zero_count`
     displacement_standard_uncertainty_m: float
     """Largest combined one of a displacement within the readings (m), without sources that are not stated."""
     characteristics: GaugeCharacteristics
@@ -221,8 +215,7 @@ class Calibration:
     points: CalibrationPoints
     residual_m: Floats
     """(n,) float64: dial reading minus curve (m)."""
-    budget: tuple[BudgetLine, ...]
-    """Of `gain_m_per_count` (relative), `zero` and `displacement` (m)."""
+    budget: tuple[BudgetLine, ...]  # of `gain_m_per_count` (relative), `zero` and `displacement` (m)
     warnings: tuple[ResultWarning, ...]
 
     @property

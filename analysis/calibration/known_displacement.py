@@ -48,8 +48,7 @@ class CalibrationClaim:
 class ReferenceDisplacement:
     """Known displacement, or the one that a shunt resistor simulates."""
 
-    displacement_m: float
-    """With its sign (m)."""
+    displacement_m: float  # with its sign (m)
     standard_uncertainty_m: float | None = None
     is_electric: bool = False
     """A shunt: the gauge does not move, so non-linearity and repeatability do not contribute."""
@@ -71,13 +70,11 @@ class ReferenceDisplacement:
 class DisplacementCheck:
     """Result of the check."""
 
-    expected_m: float
-    """Known displacement, and that of the gauge: its reading there minus the one at rest."""
+    expected_m: float  # known displacement, and that of the gauge: its reading there minus the one at rest
     measured_m: float
     standard_uncertainty_m: float
     """Combined, of their difference, from stated sources (m)."""
-    budget: tuple[BudgetLine, ...]
-    """Of `measured_m` minus `expected_m` (m); NaN where not stated."""
+    budget: tuple[BudgetLine, ...]  # of `measured_m` minus `expected_m` (m); NaN where not stated
     warnings: tuple[ResultWarning, ...]
 
     @property

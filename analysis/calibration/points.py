@@ -27,14 +27,10 @@ class CalibrationError(AnalysisError, ValueError):
 class CalibrationPoints:
     """Readings in the order in which they were taken; build them with `from_readings`."""
 
-    counts: Floats
-    """(n,) float64: averages of the device's counts while the table stood still."""
-    dial_m: Floats
-    """(n,) float64: readings of the dial gauge (m)."""
-    direction: IntArray
-    """(n,) int64: +1 on the way up (dial readings grow), -1 on the way down."""
-    round_number: IntArray
-    """(n,) int64: number of the way up and down, from 1."""
+    counts: Floats  # (n,) float64: averages of the device's counts while the table stood still
+    dial_m: Floats  # (n,) float64: readings of the dial gauge (m)
+    direction: IntArray  # (n,) int64: +1 on the way up (dial readings grow), -1 on the way down
+    round_number: IntArray  # (n,) int64: number of the way up and down, from 1
 
     def __len__(self) -> int:
         return len(self.counts)

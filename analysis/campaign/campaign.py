@@ -26,8 +26,7 @@ class Excluded:
 class Campaign:
     """Summary of all runs."""
 
-    rows: tuple[SeriesRow, ...]
-    """In the paper's order."""
+    rows: tuple[SeriesRow, ...]  # in the paper's order
     effects: Effects
     ratios: tuple[ContactRatio, ...]
     msk64_degrees: tuple[str, ...]

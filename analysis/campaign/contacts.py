@@ -13,8 +13,7 @@ from analysis.campaign.series import Series
 from analysis.quantities import Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 
-_RECTANGLE = 2.0 * math.sqrt(3.0)
-"""Width of a rectangular distribution over its standard deviation."""
+_RECTANGLE = 2.0 * math.sqrt(3.0)  # width of a rectangular distribution over its standard deviation
 _DYNAMIC, _STATIC = "friction_dynamic", "friction_static"
 
 
@@ -22,8 +21,7 @@ _DYNAMIC, _STATIC = "friction_dynamic", "friction_static"
 class ContactFriction:
     """Friction of one contact over its series."""
 
-    contact: str
-    """Code, "" where it is not known."""
+    contact: str  # code, "" where it is not known
     dynamic: Quantity | None
     """Mean over the series, with the scatter between series and shared errors; None where undetermined."""
     static: Quantity | None

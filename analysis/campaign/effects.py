@@ -23,8 +23,7 @@ _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
 _NAMED: Final = 3
 """Sizes of an effect that its sentence names."""
-_LARGEST: Final = 700.0
-"""Difference of logarithms above which a ratio overflows."""
+_LARGEST: Final = 700.0  # difference of logarithms above which a ratio overflows
 
 
 class Cause(StrEnum):

@@ -23,24 +23,18 @@ class Observations:
     values: Floats
     variances: Floats
     """(n,) float64: of the independent errors, from repeats."""
-    shared: Floats
-    """(n, n) float64: covariance of the shared errors."""
-    degrees_of_freedom: int
-    """Of `variances`; 0 where they come from single runs."""
+    shared: Floats  # (n, n) float64: covariance of the shared errors
+    degrees_of_freedom: int  # of `variances`; 0 where they come from single runs
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearFit:
     """A model fitted by generalised least squares."""
 
-    coefficients: Floats
-    """(p,) float64."""
-    covariance: Floats
-    """(p, p) float64."""
-    degrees_of_freedom: int
-    """Of the variance used in tests."""
-    excess_deviation: float
-    """Standard deviation of the values about the model beyond their uncertainties."""
+    coefficients: Floats  # (p,) float64
+    covariance: Floats  # (p, p) float64
+    degrees_of_freedom: int  # of the variance used in tests
+    excess_deviation: float  # standard deviation of the values about the model beyond their uncertainties
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,28 +133,23 @@ def _noncentrality(count: int, degrees: int) -> float:
 FRICTION = "friction_dynamic"
 _INFLATION_MAX: Final = 10.0
 """Variance inflation of the velocity's coefficient above which it is confounded with the plate mass."""
-_NOTHING: Final = 1e-9
-"""Relative variation that is rounding."""
-_VAGUE: Final = 1e100
-"""Relative uncertainty whose square overflows."""
+_NOTHING: Final = 1e-9  # relative variation that is rounding
+_VAGUE: Final = 1e100  # relative uncertainty whose square overflows
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DesignMatrix:
     """Design matrix of ln f_d: combination of contact and pullback, plate mass, velocity."""
 
-    cells: tuple[tuple[str, float], ...]
-    """Contact and pullback (m) of each combination."""
+    cells: tuple[tuple[str, float], ...]  # contact and pullback (m) of each combination
     matrix: Floats
     """(n, p) float64: one column for each combination, then plate mass (kg) and velocity (m/s) about their
     means, where they are not confounded."""
-    mass: int | None
-    """Indices of their columns; None where confounded."""
+    mass: int | None  # index of its column; None where confounded
     velocity: int | None
     velocity_follows: bool
     """The velocity varies only with contact, pullback and plate mass."""
-    velocities: tuple[float, float]
-    """Least and largest (m/s)."""
+    velocities: tuple[float, float]  # least and largest (m/s)
 
     @property
     def contacts(self) -> tuple[str, ...]:

@@ -14,10 +14,8 @@ from analysis.campaign.series import RunResult
 from analysis.quantities import BudgetLine, BudgetSource, Quantity, SharedBy, Source
 from analysis.uncertainty import COVERAGE_FACTOR_95
 
-_SMALLEST = 1e-9
-"""Relative uncertainty below which rounding errors decide."""
-_LARGEST = 1e100
-"""Larger values have no square in double precision."""
+_SMALLEST = 1e-9  # relative uncertainty below which rounding errors decide
+_LARGEST = 1e100  # larger values have no square in double precision
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +38,8 @@ class RunValue:
     value: float
     repeatable: float
     """Standard uncertainty of this run alone; above 0."""
-    common: dict[SharedError, float]
-    """Standard uncertainties of errors shared with other runs."""
-    half_widths: tuple[float, float]
-    """Of the 95 % interval, below and above the value."""
+    common: dict[SharedError, float]  # standard uncertainties of errors shared with other runs
+    half_widths: tuple[float, float]  # of the 95 % interval, below and above the value
     unit: str
 
 
@@ -122,24 +118,20 @@ def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, 
 class PooledQuantity:
     """One quantity of one series, pooled over its runs."""
 
-    quantity: Quantity
-    """Weighted mean; its uncertainty includes errors that repeats share."""
+    quantity: Quantity  # weighted mean; its uncertainty includes errors that repeats share
     runs: int
     repeatable: float
     """Part of the standard uncertainty that repeats reduce."""
-    common: dict[SharedError, float]
-    """Other parts, by shared error."""
+    common: dict[SharedError, float]  # other parts, by shared error
     between_runs: float | None
     """Standard deviation between runs beyond the noise of the readings; None without repeats."""
-    scatter: float | None
-    """Standard deviation of the runs' values; None without repeats."""
+    scatter: float | None  # standard deviation of the runs' values; None without repeats
     birge_ratio: float | None
     """Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that each
     run states for itself; None without repeats."""
     degrees_of_freedom: float
     """Of the scatter used for this series: its own plus those lent by its contact; 0 without repeats."""
-    outliers: tuple[str, ...] = ()
-    """Runs too far from the others; they are not left out."""
+    outliers: tuple[str, ...] = ()  # runs too far from the others; they are not left out
 
 
 def pool(

@@ -25,8 +25,7 @@ _CHANCE = 0.01
 class SeriesRow:
     """A row of the table."""
 
-    label: str
-    """Code of the series, with the difference where it has several rows; unique in a campaign."""
+    label: str  # code of the series, with the difference where it has several rows; unique in a campaign
     series: SeriesKey
     quantities: dict[str, PooledQuantity]
     """By name, for every column of the table and both bounds of f_s; absent where no run determined it."""

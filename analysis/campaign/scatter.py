@@ -12,21 +12,18 @@ from scipy.special import digamma, polygamma, stdtr
 
 from analysis.arrays import Floats
 
-_PRECISION = 1e-9
-"""Of the standard deviation between runs."""
+_PRECISION = 1e-9  # of the standard deviation between runs
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RepeatedValues:
     """Values of one quantity from several series."""
 
-    values: Floats
-    """(n,) float64: variances are those of each run by itself."""
-    variances: Floats
+    values: Floats  # (n,) float64
+    variances: Floats  # (n,) float64: of each run by itself
     scales: Floats
     """(n,) float64: size of a unit deviation between runs, for each value."""
-    series: NDArray[np.intp]
-    """(n,) int: index of the series of each value, from 0 without gaps."""
+    series: NDArray[np.intp]  # (n,) int: index of the series of each value, from 0 without gaps
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -69,26 +66,19 @@ class RepeatedValues:
         return float(self.chi_squares(between).sum()) - self.degrees_of_freedom
 
 
-_ALIKE = 1e-6
-"""Excess variance of the logarithms below which all series count as alike."""
-_LEAST = 1e-5
-"""Over the median: smaller scatters are chance, and would dominate the logarithms."""
-_TRUST = 1.0
-"""Degrees of freedom lent by a kind, over those that estimate how alike its series are."""
-_LOG_HALVES = (-15.0, 20.0)
-"""Search range of the logarithm of half the degrees of freedom."""
+_ALIKE = 1e-6  # excess variance of the logarithms below which all series count as alike
+_LEAST = 1e-5  # over the median: smaller scatters are chance, and would dominate the logarithms
+_TRUST = 1.0  # degrees of freedom lent by a kind, over those that estimate how alike its series are
+_LOG_HALVES = (-15.0, 20.0)  # search range of the logarithm of half the degrees of freedom
 
 
 @dataclass(frozen=True, slots=True)
 class SeriesScatter:
     """Scatter of the runs of one series."""
 
-    between: float
-    """Standard deviation between runs, in scales, from all series of the kind."""
-    factor: float
-    """Multiplies the variances with `between` for this series."""
-    degrees_of_freedom: float
-    """0 where there are no repeats."""
+    between: float  # standard deviation between runs, in scales, from all series of the kind
+    factor: float  # multiplies the variances with `between` for this series
+    degrees_of_freedom: float  # 0 where there are no repeats
 
 
 def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter]]:
@@ -156,13 +146,11 @@ def _moderated(
     return found
 
 
-_CHANCE = 0.01
-"""Chance that a quantity without outliers has one named."""
+_CHANCE = 0.01  # chance that a quantity without outliers has one named
 _DOUBT = 0.003
 """Chance up to which a suspect is an outlier of its own series too. Where series scatter by factors of 3, one
 is named wrongly in one of six sets of 12 x 3; a run 20 standard deviations off is found in 96 %."""
-_TIE = 1e-6
-"""Relative difference of distances that rounding makes."""
+_TIE = 1e-6  # relative difference of distances that rounding makes
 
 
 def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:

@@ -13,14 +13,10 @@ from messages.i18n import N_
 class SeriesKey:
     """Properties that all repeats of a series have in common."""
 
-    code: str
-    """As in the paper, for example "1FFM0"; "" for runs without a series."""
-    contact: str
-    """Code of the pair of surfaces, for example "FF", or any other name; "" where unknown."""
-    pullback_m: float | None
-    """Nominal; None where unknown."""
-    plate_mass_kg: float
-    """m2 with its added mass, and m1."""
+    code: str  # as in the paper, for example "1FFM0"; "" for runs without a series
+    contact: str  # code of the pair of surfaces, for example "FF", or any other name; "" where unknown
+    pullback_m: float | None  # nominal; None where unknown
+    plate_mass_kg: float  # m2 with its added mass
     table_mass_kg: float
 
     @property
@@ -42,30 +38,21 @@ class SeriesKey:
 class RunResult:
     """Result of one run."""
 
-    name: str
-    """Path or label of the run."""
+    name: str  # path or label of the run
     series: SeriesKey
     results: dict[str, Quantity]
     """By name; absent where undetermined. `plate_mass_kg` may be among them."""
-    budget: tuple[BudgetLine, ...] = ()
-    """Lines of all results."""
-    calibration_id: str = ""
-    """Runs with the same calibrations share their errors."""
-    stand_id: str = ""
-    """Runs on the same stand share the errors of masses, gravity and clock."""
-    adequate: bool | None = None
-    """The friction law explains the record; None where no law was fitted."""
-    msk64_degree: str = ""
-    """"" where unknown."""
-    excluded: str = ""
-    """Why the run does not count; "" when it does."""
+    budget: tuple[BudgetLine, ...] = ()  # lines of all results
+    calibration_id: str = ""  # runs with the same calibrations share their errors
+    stand_id: str = ""  # runs on the same stand share the errors of masses, gravity and clock
+    adequate: bool | None = None  # the friction law explains the record; None where no law was fitted
+    msk64_degree: str = ""  # "" where unknown
+    excluded: str = ""  # why the run does not count; "" when it does
     warnings: tuple[ResultWarning, ...] = ()
 
 
-_SAME_MASS = 1e-3
-"""Relative difference up to which masses are equal: they are weighed to some grams."""
-_NAMED = 5
-"""Runs named in a message; further ones are counted."""
+_SAME_MASS = 1e-3  # relative difference up to which masses are equal: they are weighed to some grams
+_NAMED = 5  # runs named in a message; further ones are counted
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,22 +21,19 @@ _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
 _GROWTH = 20.0
 """Largest natural logarithm by which a trial swing may grow over the record."""
-_FAR = 1e12
-"""Residual, in units of the swing, of trial parameters that are none."""
+_FAR = 1e12  # residual, in units of the swing, of trial parameters that are none
 
 
 class Parameters(NamedTuple):
     """Parameters of ``offset + d^r/dt^r free_decay``, r = 0, 1, 2 (displacement, velocity, acceleration)."""
 
-    turning_s: float
-    """Time (s) of the last turning point before the fitted stretch."""
+    turning_s: float  # time (s) of the last turning point before the fitted stretch
     turning: float
     omega_rad_per_s: float
     damping_n_per_s: float
     coulomb: float
     """x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left."""
-    offset: float
-    """Zero of the readings, in their own unit."""
+    offset: float  # zero of the readings, in their own unit
 
     @property
     def period_s(self) -> float:
@@ -71,10 +68,8 @@ class OneMassFit:
     parameters: Parameters
     covariance: Floats
     """(6, 6) float64: type A, for white residuals; zero in rows of what was held."""
-    channel: Channel
-    """Readings that were fitted."""
-    residual: Floats
-    """(n,) float64: reading minus curve, in the unit of the readings."""
+    channel: Channel  # readings that were fitted
+    residual: Floats  # (n,) float64: reading minus curve, in the unit of the readings
     cost: float
     order: int
     """Derivative of the displacement that the readings are."""

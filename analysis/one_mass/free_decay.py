@@ -27,15 +27,12 @@ from analysis.uncertainty import numerical_gradient
 from messages.i18n import N_
 from messages.message import message
 
-_RARE = 1e-3
-"""Chance at which noise alone is called a pattern, per test."""
-_BAND = 3.29
-"""Standard deviations within which 99.9 % of a normal distribution lie."""
+_RARE = 1e-3  # chance at which noise alone is called a pattern, per test
+_BAND = 3.29  # standard deviations within which 99.9 % of a normal distribution lie
 _COMPUTED = 1e-9
 _ROUNDED_SHARE = 0.25
 """Rounding makes residuals of any colour once it makes this share of their variance."""
-_ROUNDED_LINE = 1.0 / 3.0
-"""Lines up to this share of a rounding step may be harmonics of the rounding itself."""
+_ROUNDED_LINE = 1.0 / 3.0  # lines up to this share of a rounding step may be harmonics of the rounding itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +48,7 @@ class SpectralLine:
 class ResidualAssessment:
     """Assessment of residuals."""
 
-    adequate: bool
-    """They are noise, or the rounding of the converter."""
+    adequate: bool  # they are noise, or the rounding of the converter
     rms: float
     noise: float
     """Root mean square of their part which neighbours do not share."""
@@ -143,23 +139,19 @@ _SPIKES_MAX = 0.02
 _REST_READINGS_MIN = 8
 _STEPS_SEEN = 3.0
 """Swings under this many rounding steps look as if they stopped."""
-_GAP_PERIODS_MAX = 1000.0
-"""Without a reading for longer than this, it was the clock that jumped."""
+_GAP_PERIODS_MAX = 1000.0  # without a reading for longer than this, it was the clock that jumped
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FreeDecayFit:
     """A fitted decay with its assessment and warnings."""
 
-    fit: OneMassFit
-    """With viscous and Coulomb damping."""
-    viscous: OneMassFit
-    """The same readings without Coulomb damping."""
+    fit: OneMassFit  # with viscous and Coulomb damping
+    viscous: OneMassFit  # the same readings without Coulomb damping
     verdict: ResidualAssessment
     adequate: bool
     """The residuals are noise, and nothing moves after the motion should have ended."""
-    unit: str
-    """Of the readings, and of what is left of them."""
+    unit: str  # of the readings, and of what is left of them
     warnings: list[ResultWarning]
 
 

@@ -10,12 +10,9 @@ from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import median_of_three, white_noise
 from analysis.record import RecordError
 
-_DEAD_BAND = (0.03, 0.35)
-"""Least and largest dead band about the middle, as shares of the largest swing."""
-_EARLY = 9
-"""Passages that the first estimate of the period is taken from: later ones may be those of hum."""
-_CLASSICAL_SHARE = 0.1
-"""The classical log decrement counts the swings above this share of the first."""
+_DEAD_BAND = (0.03, 0.35)  # least and largest dead band about the middle, as shares of the largest swing
+_EARLY = 9  # passages that the first estimate of the period is taken from: later ones may be those of hum
+_CLASSICAL_SHARE = 0.1  # the classical log decrement counts the swings above this share of the first
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -28,18 +25,15 @@ class TurningPoints:
     value: Floats
     side: Floats
     """(k,) float64: +1 for a maximum, -1 for a minimum."""
-    noise_gain: Floats
-    """(k,) float64: standard uncertainty of `value` per unit of noise in a reading."""
+    noise_gain: Floats  # (k,) float64: standard uncertainty of `value` per unit of noise in a reading
 
 
 @dataclass(frozen=True, slots=True)
 class HalfCycleRegression:
     """Line through neighbouring turning points, ``|X_(i+1)| = b |X_i| - loss``."""
 
-    ratio: float
-    """b = exp(-n T / 2) (1)."""
-    loss: float
-    """(1 + b) x_k, in the unit of the readings."""
+    ratio: float  # b = exp(-n T / 2) (1)
+    loss: float  # (1 + b) x_k, in the unit of the readings
     offset: float
 
 

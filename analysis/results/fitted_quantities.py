@@ -140,14 +140,11 @@ def msk64_degree(velocity_max_m_per_s: float) -> str:
     return _DEGREES[bisect_left(_BOUNDS_M_PER_S, velocity_max_m_per_s)]
 
 
-CHI_SQUARE_RISE_95 = 3.841458820694124
-"""Rise of chi-square at the ends of a 95 % interval."""
-_QUADRATIC = 0.15
-"""Relative deviation from that rise up to which a parabola is good enough."""
+CHI_SQUARE_RISE_95 = 3.841458820694124  # rise of chi-square at the ends of a 95 % interval
+_QUADRATIC = 0.15  # relative deviation from that rise up to which a parabola is good enough
 _DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)
 """Distances at which chi-square is evaluated, in units of the half interval of a parabola."""
-_HOPELESS = 14.0
-"""Rise from which on a density of exp(-rise / 2) adds nothing to the interval."""
+_HOPELESS = 14.0  # rise from which on a density of exp(-rise / 2) adds nothing to the interval
 _FINE = 2001
 _PROFILE_STEPS = 8
 
@@ -156,8 +153,7 @@ _PROFILE_STEPS = 8
 class ProfileInterval:
     """Distribution of a parameter about which chi-square is no parabola."""
 
-    below: float
-    """From the fitted value to the ends of the shortest 95 % interval."""
+    below: float  # from the fitted value to the ends of the shortest 95 % interval
     above: float
     deviation: float
 
@@ -171,12 +167,10 @@ class Profile:
     parameter: int
     parameters: Floats
     """(p,) float64: the fit."""
-    follow: Floats
-    """(p,) float64: how the others follow a step of one in the parameter, by a parabola."""
+    follow: Floats  # (p,) float64: how the others follow a step of one in the parameter, by a parabola
     deviation: float
     """Standard uncertainty of the parameter by the noise, the known parameters being as fitted."""
-    white: float
-    """Its variance over that by white noise as stated."""
+    white: float  # its variance over that by white noise as stated
 
     @classmethod
     def from_fit(cls, problem: FitProblem, fit: Fit, parameter: int, white: float) -> Self:
@@ -249,8 +243,7 @@ LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _READINGS = 3000
 _FIRST_STEP = 1e-4
 """Of the way up along f_s, relative to the likeliest; each next step is twice as long."""
-_FARTHEST = 3.0
-"""f_s over the likeliest where the way ends."""
+_FARTHEST = 3.0  # f_s over the likeliest where the way ends
 _STEPS, _HALVINGS = 6, 5
 _SLIP_DOUBT = 2.0
 """Later slips take back part of the first one: what gauge 2 shows in the end is as much smaller."""
@@ -390,8 +383,7 @@ def _largest_demand(parameters: Floats, phase: Floats) -> float:
     return float(_demand(parameters, position, velocity).max())
 
 
-_DRAWS = 40
-"""Of parameters, for the scatter of the end of slip: it is known to a ninth."""
+_DRAWS = 40  # of parameters, for the scatter of the end of slip: it is known to a ninth
 _PLAUSIBLE = 2.0
 """Laws whose BIC is higher by less than so many times the price of a parameter may be the true ones."""
 

@@ -28,8 +28,7 @@ from analysis.uncertainty import (
 from messages.i18n import N_
 from messages.message import message
 
-_BAND = 3.2905
-"""99.9 % of a normal distribution lie within this many standard deviations."""
+_BAND = 3.2905  # 99.9 % of a normal distribution lie within this many standard deviations
 _BEND_SIGMAS = 5.0
 _NEGLIGIBLE = 0.25
 """Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
@@ -171,8 +170,7 @@ class JointFit:
     problem: FitProblem
     chosen: Fit
     """The likeliest law (lowest BIC) among `candidates`."""
-    candidates: list[Fit]
-    """Fits of the laws whose parameters the record identifies."""
+    candidates: list[Fit]  # fits of the laws whose parameters the record identifies
     uncertainty: ParameterUncertainty
     selection: ModelSelection
 

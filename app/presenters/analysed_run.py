@@ -76,7 +76,7 @@ class AnalysedRun:
     labels: dict[str, str | bool] = field(default_factory=dict)
     model: ModelSelection | None = None
     events: Events = NO_EVENTS
-    cautions: tuple[ResultWarning, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     ended: str = ""
     """Why the recording ended, as stored."""
     budget: tuple[BudgetLine, ...] = ()

@@ -50,7 +50,7 @@ def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         labels=found.labels,
         model=found.model,
         events=found.events,
-        cautions=tuple(found.warnings),
+        warnings=tuple(found.warnings),
         ended=run.end.ended if run.end else "",
         budget=tuple(found.budget),
         kinematics=None if motion is None else _kinematics(motion, found),

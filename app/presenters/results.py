@@ -73,7 +73,7 @@ _REMEDIES = {
     "tilt-not-identified": N_("Level the plane."),
     "zero-moved": N_("Let the amplifier warm up, or identify a run of the bare table."),
 }
-"""What to do about a caution whose own words do not say it."""
+"""What to do about a warning whose own words do not say it."""
 
 _MICROMETRES = re.compile(r" um\b")
 _SENTENCE_ENDS = re.compile(r"(?<=[.!?])(?<!\be\.g\.)(?<!\bi\.e\.)(?<!\bno\.)(?<!\bvs\.) ")
@@ -101,7 +101,7 @@ def make_result(run: AnalysedRun, true_friction: float | None = None) -> Result:
         fit=_fit(run.model),
         comparison=_comparison(run, true_friction),
         end_status=end_status(run.ended),
-        warnings=tuple(_caution(caution) for caution in run.cautions),
+        warnings=tuple(_warning(warning) for warning in run.warnings),
         path=str(run.path),
     )
 
@@ -192,9 +192,9 @@ def _headline(run: AnalysedRun) -> ResultRow:
     )
 
 
-def _caution(caution: ResultWarning) -> str:
+def _warning(warning: ResultWarning) -> str:
     """The words of the analysis, and what to do where they do not say it."""
-    words, remedy = in_words(caution.message), gettext(_REMEDIES.get(caution.code, ""))
+    words, remedy = in_words(warning.message), gettext(_REMEDIES.get(warning.code, ""))
     return f"{words} {remedy}" if remedy else words
 
 

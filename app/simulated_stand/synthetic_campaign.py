@@ -30,8 +30,7 @@ from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
 
-CLOCK_UNCERTAINTY = 2e-5
-"""Relative standard uncertainty of the device's clock, as the runs state it."""
+CLOCK_UNCERTAINTY = 2e-5  # relative standard uncertainty of the device's clock, as the runs state it
 _BETWEEN_TESTS = datetime.timedelta(minutes=2)
 _UNTIL_REST_S = 90.0
 _SURELY_SLIPS = 1.05
@@ -41,8 +40,7 @@ _SURELY_SLIPS = 1.05
 class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     """A synthetic campaign."""
 
-    series: tuple[str, ...] = ()
-    """Codes; empty is the 36 of Table 1."""
+    series: tuple[str, ...] = ()  # codes; empty is the 36 of Table 1
     repeats: int = 3
     seed: int = 1
     rate_hz: float = 1000.0
@@ -51,8 +49,7 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     noise_m: float = 20e-6
     friction_scatter: float = 0.0
     """Standard deviation of f_d from run to run, as a share of it."""
-    friction_per_kg: float = 0.0
-    """By which share f_d changes for each kg of added mass."""
+    friction_per_kg: float = 0.0  # by which share f_d changes for each kg of added mass
     friction_by_contact: bool = False
     """f_d depends on nothing but the contact: that of the contact's first row everywhere."""
     static_friction: Literal["printed", "dynamic"] = "printed"
@@ -70,15 +67,12 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
 class SystematicErrors(msgspec.Struct, frozen=True):
     """Errors of the stand that the campaign does not know; drawn once from the stated uncertainties."""
 
-    gains: tuple[float, float]
-    """By which share displacements are read too large."""
-    bends_m: tuple[float, float]
-    """Largest deviations from the calibration line."""
+    gains: tuple[float, float]  # by which share displacements are read too large
+    bends_m: tuple[float, float]  # largest deviations from the calibration line
     lag_s: float
     clock: float
     """By which share true time runs faster than the device's."""
-    table_mass_kg: float
-    """Error of the true value against the stated one, as of the next two."""
+    table_mass_kg: float  # error of the true value against the stated one, as of the next two
     plate_mass_kg: float
     gravity_m_per_s2: float
 

@@ -224,7 +224,7 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
             ),
         ),
         "events": Events(RELEASED_S, SLIP_END_S, None),
-        "cautions": (
+        "warnings": (
             ResultWarning("tail-not-exponential", message("The tail does not decay exponentially.")),
         ),
         "ended": "enough",

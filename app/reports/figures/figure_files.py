@@ -123,8 +123,7 @@ def write_figures(
     return written, notes
 
 
-PAPER_SERIES = "1FFM0"
-"""Figs. 3 to 5 of the paper show a run of it."""
+PAPER_SERIES = "1FFM0"  # Figs. 3 to 5 of the paper show a run of it
 _FRICTION = "friction_dynamic"
 
 

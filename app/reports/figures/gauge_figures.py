@@ -19,7 +19,8 @@ _BRANCHES = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))
 def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
     """Draw readings, curve and residuals to a PNG, SVG or PDF file. Raises OSError."""
     with titled_figure(path, title, height_in=5.6) as figure:
-        _draw_calibration(*figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), found)
+        curve, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _draw_calibration(curve, residual, found)
 
 
 def _draw_calibration(curve: Axes, residual: Axes, found: Calibration) -> None:

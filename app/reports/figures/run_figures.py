@@ -38,13 +38,11 @@ _JUST_BEFORE_S = 1e-9
 class RunFigureData:
     """Curves of a run. Displacements are from rest, and from the position of the plate before the pull."""
 
-    time_s: Floats
-    """(n,) float64: times of the readings since the release."""
+    time_s: Floats  # (n,) float64: times of the readings since the release
     table_m: Floats
     relative_m: Floats | None
     """(n,) float64 or None: plate against table; None without a second gauge."""
-    motion: MotionSamples | None
-    """Of the fitted law; None without one."""
+    motion: MotionSamples | None  # of the fitted law; None without one
     slip_end_s: float | None
     results: dict[str, Quantity]
 

@@ -22,8 +22,7 @@ FORMATS: Final = ("png", "svg", "pdf")
 FAMILY = "IBM Plex Sans"
 COLUMN_IN = 3.46
 """Width of a column of a journal, 88 mm."""
-_STRETCHES = 4000
-"""More stretches than a page has dots across at 300 dpi."""
+_STRETCHES = 4000  # more stretches than a page has dots across at 300 dpi
 Floats = NDArray[np.float64]
 _REPRODUCIBLE: Final[dict[str, dict[str, Any]]] = {
     "png": {"Software": None},

@@ -100,7 +100,6 @@ class Report(msgspec.Struct, frozen=True):
     subtitle: str
     laboratory: str
     """"" where unknown."""
-    date: str
-    """ISO date of the report, the only difference between two reports of the same runs."""
+    date: str  # ISO date of the report, the only difference between two reports of the same runs
     software: str
     sections: list[Section]

@@ -15,8 +15,7 @@ from app.reports.test_report.blocks import Report
 from app.runs.disk import atomic_write
 from app.runs.errors import WriteError
 
-PDF_STANDARD: Final = "a-2a"
-"""PDF/A-2 level a: archival, with the structure that screen readers need."""
+PDF_STANDARD: Final = "a-2a"  # PDF/A-2 level a: archival, with the structure that screen readers need
 _LONG_WORD = re.compile(r"\S{48}(?=\S)")
 _BREAK = "\u200b"
 _ALWAYS = frozenset("\n\u200b\u00a0\u202f")

@@ -257,6 +257,6 @@ def test_cancelling_is_possible_only_while_something_goes_on(stage: Stage) -> No
 
 
 def test_a_caution_of_the_analysis_reaches_the_screen(stage: Stage) -> None:
-    stage.show(cautions=(ResultWarning("tilt-not-identified", message("tilt and f_d act alike.")),))
+    stage.show(warnings=(ResultWarning("tilt-not-identified", message("tilt and f_d act alike.")),))
     assert stage.presenter.state.result is not None
     assert stage.presenter.state.result.warnings == ("Tilt and f_d act alike. Level the plane.",)

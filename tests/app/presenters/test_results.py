@@ -75,7 +75,7 @@ def test_a_caution_says_what_to_do_and_says_it_once() -> None:
         ResultWarning("spikes", message("3 readings are left out.")),
         ResultWarning("no-slip", message("nothing slips.")),
     )
-    assert results.make_result(analysed(cautions=said)).warnings == (
+    assert results.make_result(analysed(warnings=said)).warnings == (
         "3 readings are left out. Check the cables for loose contacts.",
         "Nothing slips.",
     )
