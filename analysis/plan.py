@@ -73,12 +73,12 @@ class PlannedTest:
                 raise AnalysisError(
                     "{name} is {value:g}: give a positive number to plan a test with", name=name, value=value
                 )
-        if self.parameters.friction_dynamic < _FRICTION_MIN:
-            raise AnalysisError(
-                "friction_dynamic is {friction_dynamic:g}: give {friction_min:g} or more to plan a test with",
-                friction_dynamic=self.parameters.friction_dynamic,
-                friction_min=_FRICTION_MIN,
+        friction = self.parameters.friction_dynamic
+        if friction < _FRICTION_MIN:
+            template = N_(
+                "friction_dynamic is {friction_dynamic:g}: give {friction_min:g} or more to plan a test with"
             )
+            raise AnalysisError(template, friction_dynamic=friction, friction_min=_FRICTION_MIN)
         readings, periods = self.rate_hz * (self.duration_s + self.hold_s), self.duration_s / self.period_s
         for many, what, most in ((readings, "readings", _READINGS_MAX), (periods, "periods", _PERIODS_MAX)):
             if many > most:
@@ -153,20 +153,19 @@ def plan(test: PlannedTest) -> Plan:
     table_use, relative_use = range_use(test, motion)
     budget = expected_budget(test)
 
-    def fits(tests: int) -> bool:
-        return relative_use.fits(tests * motion.residual_displacement_m)
-
+    offsets_m = motion.residual_displacement_m * np.arange(_TESTS_MAX)
+    without = next((count for count, offset in enumerate(offsets_m) if not relative_use.fits(offset)), None)
     return Plan(
-        law=test.law,
-        motion=motion,
-        msk64_degree=msk64_degree(motion.table_velocity_max_m_per_s),
-        rest_s=_rest_s(test),
-        table_use=table_use,
-        relative_use=relative_use,
-        tests_without_recentring=next((count for count in range(_TESTS_MAX) if not fits(count)), None),
-        results=budget.results,
-        budget=budget.lines,
-        warnings=list(_warnings(test, motion, (table_use, relative_use), budget)),
+        test.law,
+        motion,
+        msk64_degree(motion.table_velocity_max_m_per_s),
+        _rest_s(test),
+        table_use,
+        relative_use,
+        without,
+        budget.results,
+        budget.lines,
+        list(_warnings(test, motion, (table_use, relative_use), budget)),
     )
 
 
@@ -176,18 +175,15 @@ def range_use(test: PlannedTest, motion: Motion) -> tuple[RangeUse, RangeUse]:
     times = np.union1d(np.linspace(0.0, motion.duration_s, count), motion.phase_starts_s)
     table, relative = motion.sample_displacements(times)
     second = relative + table if test.gauge_2_measures_plate else relative
-    return (
-        RangeUse(float(table.min()), float(table.max()), test.table_gauge.range_m),
-        RangeUse(float(second.min()), float(second.max()), test.relative_gauge.range_m),
-    )
+    gauges = (table, test.table_gauge), (second, test.relative_gauge)
+    first, other = (RangeUse(float(x.min()), float(x.max()), gauge.range_m) for x, gauge in gauges)
+    return first, other
 
 
 def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     """Friction with its expected uncertainty by source; empty where the test does not determine it."""
     record, budget = _record(test), UncertaintyBudget()
-    if test.motion().slip_end_s == 0.0:
-        return budget
-    problem = _problem(test, record)
+    problem = _problem(test, record) if test.motion().slip_end_s > 0.0 else None
     if problem is None:
         return budget
     fit = _fit(test, problem)
@@ -242,10 +238,9 @@ def _record(test: PlannedTest) -> Record:
 
 def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
     """Fit problem of the expected record; None where a gauge has too few readings in its range."""
-    relative_m = np.empty(0) if record.relative_displacement_m is None else record.relative_displacement_m
     channels = (
         _within(record.time_s, record.table_displacement_m, test.table_gauge.range_m),
-        _within(record.time_s, relative_m, test.relative_gauge.range_m),
+        _within(record.time_s, record.relative_displacement_m, test.relative_gauge.range_m),
     )
     if min(map(len, channels)) < SAMPLES_MIN:
         return None
@@ -255,12 +250,15 @@ def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
     )
 
 
-def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
-    kept = np.abs(value_m) <= (math.inf if range_m is None else range_m)
+def _within(time_s: Floats, value_m: Floats | None, range_m: float | None) -> Channel:
+    if value_m is None:
+        return Channel(np.empty(0), np.empty(0))
+    kept = np.abs(value_m) <= (range_m or math.inf)
     return Channel(time_s[kept], value_m[kept])
 
 
 def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
+    """Fit at the true parameters."""
     point = default_point()
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)

@@ -16,6 +16,7 @@ from analysis.laws.catalogue import compared_law
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
 from analysis.motion.two_mass import PEAK_RATES
+from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay
 from analysis.quantities import BudgetSource, Source
 from analysis.record import AnalysisError, Record
@@ -110,11 +111,10 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
         and decay.slip_end_s is not None
         and not decay.gauge_2_absolute
     ):
-        held = decay.relative.between(*decay.plateau).value_m
-        rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
-        value, gauge = float(rest.mean() - held.mean()), joint.record.relative_gauge
+        gauge = joint.record.relative_gauge
+        value, noise_m = _shift_of_gauge_2(decay.relative, decay.plateau, decay.slip_end_s, decay.noise_m[1])
         shares = {
-            BudgetSource.NOISE: decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
+            BudgetSource.NOISE: noise_m,
             BudgetSource.GAUGE_2_GAIN: value * (gauge.gain_relative or 0.0),
             BudgetSource.GAUGE_2_NONLINEARITY: gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
         }
@@ -344,10 +344,17 @@ def _unseen_slip_m(record: Record, decay: FreeDecay) -> float:
         share = record.masses.plate_mass_kg / (record.masses.table_mass_kg + record.masses.plate_mass_kg)
         count = max(1.0, 0.25 * decay.period_s / decay.channels.interval_s)
         return _SLIP_DOUBT * 2.0 * decay.noise_m[0] / float(np.sqrt(count)) / share
-    held = decay.relative.between(*decay.plateau).value_m
-    rest = decay.relative.between(decay.release.time_s + 0.5 * decay.period_s, np.inf).value_m
-    uncertainty = decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest)))
-    return _SLIP_DOUBT * (abs(float(rest.mean() - held.mean())) + 2.0 * uncertainty)
+    after_s = decay.release.time_s + 0.5 * decay.period_s
+    shift_m, noise_m = _shift_of_gauge_2(decay.relative, decay.plateau, after_s, decay.noise_m[1])
+    return _SLIP_DOUBT * (abs(shift_m) + 2.0 * noise_m)
+
+
+def _shift_of_gauge_2(
+    channel: Channel, plateau: tuple[float, float], after_s: float, noise_m: float
+) -> tuple[float, float]:
+    """Mean reading after a time minus that in the hold, and its standard uncertainty by noise (m)."""
+    held, rest = channel.between(*plateau).value_m, channel.between(after_s, np.inf).value_m
+    return float(rest.mean() - held.mean()), noise_m * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest)))
 
 
 def _bounds_of_motion(parameters: Floats, law: FrictionLaw, duration_s: float) -> Floats:
@@ -355,7 +362,7 @@ def _bounds_of_motion(parameters: Floats, law: FrictionLaw, duration_s: float) -
     phases = motion_phases(parameters, law, duration_s)
     stick = phases[:, 1] == 0.0
     if (stick[:-1] & ~stick[1:]).any():
-        return np.array([parameters[Parameter.FRICTION_STATIC], parameters[Parameter.FRICTION_STATIC]])
+        return np.full(2, parameters[Parameter.FRICTION_STATIC])
     demands = _demand(parameters, phases[:, 2], phases[:, 3])
     upper = float(demands[~stick].min()) if (~stick).any() else np.inf
     lower = _largest_demand(parameters, phases[-1]) if stick[-1] else np.nan

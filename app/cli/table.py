@@ -13,9 +13,8 @@ from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import TableOptions
-from app.reports.table.content import PublishedRowComparison, TableContent
 from app.reports.table.files import as_text, write_table
-from app.reports.table.text import note_sections
+from app.reports.table.text import PublishedRowComparison, TableContent, note_sections
 from config.files import load_stand, published_table
 
 _WIDTH_MIN, _UNLIMITED = 40, 1_000_000  # columns of a narrow terminal, and of a pipe

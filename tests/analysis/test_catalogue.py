@@ -24,8 +24,8 @@ from analysis.catalogue import (
 )
 from analysis.quantities import Quantity
 from app.presenters.campaign.state import column_titles
-from app.reports.table.content import TableContent, row_cells, table_headers
 from app.reports.table.files import as_text
+from app.reports.table.text import TableContent, row_cells, table_headers
 from tests.campaign_kit import FRICTION, run
 
 RATIO = QuantityDefinition(

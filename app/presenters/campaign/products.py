@@ -7,8 +7,8 @@ from app.presenters.base import Progress, ReportProgress
 from app.presenters.campaign.state import Product
 from app.presenters.campaign.tasks import collected_runs
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
-from app.reports.table.content import TableContent
 from app.reports.table.files import write_table
+from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
 from app.runs.campaign.collect import CollectedRuns

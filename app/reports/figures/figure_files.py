@@ -13,8 +13,13 @@ from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
-from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
-from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
+from app.reports.figures.run_figures import (
+    CAPTION,
+    RUN_FIGURES,
+    RunFigureData,
+    contact_names,
+    friction_figure,
+)
 from app.reports.figures.style import print_style, save_figure
 from app.runs.analyze import Progress, repeat_saved_analysis
 from app.runs.disk import atomic_write, storage_error
@@ -30,8 +35,6 @@ NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))
 
 
 class FigureFile(msgspec.Struct, frozen=True):
-    """A written figure."""
-
     figure: str
     file: str
     caption: str
@@ -40,8 +43,6 @@ class FigureFile(msgspec.Struct, frozen=True):
 
 
 class FigureFolder(msgspec.Struct, frozen=True):
-    """Folder and format of figures."""
-
     path: str
     format: Format = "png"
     replace: bool = False

@@ -46,7 +46,6 @@ def print_style() -> Iterator[None]:
 
 
 def new_figure(height_in: float = 2.5) -> tuple[Figure, Axes]:
-    """Return an empty figure with its axes, one column wide."""
     figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
     return figure, figure.subplots()
 
@@ -83,12 +82,10 @@ def titled_figure(path: Path, title: str, height_in: float) -> Iterator[Figure]:
 
 
 def figure_svg(figure: Figure) -> str:
-    """The figure as SVG, reproducible."""
     buffer = StringIO()
     figure.savefig(buffer, format="svg", metadata=_REPRODUCIBLE["svg"])
     return buffer.getvalue()
 
 
 def typeface_files() -> list[Path]:
-    """The files of the one typeface."""
     return sorted(Path(ROOT).rglob("*.ttf"))

@@ -14,14 +14,18 @@ from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place
 from analysis.quantities import Quantity
-from app.reports.table.content import (
+from app.reports.table.text import (
+    LEGEND,
     PublishedRowComparison,
     TableContent,
+    note_sections,
+    published_grid,
+    repeats_grid,
     row_cells,
     table_headers,
     table_quantities,
+    text_lines,
 )
-from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
 from app.runs.analysis_json import warning_documents
 from app.runs.disk import atomic_write
 from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, write_sheets

@@ -16,8 +16,6 @@ Cell = str | Symbol
 
 
 class Facts(msgspec.Struct, frozen=True, tag="facts"):
-    """Names with values."""
-
     rows: list[tuple[str, str]]
 
 
@@ -35,14 +33,10 @@ class Grid(msgspec.Struct, frozen=True, tag="grid"):
 
 
 class Text(msgspec.Struct, frozen=True, tag="text"):
-    """A paragraph."""
-
     text: str
 
 
 class Points(msgspec.Struct, frozen=True, tag="points"):
-    """A list of sentences."""
-
     texts: list[str]
 
 
@@ -71,14 +65,10 @@ class Drawing(msgspec.Struct, frozen=True, tag="drawing"):
 
 
 class Drawings(msgspec.Struct, frozen=True, tag="drawings"):
-    """Figures in two columns."""
-
     items: list[Drawing]
 
 
 class Signatures(msgspec.Struct, frozen=True, tag="signatures"):
-    """Fields for signatures."""
-
     roles: list[str]
 
 
@@ -94,8 +84,6 @@ class Section(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """Content of a report."""
-
     title: str
     subtitle: str
     laboratory: str

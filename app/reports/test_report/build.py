@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from app.reports.figures.figure_files import representative_runs
-from app.reports.table.content import TableContent
+from app.reports.table.text import TableContent
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
 from app.reports.test_report.run_report import run_sections
@@ -22,8 +22,6 @@ TITLE = "Test report: dry friction by pullback"
 
 
 class ReportHead(msgspec.Struct, frozen=True):
-    """Head of a report: date, title, laboratory."""
-
     date: datetime.date
     title: str = TITLE
     laboratory: str = ""

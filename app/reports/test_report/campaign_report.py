@@ -12,10 +12,17 @@ from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import PooledQuantity
 from analysis.catalogue import Place
 from analysis.formatting import format_uncertainty, format_value, typeset, typeset_sentence
-from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
+from app.reports.figures.run_figures import CAPTION, contact_names, friction_figure
 from app.reports.figures.style import print_style
-from app.reports.table.content import TableContent, row_cells, table_quantities
-from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
+from app.reports.table.text import (
+    LEGEND,
+    REPEATS_LEGEND,
+    TableContent,
+    note_sections,
+    repeats_grid,
+    row_cells,
+    table_quantities,
+)
 from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
@@ -41,7 +48,6 @@ class CampaignReportInput:
 
 
 def campaign_sections(material: CampaignReportInput) -> list[Section]:
-    """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
     prints = [
         msgspec.structs.replace(one, name=_local(run.name, material))

@@ -44,12 +44,10 @@ PROCEDURE: Final = Section(
 
 
 def stand_section(stands: Sequence[Stand]) -> Section:
-    """Stated properties of each stand."""
     return Section("Stand" if len(stands) == 1 else "Stands", [_stand(stand) for stand in stands])
 
 
 def gauges_section(calibrations: Sequence[Gauges]) -> Section:
-    """Calibrations of both gauges."""
     blocks: list[Block] = []
     for gauges in calibrations:
         reference = "base" if gauges.relative.measures == "plate" else "table"
@@ -70,7 +68,6 @@ def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
 
 
 def drawing(figure: Figure, caption: str) -> Drawing:
-    """A figure drawn in `print_style`, as a block."""
     return Drawing(figure_svg(figure), caption)
 
 
@@ -82,7 +79,6 @@ def run_drawings(analysis: Analysis, numbers: Sequence[str], prefix: str = "") -
 
 
 def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:
-    """Facts with a value."""
     return Facts([(name, value) for name, value in rows if value])
 
 

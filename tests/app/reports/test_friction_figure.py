@@ -7,7 +7,7 @@ from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import Quantity
 from app.reports.figures.figure_files import representative_runs
-from app.reports.figures.friction_figure import friction_figure
+from app.reports.figures.run_figures import friction_figure
 from app.reports.figures.style import print_style
 from app.runs.errors import RunNotFoundError
 

@@ -11,7 +11,7 @@ from reports_kit import write_run
 
 from analysis.campaign.campaign import summarize
 from analysis.formatting import typeset_sentence
-from app.reports.table.content import TableContent
+from app.reports.table.text import TableContent
 from app.reports.test_report.blocks import (
     Conclusion,
     Facts,

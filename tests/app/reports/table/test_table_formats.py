@@ -12,9 +12,14 @@ import pytest
 from analysis.campaign.campaign import Excluded, compare_with_published, summarize
 from analysis.campaign.series import SeriesKey
 from analysis.formatting import format_concise
-from app.reports.table.content import PublishedRowComparison, TableContent, row_cells, table_headers
 from app.reports.table.files import as_text, write_text, write_workbook
-from app.reports.table.text import ratio_sentence
+from app.reports.table.text import (
+    PublishedRowComparison,
+    TableContent,
+    ratio_sentence,
+    row_cells,
+    table_headers,
+)
 from app.runs.errors import RunExistsError
 from config.files import published_table
 from tests.campaign_kit import FRICTION, VELOCITY, run
