@@ -6,7 +6,7 @@ from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import ReportOptions
-from app.reports.table.content import TableContent
+from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
 
