@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import msgspec
 
+from messages.i18n import N_
 from messages.message import MessageError
 
 if TYPE_CHECKING:
@@ -96,20 +97,16 @@ class Stand(_Checked, frozen=True):
         if match:
             pullback, contact, mass = match.groups()
             if pullback in self.pullbacks_m and contact in self.contacts and mass in self.added_masses_kg:
-                return Series(
-                    code=f"{pullback}{contact}{mass}",
-                    pullback_m=self.pullbacks_m[pullback],
-                    contact=contact,
-                    plate_mass_kg=self.plate_mass_kg + self.added_masses_kg[mass],
-                )
-        raise SeriesError(
+                plate_mass_kg = self.plate_mass_kg + self.added_masses_kg[mass]
+                name = f"{pullback}{contact}{mass}"
+                return Series(name, self.pullbacks_m[pullback], contact, plate_mass_kg)
+        template = N_(
             "series {code!r} is not one of this stand: write pullback ({pullbacks}), contact ({contacts}) and"
-            " mass ({masses}), for example 1FFM0",
-            code=code,
-            pullbacks=list(self.pullbacks_m),
-            contacts=list(self.contacts),
-            masses=list(self.added_masses_kg),
+            " mass ({masses}), for example 1FFM0"
         )
+        pullbacks, contacts = list(self.pullbacks_m), list(self.contacts)
+        masses = list(self.added_masses_kg)
+        raise SeriesError(template, code=code, pullbacks=pullbacks, contacts=contacts, masses=masses)
 
 
 class Series(_Checked, frozen=True):

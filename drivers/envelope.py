@@ -69,18 +69,20 @@ class Unwrapper:
             start = _candidate(data, at)
             self.discarded_bytes += start - at
             at, body = start, start + HEADER_BYTES
-            header = _header(data, at) if body <= len(data) else None
-            port, length, arrival_ns, check = header or (0, 0, 0, 0)
-            end = body + length
-            if end > len(data):
+            if body > len(data):
                 break
-            content = data[body:end]
-            if header is None or zlib.crc32(content) != check:
+            fields = data[at : at + _FIELDS.size]
+            _, port, length, arrival_ns, check = _FIELDS.unpack(fields)
+            is_good = _CHECK.unpack_from(data, at + _FIELDS.size) == (crc16(fields),)
+            end = body + length
+            if is_good and end > len(data):
+                break
+            if is_good and zlib.crc32(data[body:end]) == check:
+                yield StampedRead(port, arrival_ns, data[body:end])
+                at = end
+            else:
                 self.discarded_bytes += 1
                 at += 1
-            else:
-                yield StampedRead(port, arrival_ns, content)
-                at = end
         self._unfinished = data[at:]
 
 
@@ -91,12 +93,3 @@ def _candidate(data: bytes, at: int) -> int:
         return found
     first = max(at, len(data) - len(MAGIC) + 1)
     return next((tail for tail in range(first, len(data)) if MAGIC.startswith(data[tail:])), len(data))
-
-
-def _header(data: bytes, start: int) -> tuple[int, int, int, int] | None:
-    """Port, length, arrival and CRC-32 of the data; None where the checksum of the header is wrong."""
-    fields = data[start : start + _FIELDS.size]
-    if _CHECK.unpack_from(data, start + _FIELDS.size) != (crc16(fields),):
-        return None
-    _, port, length, arrival_ns, check = _FIELDS.unpack(fields)
-    return port, length, arrival_ns, check

@@ -1,7 +1,7 @@
 """Probing a port: who uses it, what it sends at which line settings, and what answers a question."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -119,17 +119,13 @@ def _probe_link(
 
 
 def listen(
-    link: Port,
-    on_progress: Callable[[Message], None],
-    candidates: Sequence[LineSettings] = COMMON_LINE_SETTINGS,
-    clock: Callable[[], float] = time.monotonic,
+    link: Port, on_progress: Callable[[Message], None], clock: Callable[[], float] = time.monotonic
 ) -> ListenResult:
-    """Listen until what comes is recognised; nothing is sent.
+    """Listen at `COMMON_LINE_SETTINGS` until what comes is recognised; nothing is sent.
 
-    `link` is open and set to the first of `candidates`, which are tried in order; `clock` gives seconds as
-    `time.monotonic` does. A device that is silent at the first settings is silent at all. Raises
-    DeviceLostError if the port is gone.
+    `link` is set to the first; a device that is silent there is silent at all. Raises DeviceLostError.
     """
+    candidates = COMMON_LINE_SETTINGS
     best = ListenResult(None, None)
     for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
         template = N_("listening at {line_settings}") if link.has_baud else N_("listening")
@@ -150,13 +146,10 @@ def listen(
 
 
 def query_identity(
-    link: Port,
-    on_progress: Callable[[Message], None],
-    queries: Iterable[tuple[str, IdentityQuery]] | None = None,
-    clock: Callable[[], float] = time.monotonic,
+    link: Port, on_progress: Callable[[Message], None], clock: Callable[[], float] = time.monotonic
 ) -> ListenResult | None:
-    """Ask one question after the other, by default of all devices. Raises DeviceLostError."""
-    for protocol, query in queries or identity_queries():
+    """Ask one question after the other of all devices. Raises DeviceLostError."""
+    for protocol, query in identity_queries():
         for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
             with_baud = N_("asking for {protocol} at {line_settings}")
             template = with_baud if link.has_baud else N_("asking for {protocol}")

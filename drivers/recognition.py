@@ -68,9 +68,10 @@ def recognise(data: bytes, duration_s: float | None = None) -> Recognition | Non
     return max(found, key=lambda one: one.share, default=None)
 
 
-def is_recognised(packets: int, share: float, *, has_checksum: bool) -> bool:
-    """Whether so many good packets, in such a share of the bytes, are no coincidence."""
-    return packets >= MIN_PACKETS and share >= (CHECKED_SHARE if has_checksum else UNCHECKED_SHARE)
+def unless_coincidence(found: Recognition, *, has_checksum: bool) -> Recognition | None:
+    """`found`, if it has so many good packets, in such a share of the bytes, that they are no coincidence."""
+    least = CHECKED_SHARE if has_checksum else UNCHECKED_SHARE
+    return found if found.packets >= MIN_PACKETS and found.share >= least else None
 
 
 def rate_from_count(samples: int, duration_s: float | None) -> float | None:
@@ -127,10 +128,9 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
         return explained
     found = recognise(received)
     if found is not None and found.protocol != protocol and DRIVERS[found.protocol].frames_title:
+        frames = message(DRIVERS[found.protocol].frames_title)
         return message(
-            "these are {frames}, choose protocol {protocol}",
-            frames=message(DRIVERS[found.protocol].frames_title),
-            protocol=found.protocol,
+            "these are {frames}, choose protocol {protocol}", frames=frames, protocol=found.protocol
         )
     if is_text(received):
         line = _second_line(received)
@@ -145,13 +145,13 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
         return message(
             "this looks like text read with a wrong parity: try --parity N, E or O as the device is set"
         )
+    template = N_("check the baud rate and the protocol, or the parity; `slipstand device probe` tries them")
     if baud:
-        return message(
+        template = N_(
             "check the baud rate (usual is {baud}) and the protocol, or the parity;"
-            " `slipstand device probe` tries them",
-            baud=baud,
+            " `slipstand device probe` tries them"
         )
-    return message("check the baud rate and the protocol, or the parity; `slipstand device probe` tries them")
+    return message(template, baud=baud)
 
 
 def _second_line(received: bytes) -> str:

@@ -187,10 +187,11 @@ class HostTimeFit:
             early_ns = int(self.host_ns(np.array([device_s]))[0]) - arrival_ns
             if early_ns > _LEAP_NS + _LEAP * (arrival_ns - self._best[1]):
                 self.reset()
-        if self._best is None or _window(point) > _window(self._best):
+        best_s, best_ns = self._best or point
+        if self._best is None or arrival_ns // _WINDOW_NS > best_ns // _WINDOW_NS:
             self._close_window(arrival_ns)
             self._best = point
-        elif _late_ns(point) < _late_ns(self._best):
+        elif arrival_ns - device_s * 1e9 < best_ns - best_s * 1e9:
             self._best = point
 
     def host_ns(self, device_s: Floats) -> Ints:
@@ -214,11 +215,3 @@ class HostTimeFit:
             since_s = np.array([point_s - own_s for point_s, _ in self._points])
             late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._points]) - since_s
             self._line = fit_robust_line(since_s, late_s)
-
-
-def _window(point: _Point) -> int:
-    return point[1] // _WINDOW_NS
-
-
-def _late_ns(point: _Point) -> float:
-    return point[1] - point[0] * 1e9

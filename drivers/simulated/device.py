@@ -19,6 +19,7 @@ from messages.i18n import N_
 
 _log = logging.getLogger(__name__)
 _SEQUENCES = 1 << 32
+_UPDATE_S = 0.02
 
 SignalFactory: TypeAlias = Callable[[float, float], Signal]
 """Makes the signal of a new stream from samples a second and first sample, both on the stand's time."""
@@ -240,29 +241,25 @@ class PolledDevice(SimulatedDevice):
         return RegisterUpdater(self._registers, signal, self.log, now_ns)
 
 
+@dataclass(frozen=True, slots=True)
 class RegisterUpdater:
     """Takes samples at their rate into the registers of a polled device, and counts them."""
 
-    _INTERVAL_S = 0.02
-
-    def __init__(
-        self, registers: PolledProtocol, signal: Signal, log: TransmissionLog, started_ns: int
-    ) -> None:
-        self._registers = registers
-        self._signal = signal
-        self._log = log
-        self._started_ns = started_ns
+    registers: PolledProtocol
+    signal: Signal
+    log: TransmissionLog
+    started_ns: int
 
     def send_due(self, now_ns: int, has_reader: bool) -> float:  # noqa: ARG002 - registers need no reader
         """Take the samples that are due; returns seconds until the next call, requests or not."""
-        rate_hz = self._log.true_rate_hz
-        due = math.floor((now_ns - self._started_ns) * 1e-9 * rate_hz) + 1 - self._log.samples
+        taken = math.floor((now_ns - self.started_ns) * 1e-9 * self.log.true_rate_hz) + 1
+        due = taken - self.log.samples
         if due > 0:
-            counts, status = self._signal.take(due)
-            self._registers.store_sample(counts[-1], int(status[-1]))
-            self._log.samples += due
-            self._log.samples_clipped += int(np.count_nonzero(status))
-        return self._INTERVAL_S
+            counts, status = self.signal.take(due)
+            self.registers.store_sample(counts[-1], int(status[-1]))
+            self.log.samples += due
+            self.log.samples_clipped += int(np.count_nonzero(status))
+        return _UPDATE_S
 
 
 _Stream: TypeAlias = StreamSender | RegisterUpdater

@@ -16,7 +16,7 @@ from drivers.devices.csv_lines.inference import (
 )
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.errors import NoDataError, SettingsError
-from drivers.recognition import Recognition, is_recognised, rate_from_count
+from drivers.recognition import Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
 from drivers.stream import SampleSource, parse_settings
@@ -60,15 +60,9 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if unknown is not None:
             template = N_("column {name!r} is not known: allowed are {allowed}")
             raise SettingsError(template, name=unknown, allowed=list(Column))
-        return LineFormat(
-            tuple(map(Column, columns)),
-            SEPARATORS.get(self.separator, self.separator),
-            DECIMALS.get(self.decimal, self.decimal),
-            self.comment,
-            self.time_bits,
-            self.sequence_bits,
-            self.unit,
-        )
+        marks = SEPARATORS.get(self.separator, self.separator), DECIMALS.get(self.decimal, self.decimal)
+        bits = self.time_bits, self.sequence_bits
+        return LineFormat(tuple(map(Column, columns)), *marks, self.comment, *bits, self.unit)
 
 
 class CsvLinesSource(SampleSource):
@@ -212,12 +206,10 @@ def _recognise_lines(inferred: InferredColumns, data: bytes, duration_s: float |
     lines = LineParser(layout).read(whole)
     good = lines[lines["good"] != 0]
     share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)
-    if not is_recognised(len(good), share, has_checksum=layout.checksum in CHECKSUMS):
-        return None
     samples = len(good) + 1  # the first line was left out
     rate_hz = codec.rate_from_lines(layout, data) or rate_from_count(samples, duration_s)
     needs_rate = layout.time_column is None
     share, packets = min(share, 1.0), len(good)
-    return Recognition(
-        DRIVER.name, share, packets, layout.channels, inferred.settings, rate_hz, needs_rate, inferred.remark
-    )
+    settings, remark = inferred.settings, inferred.remark
+    found = Recognition(DRIVER.name, share, packets, layout.channels, settings, rate_hz, needs_rate, remark)
+    return unless_coincidence(found, has_checksum=layout.checksum in CHECKSUMS)

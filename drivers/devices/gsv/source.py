@@ -9,7 +9,7 @@ from drivers.devices.gsv import DRIVER, codec, commands
 from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.devices.gsv.commands import Code, InputType, Response
 from drivers.errors import ProtocolError
-from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
@@ -80,10 +80,9 @@ class GsvSource(SampleSource):
     def _require(self, link: Link, command: bytes, what: Message) -> None:
         response = self._ask(link, command)
         if response is None or not response.is_ok:
+            template = N_("the device does not take {what} ({fault}): choose what this model can do")
             raise ProtocolError(
-                "the device does not take {what} ({fault}): choose what this model can do",
-                what=what,
-                fault=response.fault if response else message("no answer"),
+                template, what=what, fault=response.fault if response else message("no answer")
             )
 
     def _set_up(self, link: Link) -> None:
@@ -138,25 +137,22 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> GsvSource:
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
-    found = codec.find_layout(data)
-    if found is None or found[0] < DRIVER.channels:
+    frame = codec.find_layout(data)
+    if frame is None or frame[0] < DRIVER.channels:
         return None
-    channels, kind = found
+    channels, kind = frame
     layout = FrameLayout(channels, kind)
     frames = sum(map(len, FrameDecoder(layout, 1.0).feed(data, 0)))
     share = frames * layout.length / max(len(data), 1)
-    if not is_recognised(frames, share, has_checksum=False):
-        return None
-    template = N_("of its {channels} channels say which the gauges are: {option} table=N {option} relative=N")
-    remark = message(template, option=option("--set"), channels=channels)
-    return Recognition(
-        DRIVER.name,
-        share,
-        frames,
-        settings={} if kind is ValueKind.FLOAT32 else {"format": "device"},
-        rate_hz=rate_from_count(frames, duration_s),
-        remark=remark if channels > DRIVER.channels else EMPTY,
-    )
+    settings, remark = {} if kind is ValueKind.FLOAT32 else {"format": "device"}, EMPTY
+    if channels > DRIVER.channels:
+        template = N_(
+            "of its {channels} channels say which the gauges are: {option} table=N {option} relative=N"
+        )
+        remark = message(template, option=option("--set"), channels=channels)
+    rate_hz = rate_from_count(frames, duration_s)
+    found = Recognition(DRIVER.name, share, frames, settings=settings, rate_hz=rate_hz, remark=remark)
+    return unless_coincidence(found, has_checksum=False)
 
 
 def _parse_firmware(received: bytes) -> Message | None:

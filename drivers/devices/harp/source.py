@@ -8,7 +8,7 @@ import numpy as np
 from drivers.devices.harp import DRIVER, codec
 from drivers.devices.harp.codec import EventDecoder, Register
 from drivers.errors import ProtocolError, SettingsError
-from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
@@ -80,12 +80,9 @@ class HarpSource(SampleSource):
             raise ProtocolError(template, number=who, expected=codec.WHO_AM_I)
         high, low = (self._read(link, r) for r in (Register.FIRMWARE_HIGH, Register.FIRMWARE_LOW))
         serial_number = self._read(link, Register.SERIAL_NUMBER)
-        self._identity = DeviceIdentity(
-            DRIVER.name,
-            "Harp LoadCells",
-            firmware="" if high is None or low is None else f"{high}.{low}",
-            serial_number="" if serial_number is None else str(serial_number),
-        )
+        firmware = "" if high is None or low is None else f"{high}.{low}"
+        serial = "" if serial_number is None else str(serial_number)
+        self._identity = DeviceIdentity(DRIVER.name, "Harp LoadCells", firmware, serial)
 
     def _read(self, link: Link, register: Register) -> int | None:
         command = codec.encode_read(register)
@@ -116,12 +113,11 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
     events = len(codec.event_times(data))
     share = events * codec.EVENT_BYTES / max(len(data), 1)
-    if not is_recognised(events, share, has_checksum=True):
-        return None
     rate_hz = codec.rate_from_events(data) or rate_from_count(events, duration_s)
     template = N_("say which channels the gauges are: {option} table=N {option} relative=N")
     remark = message(template, option=option("--set"))
-    return Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
+    found = Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
+    return unless_coincidence(found, has_checksum=True)
 
 
 def _parse_who_am_i(received: bytes) -> Message | None:

@@ -8,7 +8,7 @@ import numpy as np
 from drivers.devices.slipstand_binary import DRIVER, codec
 from drivers.devices.slipstand_binary.codec import FirmwareIdentity, FrameDecoder
 from drivers.errors import ProtocolError
-from drivers.recognition import IdentityQuery, Recognition, is_recognised, rate_from_count
+from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, parse_settings
@@ -105,10 +105,10 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     """What `data` are; see `drivers.recognition.recognise`."""
     frames = codec.find_frames(data)
     share = sum(codec.frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
-    if not is_recognised(len(frames), share, has_checksum=True):
-        return None
     rate_hz = codec.rate_from_frames(data) or rate_from_count(int(frames["n"].sum()), duration_s)
-    return Recognition(DRIVER.name, share, len(frames), rate_hz=rate_hz)
+    return unless_coincidence(
+        Recognition(DRIVER.name, share, len(frames), rate_hz=rate_hz), has_checksum=True
+    )
 
 
 def _parse_identity(received: bytes) -> Message | None:
