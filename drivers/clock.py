@@ -36,11 +36,9 @@ DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
 def rate_from_steps(steps_s: Floats, resolution_s: float = 0.0) -> float | None:
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
-    Steps of up to 1.5 times the median, or up to the median and the step of the clock, are one period each;
-    the rate is that of their mean. Longer steps span a gap, negative ones a restart of the device; either may
-    be a damaged digit. They are left out. `steps_s` (n,) are differences of consecutive device times (s),
-    `resolution_s` is the step of the device's clock. Returns None while there are fewer than 5 single periods
-    or 0.5 s of them.
+    Steps of up to 1.5 times the median, or up to the median and the step of the clock (`resolution_s`), are
+    one period each; the rate is that of their mean. Longer steps span a gap, negative ones a restart; either
+    may be a damaged digit. Returns None while there are fewer than 5 single periods or 0.5 s of them.
     """
     if len(steps_s) < MIN_STEPS:
         return None

@@ -64,13 +64,13 @@ class HostMonitor:
     _CLOCK_STEP_S = 0.5  # more than a time server slews in 0.1 s
 
     def __init__(self) -> None:
-        self._times_ns = self._read_clocks()
+        self._times_ns = host_ns(), suspended_ns(), time.time_ns()
 
     def check(self) -> list[Message]:
         """What happened since the last call; the clocks are read ten times a second at most."""
         if host_ns() - self._times_ns[0] < self._INTERVAL_NS:
             return []
-        before_ns, self._times_ns = self._times_ns, self._read_clocks()
+        before_ns, self._times_ns = self._times_ns, (host_ns(), suspended_ns(), time.time_ns())
         passed_s, suspended_s, wall_s = (
             (now - before) * 1e-9 for now, before in zip(self._times_ns, before_ns, strict=True)
         )
@@ -82,10 +82,6 @@ class HostMonitor:
         if abs(step_s) > self._CLOCK_STEP_S:
             found.append(message(_SET_FORWARD if step_s > 0 else _SET_BACK, step_s=abs(step_s)))
         return found
-
-    @staticmethod
-    def _read_clocks() -> tuple[int, int, int]:
-        return host_ns(), suspended_ns(), time.time_ns()
 
 
 _SUSPENDED = N_("this computer slept for {duration_s:.1f} s: switch its energy saving off to record")

@@ -98,9 +98,8 @@ class PortConfig:
         """Open the port of the same device, wherever it is now. Raises DriverError while it is gone."""
         url = find_replugged(lost)
         if url is None:
-            raise PortUnavailableError(
-                "the device of {port} is not there: plug it in again, into the same socket", port=lost.device
-            )
+            template = N_("the device of {port} is not there: plug it in again, into the same socket")
+            raise PortUnavailableError(template, port=lost.device)
         return open_port(url, self.baud, self.parity)
 
 

@@ -129,9 +129,8 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
     found = recognise(received)
     if found is not None and found.protocol != protocol and DRIVERS[found.protocol].frames_title:
         frames = message(DRIVERS[found.protocol].frames_title)
-        return message(
-            "these are {frames}, choose protocol {protocol}", frames=frames, protocol=found.protocol
-        )
+        template = N_("these are {frames}, choose protocol {protocol}")
+        return message(template, frames=frames, protocol=found.protocol)
     if is_text(received):
         line = _second_line(received)
         if driver.frames_title:

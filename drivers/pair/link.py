@@ -4,6 +4,7 @@ import contextlib
 import logging
 import queue
 import threading
+from typing import TypeAlias
 
 from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, QueueFullError
@@ -23,6 +24,7 @@ _STALL_S = 2.0  # a read of a polled device takes up to a second: after more, th
 _SILENT_SAMPLES = 5.0
 _RETRY_S = 0.2
 _WAIT_S = 0.05
+_Half: TypeAlias = tuple[OpenPort, PortConfig, SampleSource]
 _QUEUED_READS = 4096
 _MAX_READS = 256
 
@@ -44,10 +46,8 @@ class PairLink:
         is_resumed: bool = False,
     ) -> None:
         self._reads: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._readers = [
-            _ChannelReader(gauge, *half, self._reads, is_resumed=is_resumed)
-            for gauge, half in enumerate(zip(ports, configs, sources, strict=True))
-        ]
+        halves = enumerate(zip(ports, configs, sources, strict=True))
+        self._readers = [_ChannelReader(gauge, half, self._reads, is_resumed) for gauge, half in halves]
         self._is_ending = False
         for reader in self._readers:
             reader.thread.start()
@@ -113,22 +113,12 @@ def open_pair(
 class _ChannelReader:
     """Thread of one port: starts the device, reads it, stamps what came, reconnects it."""
 
-    def __init__(
-        self,
-        gauge: int,
-        port: OpenPort,
-        config: PortConfig,
-        source: SampleSource,
-        reads: "queue.SimpleQueue[bytes]",
-        *,
-        is_resumed: bool,
-    ) -> None:
-        self.info = port.info
+    def __init__(self, gauge: int, half: _Half, reads: "queue.SimpleQueue[bytes]", is_resumed: bool) -> None:
+        self._port: OpenPort | None
+        self._port, self._config, self._source = half
+        self.info = half[0].info
         self.failure: DriverError | None = None
         self._gauge = gauge
-        self._port: OpenPort | None = port
-        self._config = config
-        self._source = source
         self._reads = reads
         self._is_resumed = is_resumed
         self.stopping = threading.Event()

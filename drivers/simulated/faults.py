@@ -45,15 +45,14 @@ class FaultRates:
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             if not (math.isfinite(value) and value >= 0.0):
-                raise SettingsError(
-                    "{name} = {value:g} is no fraction of the frames: give 0 to 1", name=name, value=value
-                )
+                template = N_("{name} = {value:g} is no fraction of the frames: give 0 to 1")
+                raise SettingsError(template, name=name, value=value)
         if self.drop + self.flip + self.truncate > 1.0:
-            raise SettingsError(
+            template = N_(
                 "drop {drop:g}, flip {flip:g}, truncate {truncate:g} are more than all frames:"
-                " give 1 at most together",
-                **asdict(self),
+                " give 1 at most together"
             )
+            raise SettingsError(template, **asdict(self))
 
 
 class FrameDamager:
@@ -71,11 +70,11 @@ class FrameDamager:
         is_merged, self.is_line_open = self.is_line_open, False
         rates = self._rates
         draw = self._random.random()
-        if draw < rates.drop:
-            at = self._choose_byte(frame)
-            return frame[:at] if self.is_line_open else frame[:at] + frame[at + 1 :], FrameFault.DROP
         if draw < rates.drop + rates.flip:
-            return self._flip_bit(frame), FrameFault.FLIP
+            at = self._choose_byte(frame)
+            end = b"" if self.is_line_open else frame[at + 1 :]
+            changed = b"" if draw < rates.drop or self.is_line_open else self._flip_bit(frame[at])
+            return frame[:at] + changed + end, FrameFault.DROP if draw < rates.drop else FrameFault.FLIP
         if draw < rates.drop + rates.flip + rates.truncate:
             self.is_line_open = bool(self._line_end)  # a line loses its end too
             kept = self._random.randrange(1, len(frame) - len(self._line_end))
@@ -87,13 +86,10 @@ class FrameDamager:
         self.is_line_open = bool(self._line_end) and data[-1] not in self._line_end
         return data, FrameFault.GARBAGE
 
-    def _flip_bit(self, frame: bytes) -> bytes:
-        at = self._choose_byte(frame)
-        if self.is_line_open:
-            return frame[:at]
+    def _flip_bit(self, byte: int) -> bytes:
         # In text, only bits that make another digit or letter: a change of case may mean the same.
         bit = self._random.choice((0, 1, 2, 3, 6)) if self._line_end else self._random.randrange(8)
-        return frame[:at] + bytes([frame[at] ^ (1 << bit)]) + frame[at + 1 :]
+        return bytes([byte ^ (1 << bit)])
 
     def _choose_byte(self, frame: bytes) -> int:
         """Position of a byte; the end of a line counts as one byte, because one half still ends it."""
@@ -154,9 +150,8 @@ def parse_disturbance(text: str) -> Disturbance:
     kind, seconds, at = match.groups()
     at_s = None if at is None else float(at)
     if at_s is not None and not 0.0 <= at_s < math.inf:
-        raise SettingsError(
-            "{kind} at {at_s:g}: give the seconds after the start, from 0 on", kind=kind, at_s=at_s
-        )
+        template = N_("{kind} at {at_s:g}: give the seconds after the start, from 0 on")
+        raise SettingsError(template, kind=kind, at_s=at_s)
     return Disturbance(DisturbanceKind(kind.lower()), None if seconds is None else float(seconds), at_s)
 
 

@@ -49,7 +49,6 @@ class Transport(ABC):
         """Open the port again under its old address."""
 
     def close(self) -> None:
-        """Close the port for good."""
         self.unplug()
 
 
@@ -60,10 +59,7 @@ _SEND_BUFFER_BYTES = 1 << 16
 
 
 class _TcpPort(Transport):
-    """A TCP port for one reader at a time (a `Transport`), see `open_tcp_port`.
-
-    While a reader is connected the port does not listen, so the system refuses a second one.
-    """
+    """A TCP port; while a reader is connected it does not listen, so the system refuses a second one."""
 
     resets_device = False
     burst_s = 0.05
@@ -173,7 +169,7 @@ def _listener(number: int) -> socket.socket:
 
 
 class _PseudoTerminal(Transport):
-    """The device's end of a POSIX pseudo-terminal (a `Transport`), see `open_pseudo_terminal`.
+    """The device's end of a POSIX pseudo-terminal.
 
     Readers open a link to it, because a terminal that is opened again has another name. While no reader has
     the other end open, reading here fails or ends: this shows when a reader comes or leaves. `link` leads to

@@ -79,10 +79,8 @@ class LineDecoder(PacketDecoder):
     from the host's clock.
 
     The first line is left out, because it may be cut; lines before the first good one are a banner. Without a
-    checksum a damaged digit in a value is not noticed. `rate_hz` is the nominal rate, > 0, with a time column
-    that of its times (`rate_from_lines`); `clock_step_s` the step of the device's clock
-    (`clock_step_from_lines`). Readings of `overload_count` and more are marked. `max_gap_s` is the longest
-    gap that is believed.
+    checksum a damaged digit in a value is not noticed. `rate_hz` is, with a time column, that of its times;
+    `clock_step_s` the step of the device's clock. Readings of `overload_count` and more are marked.
     """
 
     def __init__(

@@ -56,17 +56,15 @@ class LineFormat:
             template = N_("separator {separator!r} cannot part numbers: give one of , ; tab space")
             raise SettingsError(template, separator=self.separator)
         if not self.comment.isascii() or any(mark in _OF_NUMBERS for mark in self.comment):
-            raise SettingsError(
-                "comment {comment!r} cannot mark comments: give characters such as #%;", comment=self.comment
-            )
+            template = N_("comment {comment!r} cannot mark comments: give characters such as #%;")
+            raise SettingsError(template, comment=self.comment)
         if self.unit and not (self.unit.isascii() and self.unit.isalpha()):
             raise SettingsError("unit {unit!r} is no word: give letters, for example kg", unit=self.unit)
         if self.decimal not in (".", ","):
             raise SettingsError("decimal {decimal!r} is not known: give . or ,", decimal=self.decimal)
         if self.decimal == self.separator:
-            raise SettingsError(
-                "separator and decimal are both {mark!r}: give another separator", mark=self.decimal
-            )
+            template = N_("separator and decimal are both {mark!r}: give another separator")
+            raise SettingsError(template, mark=self.decimal)
         for name, bits in (("time_bits", self.time_bits), ("sequence_bits", self.sequence_bits)):
             if bits != 0 and not _MIN_BITS <= bits <= _MAX_BITS:
                 template = N_("{name} {bits} is out of range: give {least} to {most}, or 0 for no wrap")
@@ -100,12 +98,10 @@ def _check_columns(columns: tuple[Column, ...]) -> None:
     readings = [column for column in columns if column in _READINGS]
     names = ",".join(columns)
     if sorted(readings) not in ([Column.RELATIVE, Column.TABLE], [Column.VALUE]):
-        raise SettingsError(
-            "columns {columns} need table and relative exactly once each, or value alone", columns=names
-        )
+        template = N_("columns {columns} need table and relative exactly once each, or value alone")
+        raise SettingsError(template, columns=names)
     if sum(column in TIME_UNIT_S for column in columns) > 1 or columns.count(Column.SEQUENCE) > 1:
-        raise SettingsError(
-            "columns {columns} hold more than one time or sequence: name others ignore", columns=names
-        )
+        template = N_("columns {columns} hold more than one time or sequence: name others ignore")
+        raise SettingsError(template, columns=names)
     if any(column in CHECKSUMS for column in columns[:-1]):
         raise SettingsError("columns {columns}: a checksum (xor, crc) can only be the last", columns=names)

@@ -92,11 +92,7 @@ class CsvLinesSource(SampleSource):
         list(LineDecoder(layout, 1.0).feed(b"\n" + codec.encode_line(layout, 0.0, 0, 0), 0))
 
     def start(self, link: Link) -> bytes:
-        """Wait for the first good line, and with a time column for as many as show the rate.
-
-        Opening the port resets many Arduinos, which are silent for two seconds after it. Raises SettingsError
-        where the device's own times show another rate than the one asked for.
-        """
+        """Wait for the first good line, and with a time column for as many as show the rate."""
         self.prepare()
         link.read()  # what waited in the port is old, and some of it may be lost
         first = self.await_stream(link, self._has_good_line, self.timeout_s)
@@ -120,8 +116,7 @@ class CsvLinesSource(SampleSource):
     def make_decoder(self, data: bytes) -> LineDecoder | None:
         """Decoder once the layout is known, and the rate is given or shown by the device's own times.
 
-        Where both rates are there and disagree, the first lines may be damaged: more of them are awaited.
-        Raises SettingsError if many lines still disagree, or neither rate can be known.
+        Where both disagree, the first lines may be damaged: more are awaited, then SettingsError is raised.
         """
         layout = self._layout = self._layout or self.find_layout(data)
         if layout is None:

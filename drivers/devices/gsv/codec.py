@@ -222,7 +222,7 @@ def find_frames(
 
 @compiled
 def count_packets(packets: Records, states: Records) -> None:
-    """Add `packets` to the counts in `states` (1,)."""
+    """Add packets to the counts in `states` (1,)."""
     state = states[0]
     for packet in packets:
         count_packet(state, packet, True)

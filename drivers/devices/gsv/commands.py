@@ -87,9 +87,8 @@ def encode_request(code: Code, parameters: bytes = b"") -> bytes:
 def write_rate(rate_hz: float) -> bytes:
     """Request that sets the rate. Raises SettingsError above 48 kHz, the highest rate of any GSV."""
     if not 0 < rate_hz <= 48_000:
-        raise SettingsError(
-            "rate {rate_hz:g} Hz cannot be set: give 1 to 48000, as the amplifier allows", rate_hz=rate_hz
-        )
+        template = N_("rate {rate_hz:g} Hz cannot be set: give 1 to 48000, as the amplifier allows")
+        raise SettingsError(template, rate_hz=rate_hz)
     return encode_request(Code.WRITE_RATE, struct.pack(">f", rate_hz))
 
 

@@ -244,8 +244,7 @@ class EventDecoder(PacketDecoder):
     An event that comes k periods after the one before shows k - 1 lost ones (`missing_estimated`); as many
     of them as the bytes between can have held are damaged. Other messages are skipped. A time out of sequence
     is believed only if the next event confirms it, because a checksum of eight bits passes one in 256 damaged
-    events. `table` and `relative` are the channels of the gauges, 0 to 7. Readings of `overload_count` and
-    more are marked as overloaded. `max_gap_s` is the longest gap that is believed.
+    events. `table` and `relative` are the channels of the gauges. Readings of `overload_count` are overloads.
     """
 
     def __init__(

@@ -77,11 +77,9 @@ class SimulatedModbus(PolledProtocol):
         unit, function = command.code, command.parameters[0]
         if unit not in {channel.unit for channel in self._channels.values()}:
             return b""
-        if function in frames.READ_FUNCTIONS:
-            return self._read(unit, function, command.parameters)
         if function in frames.WRITE_FUNCTIONS:
             return self._write(unit, function, command.parameters)
-        return frames.encode_exception(unit, function, _ILLEGAL_FUNCTION)
+        return self._read(unit, function, command.parameters)
 
     def _read(self, unit: int, function: int, asked: bytes) -> bytes:
         first, count = struct.unpack_from(">HH", asked, 1)

@@ -44,9 +44,8 @@ class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not 0.005 <= self.timeout_s <= 1.0:
-            raise SettingsError(
-                "timeout_s {timeout_s:g} is out of range: give 0.005 to 1", timeout_s=self.timeout_s
-            )
+            template = N_("timeout_s {timeout_s:g} is out of range: give 0.005 to 1")
+            raise SettingsError(template, timeout_s=self.timeout_s)
 
     @property
     def gauges(self) -> tuple[str, ...]:

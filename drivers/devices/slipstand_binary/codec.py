@@ -103,11 +103,9 @@ def encode_frame(first_index: int, time_us: int, counts: Int32s, flags: int = 0)
 def encode_frames(first_index: int, times_us: Ints, counts: Int32s, flags: int | UInt8s = 0) -> UInt8s:
     """Many frames of equal length, as a device without faults sends them.
 
-    `first_index` is that of the very first sample, sent modulo 2**32; each sample has the next one.
-    `times_us` (frames,) is the device time of the first sample of each frame (us), sent modulo 2**32.
-    `counts` (frames * n, 2) int32 are readings of both channels, n of them a frame, 1 <= n <= 32; `flags` the
-    `FrameFlags` of all or of each frame. Returns (frames, 15 + 8 n) uint8, a frame a row. Raises ValueError
-    if the samples do not fill the frames.
+    `first_index` is that of the first sample, `times_us` (frames,) the device time of the first sample of
+    each frame (us); both are sent modulo 2**32. `counts` (frames * n, 2) fill n samples, 1 to 32, into each
+    frame (else ValueError); `flags` are `FrameFlags`. Returns (frames, 15 + 8 n) uint8, a frame a row.
     """
     frames = len(times_us)
     n, rest = divmod(len(counts), max(frames, 1))

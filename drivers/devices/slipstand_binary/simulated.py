@@ -25,9 +25,7 @@ class SimulatedBinary(SimulatedProtocol):
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         matches = list(_COMMAND.finditer(data))
         unfinished = data.rfind(b"R", matches[-1].end() if matches else 0)
-        commands = [
-            Command(CommandKind.RATE, float(m[1])) if m[1] else Command(_KINDS[m[0]]) for m in matches
-        ]
+        commands = [Command(_KINDS.get(m[0], CommandKind.RATE), float(m[1] or 0)) for m in matches]
         return commands, unfinished if unfinished >= 0 else len(data)
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
