@@ -61,8 +61,8 @@ def save_calibration(
 ) -> Path:
     """Write a new calibration file: `base` with new values of the gauges named, its comments kept.
 
-    Without a `path` it gets a dated name in the folder of settings, `gauges-2026-01-12.toml`. No file is ever
-    overwritten. Returns the path. Raises ConfigError.
+    Without a `path` it gets a dated name in the folder of settings, `gauges-2026-01-12.toml`. Returns the
+    path; no file is ever overwritten. Raises ConfigError.
     """
     import tomlkit  # only needed to write
 

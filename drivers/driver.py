@@ -46,7 +46,6 @@ class DeviceDriver:
         return bool(self.package)
 
     def default_baud_for(self, settings: Mapping[str, str]) -> int:
-        """Baud rate of a device with its own `settings`; 0 where none is usual."""
         return self.format_bauds.get(settings.get("format", ""), self.default_baud)
 
     def make_source(self, settings: Mapping[str, str], rate_hz: float | None) -> "SampleSource":

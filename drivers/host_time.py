@@ -57,7 +57,6 @@ class HostMonitor:
     """Detects that this computer was suspended, stood still, or had its clock set; to be checked often."""
 
     _INTERVAL_NS = 100_000_000
-
     _SUSPENDED_S = 0.5
     _STALLED_S = 3.0
     """Longer than a busy computer stops any process, shorter than a stall that loses bytes unseen."""

@@ -67,7 +67,9 @@ def count_lines(
             elif line.start >= hold_from:
                 return found, i
         if step == _CORRUPT or step == 0:
-            _discard(stream, line, step)
+            stream.discarded_bytes += line.end - line.start
+            stream.repeated += step == 0
+            stream.broken += step != 0 and stream.started
             continue
         _fill_packet(stream, rule, line, step, packets[found])
         counts[found, 0] = line.table
@@ -123,15 +125,6 @@ def _confirmed_step(stream: Record, rule: Record, line: Record, step: int, after
     if _advance(after.time - line.time, rule.time_wrap) < 0:
         return _CORRUPT
     return max(1, to_after - 1)  # the line was only late
-
-
-@inlined
-def _discard(stream: Record, line: Record, step: int) -> None:
-    stream.discarded_bytes += line.end - line.start
-    if step == 0:
-        stream.repeated += 1
-    elif stream.started:
-        stream.broken += 1
 
 
 @inlined

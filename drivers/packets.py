@@ -16,7 +16,6 @@ from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 
 MAX_BLOCK_ROWS = 65536  # a long gap becomes several blocks, so that no block is large
-
 MAX_GAP_S = 600.0
 """Longest gap that is believed. A sequence or time that leaps further is a new start of the device."""
 
@@ -67,7 +66,6 @@ class PacketDecoder(Decoder):
 
     _piece_bytes = 1 << 16  # long data are decoded in pieces that fit a processor's cache
     _has_time = True  # whether the device sends its time
-
     _loss_estimator: "LossEstimator | None" = None  # for a device whose stream proves no loss
 
     def __init__(self, state: np.dtype[np.void], rate_hz: float, max_gap_s: float) -> None:

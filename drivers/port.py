@@ -65,7 +65,6 @@ class PortInfo:
         return f"{self.device} USB {self.vendor_id:04x}:{self.product_id:04x} {self.serial_number}".rstrip()
 
     def is_same_device(self, other: "PortInfo") -> bool:
-        """Whether both are one USB device, whatever the names of their ports."""
         own = (self.vendor_id, self.product_id, self.serial_number)
         return self.vendor_id is not None and own == (other.vendor_id, other.product_id, other.serial_number)
 

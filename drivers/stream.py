@@ -215,8 +215,7 @@ class SampleSource(ABC):
 def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) -> _Settings:
     """Device settings, given as text, as the driver's typed struct. Raises SettingsError."""
     allowed = [field.name for field in msgspec.structs.fields(kind)]
-    unknown = next((key for key in given if key not in allowed), None)
-    if unknown is not None:
+    for unknown in sorted(given.keys() - set(allowed)):
         template = N_("setting {key!r} is not known to {protocol}: it has none")
         if allowed:
             template = N_("setting {key!r} is not known to {protocol}: allowed are {allowed}")

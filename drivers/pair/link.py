@@ -54,7 +54,6 @@ class PairLink:
 
     @property
     def infos(self) -> tuple[PortInfo, PortInfo]:
-        """Each port, to open both again."""
         return self._readers[0].info, self._readers[1].info
 
     @property

@@ -58,7 +58,6 @@ class PairSource(SampleSource):
 
     @property
     def run_note(self) -> Message:
-        """Notes of both devices, equal ones once."""
         notes = [channel.source.run_note for channel in self.channel_sources]
         return joined(list({str(note): note for note in notes if note}.values()), "; ")
 

@@ -59,10 +59,8 @@ def make_device(
 class SimulatedDevice:
     """Firmware of the simulated amplifier. The caller runs `step` as often as it asks for.
 
-    Sample k is taken at k / rate of the device's own clock, counted from the start of the stream. A stream
-    starts by command, or when the port is opened.
-
-    The stand's own time begins with a session, which is a stream that is started afresh. A stream that is
+    A stream starts by command, or when the port is opened; sample k is taken at k / rate of the device's own
+    clock. The stand's own time begins with a session: a stream that is started afresh. A stream that is
     started after the last one was interrupted (cable, power, or a reader that left without a command)
     continues the session, because the stand does not wait. A stream that resumed by itself may be stopped and
     started once within the session.
@@ -251,7 +249,6 @@ class RegisterUpdater:
     started_ns: int
 
     def send_due(self, now_ns: int, has_reader: bool) -> float:  # noqa: ARG002 - registers need no reader
-        """Take the samples that are due; returns seconds until the next call, requests or not."""
         taken = math.floor((now_ns - self.started_ns) * 1e-9 * self.log.true_rate_hz) + 1
         due = taken - self.log.samples
         if due > 0:

@@ -129,7 +129,6 @@ class Disturbance:
 
     @property
     def end_s(self) -> float:
-        """When it is over; infinite where it lasts for ever."""
         return math.inf if self.seconds is None else (self.at_s or 0.0) + self.seconds
 
 

@@ -96,7 +96,7 @@ def test_a_port_that_this_user_may_not_open(tmp_path, monkeypatch):
     port = tmp_path / "ttyACM0"
     port.touch()
     monkeypatch.setattr(os, "access", lambda *_: False)
-    monkeypatch.setattr(host_checks, "_group_of", lambda _: "uucp")
+    monkeypatch.setattr(Path, "group", lambda _: "uucp")
     (hint,) = port_hints(PortInfo(str(port)), **folders(tmp_path))
     assert str(hint.message) == f"{port} may not be opened by this user (group uucp may)"
     assert str(hint.remedy) == "Run: sudo usermod -aG uucp $USER, then log in again"
@@ -124,7 +124,6 @@ def test_names_of_chips(vendor_id, product_id, name):
 
 
 def test_the_rule_covers_every_known_maker():
-    from drivers import host_checks
 
     rule = (Path(__file__).parents[2] / "config/udev/60-slipstand.rules").read_text("utf-8")
     (line,) = [line for line in rule.splitlines() if "ATTRS{idVendor}" in line]

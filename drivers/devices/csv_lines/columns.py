@@ -86,7 +86,6 @@ class LineFormat:
 
     @property
     def sequence_wrap(self) -> int:
-        """Value at which the sequence wraps; 0: it does not."""
         return 1 << self.sequence_bits if self.sequence_bits else 0
 
     @property

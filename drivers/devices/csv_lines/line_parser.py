@@ -11,20 +11,10 @@ from drivers.line_counting import LINE
 
 ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
 ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)
-_ROLES = {
-    Column.IGNORE: ROLE_IGNORE,
-    Column.TIME_US: ROLE_TIME,
-    Column.TIME_MS: ROLE_TIME,
-    Column.TIME_S: ROLE_TIME,
-    Column.SEQUENCE: ROLE_SEQUENCE,
-    Column.TABLE: ROLE_TABLE,
-    Column.RELATIVE: ROLE_RELATIVE,
-    Column.VALUE: ROLE_TABLE,
-    Column.UNIT: ROLE_UNIT,
-    Column.EMPTY: ROLE_EMPTY,
-    Column.XOR: ROLE_XOR,
-    Column.CRC: ROLE_CRC,
-}
+_ROLES = dict.fromkeys((Column.TIME_US, Column.TIME_MS, Column.TIME_S), ROLE_TIME)
+_ROLES |= {Column.TABLE: ROLE_TABLE, Column.RELATIVE: ROLE_RELATIVE, Column.VALUE: ROLE_TABLE}
+_ROLES |= {Column.SEQUENCE: ROLE_SEQUENCE, Column.IGNORE: ROLE_IGNORE, Column.UNIT: ROLE_UNIT}
+_ROLES |= {Column.EMPTY: ROLE_EMPTY, Column.XOR: ROLE_XOR, Column.CRC: ROLE_CRC}
 
 MARKS = record_type("separator decimal", "")
 

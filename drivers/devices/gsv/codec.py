@@ -128,13 +128,13 @@ class FrameDecoder(PacketDecoder):
     An overload is marked on both gauges, because the device does not report its input.
     """
 
+    _has_time = False
+
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         super().__init__(STATE, rate_hz, max_gap_s)
         self._layout = layout
         self._pattern = frame_pattern(layout)
         self._loss_estimator = LossEstimator(rate_hz)
-
-    _has_time = False
 
     def expect_restart(self) -> None:
         self._state["garbage"] += len(self._unfinished)

@@ -17,12 +17,7 @@ from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
 _TRIES = 2
-_INPUTS = {
-    "bridge-8.75v": InputType.BRIDGE_8_75_V,
-    "bridge-5v": InputType.BRIDGE_5_V,
-    "bridge-2.5v": InputType.BRIDGE_2_5_V,
-    "single-ended": InputType.SINGLE_ENDED,
-}
+_INPUTS = dict(zip(("bridge-8.75v", "bridge-5v", "bridge-2.5v", "single-ended"), InputType, strict=True))
 
 
 class GsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -67,7 +62,6 @@ class GsvSource(SampleSource):
         return received
 
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
-        """Decoder once the rate is known and `data` show the layout of frames. Raises ProtocolError."""
         if self._rate_hz is None:
             return None
         if self._layout is None:

@@ -123,10 +123,8 @@ def find_messages(data: bytes) -> tuple[list[HarpMessage], int]:
 
 def find_reply(received: bytes, register: Register) -> HarpMessage | None:
     """Reply of the device about a register, done or refused; None while there is none."""
-    for message in find_messages(received)[0]:
-        if message.address == register and message.kind & ~ERROR in (READ, WRITE):
-            return message
-    return None
+    replies = (one for one in find_messages(received)[0] if one.kind & ~ERROR in (READ, WRITE))
+    return next((reply for reply in replies if reply.address == register), None)
 
 
 CHANNELS = 8

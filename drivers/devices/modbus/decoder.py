@@ -35,7 +35,7 @@ class ResponseDecoder(Decoder):
     Modbus exception is missing.
 
     `device_time_s` of the blocks is the time of measurement, `arrival_ns` that of the last row. `columns` are
-    those of the channels of `poll`: 0 is table, 1 relative. `max_gap_s` is the longest gap that is believed.
+    those of the channels of `poll`: 0 is table, 1 relative.
     """
 
     def __init__(

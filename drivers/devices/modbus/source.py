@@ -116,7 +116,6 @@ class ModbusSource(SampleSource):
         return b""
 
     def resume(self, link: Link) -> bytes:
-        """Continue with a device that answers again, at the same rate."""
         self._await_responses(link)
         self._response_overdue = self._was_invalid = False
         return b""
@@ -157,7 +156,6 @@ class ModbusSource(SampleSource):
         return wrapped
 
     def take_warnings(self) -> list[Message]:
-        """Warning that this computer is too busy to poll in time, each time that it becomes so."""
         return [self._warnings.popleft() for _ in range(len(self._warnings))]
 
     def make_decoder(self, data: bytes) -> ResponseDecoder:  # noqa: ARG002 - settings and rate are enough
@@ -251,14 +249,12 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
     """Settings of the driver, and the register map that they choose and change. Raises SettingsError."""
     own = {key: value for key, value in settings.items() if not is_map_key(key)}
     known = {field.name for field in msgspec.structs.fields(ModbusSettings)}
-    unknown = next((key for key in own if key not in known), None)
-    if unknown is not None:
+    for key in sorted(own.keys() - known):
         template = N_(
             "setting {key!r} is not known to {protocol}: allowed are {allowed}, the keys of a map also"
             " for one gauge, such as table_register"
         )
-        allowed = [*sorted(known), *MAP_KEYS]
-        raise SettingsError(template, key=unknown, protocol=DRIVER.name, allowed=allowed)
+        raise SettingsError(template, key=key, protocol=DRIVER.name, allowed=[*sorted(known), *MAP_KEYS])
     parsed = parse_settings(ModbusSettings, own, DRIVER.name)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(parsed.map, given, parsed.gauges)
