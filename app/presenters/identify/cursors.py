@@ -10,8 +10,7 @@ from app.presenters import number_text
 from app.presenters.identify.state import Cursor, Cursors, Floats, PlottedQuantity
 from messages.i18n import ngettext
 
-_FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5
-"""Initial places of the cursors, as shares of the visible span."""
+_FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5  # initial places of the cursors, as shares of the visible span
 _PERIOD_TOLERANCE = 0.2
 """A distance that differs from a whole number of periods by less (in periods) is shown as periods."""
 _DECIMALS = {"s": 4, "mm": 3, "µm": 1, "mm/s": 2, "m/s²": 3}

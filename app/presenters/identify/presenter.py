@@ -30,8 +30,7 @@ else:
     analysis_task = LazyModule("app.presenters.analysis_task")
     tasks = LazyModule("app.presenters.identify.tasks")
 
-_PIXELS = 1000
-"""Width of the curves before the view reports it."""
+_PIXELS = 1000  # width of the curves before the view reports it
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 """Differences of BIC after Kass and Raftery (1995): below 2 not worth mentioning, above 10 very strong."""
-_NO_BETTER = 1.001
-"""Ratio of residuals up to which the record does not distinguish two laws."""
+_NO_BETTER = 1.001  # ratio of residuals up to which the record does not distinguish two laws
 _RESIDUALS_SHOWN = 4
 _PAPER_DECIMALS = 3
 

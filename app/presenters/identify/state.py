@@ -28,8 +28,7 @@ class ChannelCurves:
 class Curves:
     """A run for drawing."""
 
-    time_s: Floats
-    """(n,) float64: from the release; without one, from the start of the record."""
+    time_s: Floats  # (n,) float64: from the release; without one, from the start of the record
     time_label: str
     channels: tuple[ChannelCurves, ...]
     """Of the table, then of gauge 2 if there is one."""
@@ -54,8 +53,7 @@ class PlotTab(StrEnum):
 class PlottedQuantity:
     """A plotted line that cursors read; times (n,) rise, values (n,) are NaN where missing."""
 
-    symbol: str
-    """As rich text."""
+    symbol: str  # as rich text
     unit: str
     time_s: Floats
     values: Floats
@@ -98,12 +96,10 @@ class Cursors:
     active: Cursor = Cursor.B
     symbols: tuple[str, ...] = ()
     """Symbols of the values on the current tab, as rich text."""
-    values: tuple[tuple[float, ...], ...] = ()
-    """A row each for A and B; NaN beside a line."""
+    values: tuple[tuple[float, ...], ...] = ()  # a row each for A and B; NaN beside a line
     cells: tuple[tuple[str, ...], ...] = ()
     """A row each for A, B and B − A: name, time, and the values with their units."""
-    period: str = ""
-    """Distance in periods, or its reciprocal."""
+    period: str = ""  # distance in periods, or its reciprocal
 
     def at(self, cursor: Cursor) -> float:
         return self.a_s if cursor is Cursor.A else self.b_s

@@ -2,46 +2,54 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.presenters import number_text
 from app.presenters.base import Chip, Tone, run_count_text
 from app.presenters.results import sentence
-from app.presenters.runs.state import METADATA_FIELDS, BatchOutcome
+from app.presenters.runs.state import METADATA_FIELDS
 from app.presenters.worker import LazyModule
 from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
+    from app.runs import edits, file_operations
 else:
     tasks = LazyModule("app.presenters.runs.tasks")
+    edits = LazyModule("app.runs.edits")
+    file_operations = LazyModule("app.runs.file_operations")
 
 Paths = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change of runs: a task with its arguments."""
+    """A change of runs: `function(path, *arguments)` for each of them, as `tasks.change_runs` does it."""
 
-    task: Callable[..., BatchOutcome]
+    paths: Paths
+    function: Callable[..., object]
     arguments: tuple[Any, ...]
-    text: Callable[[str], str]
-    """Makes the message of the name or the number of the changed runs."""
+    progress: str
+    text: Callable[[str], str]  # makes the message of the name or the number of the changed runs
     undo: Callable[[Paths], "Change"] | None = None
     """Makes the change that undoes this one in the runs that were changed."""
-    undone_text: str = ""
-    """Description of the change that this one undoes."""
+    undone_text: str = ""  # description of the change that this one undoes
 
 
 def edit(paths: Paths, field: str, value: object, author: str) -> Change:
     name = gettext(METADATA_FIELDS[field].name)
     return Change(
-        tasks.edit_runs,
-        (paths, field, value, author),
+        paths,
+        tasks.edit,
+        (field, value, author),
+        gettext("Editing"),
         lambda runs: gettext("Changed the {field} of {runs}", field=name, runs=runs),
         lambda done: Change(
-            tasks.undo_edits,
-            (done, field, author),
+            done,
+            edits.undo_edit,
+            (author, (field,)),
+            gettext("Undoing"),
             lambda runs: gettext("Undone in {runs}", runs=runs),
             undone_text=gettext("change of {field}", field=name),
         ),
@@ -50,12 +58,16 @@ def edit(paths: Paths, field: str, value: object, author: str) -> Change:
 
 def trash(paths: Paths) -> Change:
     return Change(
-        tasks.trash_runs,
-        (paths,),
+        paths,
+        file_operations.move_to_trash,
+        (),
+        gettext("Moving to the trash"),
         lambda runs: gettext("Moved {runs} to the trash", runs=runs),
         lambda done: Change(
-            tasks.restore_runs,
-            (done,),
+            done,
+            file_operations.restore_from_trash,
+            (),
+            gettext("Bringing back"),
             lambda runs: gettext("Brought back {runs}", runs=runs),
             undone_text=gettext("move of {runs} to the trash", runs=run_count_text(done)),
         ),
@@ -64,8 +76,10 @@ def trash(paths: Paths) -> Change:
 
 def copy(paths: Paths, folder: str) -> Change:
     return Change(
-        tasks.copy_runs,
-        (paths, folder),
+        paths,
+        file_operations.copy_run_into,
+        (Path(folder),),
+        gettext("Copying"),
         lambda runs: gettext("Copied {runs} into this folder", runs=runs),
     )
 

@@ -10,18 +10,15 @@ from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES, parse_
 from app.runs.errors import ConditionError, MetadataError
 from messages.i18n import N_, gettext, translate
 
-GAIN = "gain"
-"""Choice of `unit` for a gain instead."""
-Form = Mapping[str, str]
-"""Texts as typed, or chosen values, by name of the field."""
+GAIN = "gain"  # choice of `unit` for a gain instead
+Form = Mapping[str, str]  # texts as typed, or chosen values, by name of the field
 
 
 @dataclass(frozen=True, slots=True)
 class NumberRule:
     """Which numbers a field takes."""
 
-    fault: str
-    """Message about another text, with the field `{text}`."""
+    fault: str  # message about another text, with the field `{text}`
     is_valid: Callable[[float], bool] = lambda _: True
     convert: Callable[[float], float] = float
 
@@ -34,8 +31,7 @@ class Field:
     title: str
     hint: str = ""
     """What holds if nothing is typed."""
-    option: str = ""
-    """Option of `slipstand import`, as messages of the importer name it."""
+    option: str = ""  # option of `slipstand import`, as messages of the importer name it
     choices: Mapping[str, str] | None = None
     """Titles by value, the first as default; empty for columns of the file, None for a line of text."""
     rule: NumberRule | None = None
@@ -143,8 +139,7 @@ RARE_GROUPS = {
 FIELDS = {field.name: field for group in (GROUPS | RARE_GROUPS).values() for field in group}
 COLUMN_FIELDS = ("time", "table", "second")
 """Names of columns, as in `FilePreview.columns`."""
-GAIN_FIELDS = ("gain", "offset", "unit_name")
-"""Fields that hold only where `unit` is `GAIN`."""
+GAIN_FIELDS = ("gain", "offset", "unit_name")  # fields that hold only where `unit` is `GAIN`
 LINE_FIELDS = tuple(field.name for field in _LINES)
 PER_FILE_FIELDS = ("note", "run_in_number", "name", "delimiter", "decimal", "header")
 """Fields that are cleared for the next file."""

@@ -39,8 +39,7 @@ _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can 
 class ImportState:
     """State of the dialog."""
 
-    path: str = ""
-    """The current file; empty without one. `pending` others wait."""
+    path: str = ""  # the current file; empty without one. `pending` others wait.
     pending: int = 0
     columns: tuple[str, ...] = ()
     column_labels: tuple[str, ...] = ()

@@ -170,8 +170,11 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _submit(self, change: Change) -> None:
         self._worker.submit(
-            change.task,  # type: ignore[arg-type]  # of any arguments
-            *change.arguments,
+            tasks.change_runs,
+            change.paths,
+            change.function,
+            change.arguments,
+            change.progress,
             done=partial(self._on_changed, change),
             failed=self._on_failed,
             progress=self._set_progress,

@@ -80,10 +80,8 @@ METADATA_FIELDS = {
 class MetadataForm:
     """Metadata of the selected runs, as typed, by `METADATA_FIELDS`."""
 
-    texts: dict[str, str]
-    """Empty in fields of `mixed`."""
-    mixed: frozenset[str] = frozenset()
-    """Fields in which the runs differ."""
+    texts: dict[str, str]  # empty in fields of `mixed`
+    mixed: frozenset[str] = frozenset()  # fields in which the runs differ
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -142,8 +140,7 @@ class RunsState:
     folder: str = ""
     rows: tuple[RunRow, ...] = ()
     """Runs that match the filter, sorted."""
-    total: int = 0
-    """Number of runs in the folder."""
+    total: int = 0  # number of runs in the folder
     is_listed: bool = False
     all_series: tuple[str, ...] = ()
     filter: RunFilter = RunFilter()

@@ -19,11 +19,10 @@ from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.blocks import RunBlock
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
-from app.runs.edits import edit_run, series_fields, undo_edit
+from app.runs.edits import edit_run, series_fields
 from app.runs.errors import RunError
 from app.runs.exchange import importing
 from app.runs.exchange.exporting import ExportRequest, export_runs
-from app.runs.file_operations import copy_run_into, move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
 from app.runs.reader import open_run
 from app.runs.summary import RunSummary
@@ -32,12 +31,9 @@ from config.files import load_stand
 from config.schema import ConfigError, SeriesError
 from messages.i18n import N_, gettext, ngettext, translate
 
-MAX_OVERLAID_RUNS = 8
-"""More curves over one another cannot be told apart by eye."""
-_DRAWN_SPANS = 1500
-"""Extremes are kept for so many intervals of time: at least one a pixel of the preview."""
-_BEFORE_RELEASE_S = 1.0
-"""Drawn part of the hold before the release."""
+MAX_OVERLAID_RUNS = 8  # more curves over one another cannot be told apart by eye
+_DRAWN_SPANS = 1500  # extremes are kept for so many intervals of time: at least one a pixel of the preview
+_BEFORE_RELEASE_S = 1.0  # drawn part of the hold before the release
 _TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
 _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 """What fits into the preview of the export dialog."""
@@ -51,52 +47,35 @@ def list_folder(folder: str, report: ReportProgress) -> tuple[RunSummary, ...]:
     return tuple(list_runs(path, progress=lambda done, count: report(Progress(text, done / count))))
 
 
-def edit_runs(
-    paths: tuple[str, ...], field: str, value: Any, author: str, report: ReportProgress
+def change_runs(
+    paths: tuple[str, ...],
+    change: Callable[..., object],
+    arguments: tuple[Any, ...],
+    what: str,
+    report: ReportProgress,
 ) -> BatchOutcome:
-    """Set a field of `RunMetadata`; a series also sets its pullback and plate mass."""
+    """Call `change(path, *arguments)` for every run; one that fails does not stop the rest.
 
-    def edit(path: Path) -> None:
-        fields = {field: value}
-        if field == "series":
-            fields = series_fields(open_run(path).metadata.stand, value)
-        edit_run(path, author, **fields)
-
-    return _each(paths, edit, report, gettext("Editing"))
-
-
-def undo_edits(paths: tuple[str, ...], field: str, author: str, report: ReportProgress) -> BatchOutcome:
-    """Undo the last edit of a field in each run."""
-    return _each(paths, lambda path: undo_edit(path, author, (field,)), report, gettext("Undoing"))
-
-
-def trash_runs(paths: tuple[str, ...], report: ReportProgress) -> BatchOutcome:
-    return _each(paths, move_to_trash, report, gettext("Moving to the trash"))
-
-
-def restore_runs(paths: tuple[str, ...], report: ReportProgress) -> BatchOutcome:
-    return _each(paths, restore_from_trash, report, gettext("Bringing back"))
-
-
-def copy_runs(paths: tuple[str, ...], folder: str, report: ReportProgress) -> BatchOutcome:
-    """Copy run files into a folder, under free names."""
-    return _each(paths, lambda path: copy_run_into(path, Path(folder)), report, gettext("Copying"))
-
-
-def _each(
-    paths: tuple[str, ...], act: Callable[[Path], object], report: ReportProgress, what: str
-) -> BatchOutcome:
-    """Process every run; one that fails does not stop the rest. `act` returns where a moved run is now."""
+    `change` returns where a moved run is now. `what` is shown with the name of each run.
+    """
     done, faults = [], []
     for number, path in enumerate(map(Path, paths)):
         report(Progress(f"{what} {path.name}", number / len(paths)))
         try:
-            moved = act(path)
+            moved = change(path, *arguments)
         except (RunError, AnalysisError, ConfigError, ValueError) as error:
             faults.append(f"{path.name}: {error}")
         else:
             done.append(str(moved if isinstance(moved, Path) else path))
     return BatchOutcome(tuple(done), tuple(faults))
+
+
+def edit(path: Path, field: str, value: Any, author: str) -> None:
+    """Set a field of `RunMetadata`; a series also sets its pullback and plate mass."""
+    fields = {field: value}
+    if field == "series":
+        fields = series_fields(open_run(path).metadata.stand, value)
+    edit_run(path, author, **fields)
 
 
 def export_files(

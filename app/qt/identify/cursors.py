@@ -61,8 +61,7 @@ class CursorLines(QObject):
         self.moved.emit(cursor, at_s)
 
 
-_MOST_CELLS = 6
-"""Columns of `Cursors.cells`: name, time, and four values on the phase plane."""
+_MOST_CELLS = 6  # columns of `Cursors.cells`: name, time, and four values on the phase plane
 
 
 class CursorBar(QWidget):

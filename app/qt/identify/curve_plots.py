@@ -46,8 +46,7 @@ class CurvePlots(QWidget):
     change comes from pictures that Qt keeps, so that a frame costs two short lines a plot.
     """
 
-    span_changed = Signal(float, float, int)
-    """What of the time axis is drawn (s), and how wide in pixels."""
+    span_changed = Signal(float, float, int)  # what of the time axis is drawn (s), and how wide in pixels
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

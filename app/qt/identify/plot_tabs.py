@@ -40,8 +40,7 @@ _TIME_PLOTS = {
     ),
 }
 """Titles of the plots, and colours of the lines of the tab in the same order."""
-_STEP, _LONG_STEP = 1, 10
-"""Samples by which an arrow key moves a cursor, and one with Shift."""
+_STEP, _LONG_STEP = 1, 10  # samples by which an arrow key moves a cursor, and one with Shift
 _DIRECTIONS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 _CURSOR_KEYS = {Qt.Key.Key_A: Cursor.A, Qt.Key.Key_B: Cursor.B}
 

@@ -52,9 +52,9 @@ def test_each_change_is_said(change: Change, words: str) -> None:
 
 def test_the_way_back_leads_to_where_the_runs_are_now() -> None:
     restore = undo(TRASH, "/runs/.trash/a.h5", "/runs/.trash/b.h5")
-    assert restore.arguments == (("/runs/.trash/a.h5", "/runs/.trash/b.h5"),)
+    assert restore.paths == ("/runs/.trash/a.h5", "/runs/.trash/b.h5")
     assert restore.undone_text == "move of 2 runs to the trash"
-    assert undo(EDIT, *TWO).arguments == (TWO, "plate_mass_kg", "me")
+    assert (undo(EDIT, *TWO).paths, undo(EDIT, *TWO).arguments) == (TWO, ("me", ("plate_mass_kg",)))
     assert undo(EDIT, *TWO).undone_text == "change of plate mass"
     assert COPY.undo is None
 

@@ -1,11 +1,12 @@
 """The Runs screen as values: what is listed, in which order, and what becomes of work on runs."""
 
 import datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from stage import FakeWorker
+from stage import Call, FakeWorker
 
 from app.presenters.base import Progress, Tone
 from app.presenters.runs.presenter import RunsPresenter
@@ -43,6 +44,14 @@ ALL = (A, B, C, D, BAD)
 LIST = ("list_folder", "/runs")
 
 
+def asked_of(call: Call) -> tuple[Any, ...]:
+    """Name and arguments of a call; of a change of runs, its function, the runs and its arguments."""
+    if call.name != "change_runs":
+        return (call.name, *call.arguments)
+    paths, function, arguments, _ = call.arguments
+    return (function.name, paths, *arguments)
+
+
 class Desk:
     """The presenter and its workers, whose calls a test answers."""
 
@@ -67,13 +76,13 @@ class Desk:
     @property
     def tasks(self) -> list[tuple[Any, ...]]:
         """Names and arguments of the calls since the last look."""
-        asked = [(call.name, *call.arguments) for call in self.worker.calls]
+        asked = [asked_of(call) for call in self.worker.calls]
         self.worker.calls.clear()
         return asked
 
     def answer(self, name: str, answer: object) -> None:
         """Answer the last call of a task."""
-        [call for call in self.worker.calls if call.name == name][-1].done(answer)
+        [call for call in self.worker.calls if asked_of(call)[0] == name][-1].done(answer)
 
     def analysed(self, run: RunSummary, number: int = -1, **facts: Any) -> None:
         self.analyst.calls[number].progress(RunAnalysed(run.path, **facts))
@@ -174,8 +183,8 @@ def test_an_edit_can_be_undone(desk: Desk) -> None:
     desk.select(A, B)
     desk.runs.edit("plate_mass_kg", "22,5")
     both = (A.path, B.path)
-    (call,) = [call for call in desk.worker.calls if call.name == "edit_runs"]
-    assert call.arguments == (both, "plate_mass_kg", 22.5, "me")
+    call = desk.worker.calls[-1]
+    assert asked_of(call) == ("edit", both, "plate_mass_kg", 22.5, "me")
     desk.worker.calls.clear()
     call.done(BatchOutcome(both))
     assert desk.runs.state.message.text == "Changed the plate mass of 2 runs"
@@ -183,7 +192,7 @@ def test_an_edit_can_be_undone(desk: Desk) -> None:
     assert desk.tasks == [LIST]
     desk.runs.undo()
     (undo,) = desk.worker.calls
-    assert (undo.name, *undo.arguments) == ("undo_edits", both, "plate_mass_kg", "me")
+    assert asked_of(undo) == ("undo_edit", both, "me", ("plate_mass_kg",))
     undo.done(BatchOutcome(both))
     assert desk.runs.state.undo_text == ""
 
@@ -215,12 +224,12 @@ def test_leaving_a_field_as_it_was_edits_nothing(desk: Desk) -> None:
 def test_the_trash_gives_back(desk: Desk) -> None:
     desk.select(A)
     desk.runs.trash()
-    desk.answer("trash_runs", BatchOutcome(("/runs/.trash/a.h5",)))
+    desk.answer("move_to_trash", BatchOutcome(("/runs/.trash/a.h5",)))
     desk.answer("list_folder", (B, C, D, BAD))
     assert desk.runs.state.selected == ()
     assert desk.names == "dcbb"
     desk.runs.undo()
-    assert ("restore_runs", ("/runs/.trash/a.h5",)) in desk.tasks
+    assert ("restore_from_trash", ("/runs/.trash/a.h5",)) in desk.tasks
 
 
 def test_many_are_analysed_by_a_worker_of_their_own_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
@@ -279,7 +288,7 @@ def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
     desk.runs.tick()
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.edit("note", "dry")
-    desk.answer("edit_runs", BatchOutcome((A.path,)))
+    desk.answer("edit", BatchOutcome((A.path,)))
     assert desk.runs.state.message.text == "Changed the note of a"
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.cancel()
@@ -307,11 +316,11 @@ def test_both_workers_end_with_the_screen(desk: Desk) -> None:
 
 def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk) -> None:
     assert not desk.runs.add_files(("/elsewhere/x.H5",))
-    assert desk.tasks == [("copy_runs", ("/elsewhere/x.H5",), "/runs")]
+    assert desk.tasks == [("copy_run_into", ("/elsewhere/x.H5",), Path("/runs"))]
     assert desk.runs.add_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
     form = desk.runs.import_dialog.state.form
     assert desk.tasks == [
-        ("copy_runs", ("/elsewhere/y.h5",), "/runs"),
+        ("copy_run_into", ("/elsewhere/y.h5",), Path("/runs")),
         ("survey_file", "/elsewhere/x.csv", form),
     ]
 

@@ -176,7 +176,7 @@ def test_keys_in_the_table_open_analyse_and_put_aside(stage: Stage) -> None:
     for key in (Qt.Key.Key_Return, Qt.Key.Key_Delete):
         stage.qtbot.keyClick(stage.table, key)
     assert stage.opened == [path]
-    assert stage.calls("trash_runs")[-1].arguments == ((path,),)
+    assert stage.calls("change_runs")[-1].arguments[0] == (path,)
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     assert stage.asked == 1
 
@@ -192,7 +192,7 @@ def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_wor
     assert stage.analyst.calls[-1].arguments == ((path,), True)
     assert stage.button("Cancel").isVisible()
     stage.presenter.trash()
-    stage.answer("trash_runs", BatchOutcome((path,)))
+    stage.answer("change_runs", BatchOutcome((path,)))
     said = visible_words(stage.screen)
     assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
@@ -203,8 +203,9 @@ def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
     stage.field("Note").setFocus()
     stage.qtbot.keyClicks(stage.field("Note"), "dry")
     stage.qtbot.keyClick(stage.field("Note"), Qt.Key.Key_Return)
-    (edit,) = stage.calls("edit_runs")
-    assert edit.arguments == (stage.presenter.state.selected, "note", "dry", "me")
+    (edit,) = stage.calls("change_runs")
+    assert edit.arguments[0] == stage.presenter.state.selected
+    assert edit.arguments[2] == ("note", "dry", "me")
     assert not stage.button("Undo").isEnabled()
     edit.done(BatchOutcome(edit.arguments[0]))
     assert stage.button("Undo").isEnabled()
@@ -215,7 +216,7 @@ def test_faults_of_many_are_folded_away(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)
     stage.presenter.trash()
-    stage.answer("trash_runs", BatchOutcome((), ("a.h5: no right to move it", "b.h5: it is being recorded")))
+    stage.answer("change_runs", BatchOutcome((), ("a.h5: no right to move it", "b.h5: it is being recorded")))
     assert "no right" not in visible_words(stage.screen)
     stage.qtbot.mouseClick(stage.button("Details"), Qt.MouseButton.LeftButton)
     assert "b.h5: it is being recorded" in visible_words(stage.screen)
@@ -232,7 +233,7 @@ def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
         Qt.KeyboardModifier.NoModifier,
     )
     stage.screen.dropEvent(drop)
-    (copy,) = stage.calls("copy_runs")
+    (copy,) = stage.calls("change_runs")
     assert [path.replace("\\", "/")[-14:] for path in copy.arguments[0]] == ["elsewhere/x.h5"]
 
 
