@@ -48,11 +48,7 @@ def read_cursors(
     a_s, b_s = (float(time_s[nearest_index(time_s, cursors.at(cursor))]) for cursor in Cursor)
     at_a, at_b = ([_value(quantity, at_s) for quantity in drawn] for at_s in (a_s, b_s))
     difference = [later - earlier for earlier, later in zip(at_a, at_b, strict=True)]
-    rows = (
-        (Cursor.A.value, a_s, at_a),
-        (Cursor.B.value, b_s, at_b),
-        (f"B {MINUS} A", b_s - a_s, difference),
-    )
+    rows = ((Cursor.A.value, a_s, at_a), (Cursor.B.value, b_s, at_b), (f"B {MINUS} A", b_s - a_s, difference))
     units = [quantity.unit for quantity in drawn]
     return replace(
         cursors,

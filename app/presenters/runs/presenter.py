@@ -93,10 +93,7 @@ class RunsPresenter(Presenter[RunsState]):
         readable = self._library.readable(paths)
         if readable:
             self._worker.submit(
-                tasks.load_overlay,
-                readable,
-                done=partial(self._on_overlay, readable),
-                failed=self._on_failed,
+                tasks.load_overlay, readable, done=partial(self._on_overlay, readable), failed=self._on_failed
             )
         else:
             words = self._library.fault(paths[0]) if paths else ""

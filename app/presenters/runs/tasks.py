@@ -229,10 +229,7 @@ def csv_import(form: Form) -> importing.CsvImport:
 
 
 def _lines(form: Form) -> dict[str, Any]:
-    return {
-        "skip": FIELDS["skip"].parse(form) or 0,
-        "header": {"yes": True, "no": False}.get(form["header"]),
-    }
+    return {"skip": FIELDS["skip"].parse(form) or 0, "header": {"yes": True, "no": False}.get(form["header"])}
 
 
 def analyse_runs(paths: tuple[str, ...], reanalyse: bool, report: Callable[[Any], None]) -> None:
