@@ -86,7 +86,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._files += paths
         if not self.state.path:
             self._update(form={**self.state.form, "operator": operator}, message=EMPTY_CHIP)
-            self._next()
+            self.skip_file()
         self._update(pending=len(self._files))
 
     def set_form(self, form: Form) -> None:
@@ -115,14 +115,11 @@ class ImportPresenter(Presenter[ImportState]):
                 failed=self._on_failed,
             )
 
-    def skip_file(self) -> None:
-        self._next()
-
     def close(self) -> None:
         self._files.clear()
-        self._next()
+        self.skip_file()
 
-    def _next(self) -> None:
+    def skip_file(self) -> None:
         path = self._files.pop(0) if self._files else ""
         form = {**self.state.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
         self._reading = self._surveyed = self._previewed = None
@@ -148,7 +145,7 @@ class ImportPresenter(Presenter[ImportState]):
 
     def _on_done(self, run: str) -> None:
         self._on_imported(run)
-        self._next()
+        self.skip_file()
         self._update(message=Chip(gettext("Imported {name}", name=Path(run).stem), Tone.OK))
 
     def _on_failed(self, failure: TaskFailure) -> None:
