@@ -154,19 +154,16 @@ def _push_back(situation: PullbackSituation) -> tuple[Message, Message]:
     missing_m = wanted_m - situation.plate_m
     side, wanted, now = situation.position.side, _mm(wanted_m), _mm(situation.plate_m)
     if side == 0:
-        detail = message("Until gauge 2 reads {wanted}; now {now}.", wanted=wanted, now=now)
+        template = N_("Until gauge 2 reads {wanted}; now {now}.")
     elif missing_m * side > 0.0:
-        detail = message(
-            "Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.",
-            wanted=wanted,
-            now=now,
+        template = N_(
+            "Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
         )
     else:
-        detail = message(
-            "Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.",
-            wanted=wanted,
-            now=now,
+        template = N_(
+            "Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
         )
+    detail = message(template, wanted=wanted, now=now)
     return message("Push the plate back by {length}", length=_mm(abs(missing_m))), detail
 
 

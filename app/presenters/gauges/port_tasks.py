@@ -61,23 +61,19 @@ def probed_port(report: PortReport) -> PortCard:
     hints = tuple(f"{translate(hint.message)}. {translate(hint.remedy)}" for hint in report.hints)
     found = report.recognition
     if found is None:
-        return PortCard(
-            card.url,
-            card.identity,
-            replace(_OUTCOMES[report.outcome], text=gettext(_OUTCOMES[report.outcome].text)),
-            (translate(replace_options(report.message, _LABELS)), *hints),
-        )
+        status = _OUTCOMES[report.outcome]
+        words = translate(replace_options(report.message, _LABELS))
+        return replace(card, status=replace(status, text=gettext(status.text)), description=(words, *hints))
     info = DRIVERS[found.protocol]
     title = gettext(info.title)
     if report.line_settings:
         title = f"{title} at {report.line_settings}"
     remark = (translate(replace_options(found.remark, _LABELS)),) if found.remark else ()
-    return PortCard(
-        card.url,
-        card.identity,
-        Chip(title, Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
-        (f"{_signal(found)}; {translate(info.verified)}", *remark, *hints),
-        suggested_form(report, found),
+    return replace(
+        card,
+        status=Chip(title, Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
+        description=(f"{_signal(found)}; {translate(info.verified)}", *remark, *hints),
+        suggested_form=suggested_form(report, found),
     )
 
 
