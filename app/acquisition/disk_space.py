@@ -22,6 +22,7 @@ _LONGEST_S = 20.0
 _CLOSING_BYTES = 4 * MARGIN_BYTES
 _CLOSING_S = 3.0
 """A run is ended while there is space for so many more seconds, and to close it regularly."""
+_POLL_PERIOD_S = 0.5
 _WARN_S = 60.0
 """The operator is warned while there is space for so many more seconds."""
 
@@ -79,16 +80,30 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Mess
 
 
 class DiskSpaceMonitor:
-    """Follows the free space while a run is recorded."""
+    """Reads the free space of one folder after another, twice a second; the folder need not exist."""
 
-    def __init__(self, folder: Path, demand: DiskDemand) -> None:
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._demand = demand
+        self._demand: DiskDemand | None = None
         self._is_warned = False
+        self.free_bytes = free_bytes(folder)
+        """Of the folder that is followed; None if unknown."""
+        self._changing = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)
+        self._thread.start()
 
-    def update(self, free: int | None, journal_bytes: int) -> Message:
-        """Return a new warning about `free` bytes, or EMPTY. Raises DiskSpaceError when the run must end."""
-        if free is None:
+    def begin(self, folder: Path, demand: DiskDemand) -> None:
+        """Follow the folder in which a run is recorded."""
+        self._demand, self._is_warned = demand, False
+        with self._changing:
+            self._folder = folder
+            self.free_bytes = free_bytes(folder)
+
+    def check(self, journal_bytes: int) -> Message:
+        """Return a new warning for the run, or EMPTY. Raises DiskSpaceError when it must end."""
+        free = self.free_bytes
+        if free is None or self._demand is None:
             return EMPTY
         spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
         if spare_s < _CLOSING_S:
@@ -103,32 +118,8 @@ class DiskSpaceMonitor:
         template = N_("the disk has {free} left, enough for {spare_s:.0f} s more: free some space now")
         return message(template, free=_megabytes(free), spare_s=spare_s)
 
-
-def _megabytes(size: float) -> str:
-    return f"{size / 1e6:.1f} MB"
-
-
-_POLL_PERIOD_S = 0.5
-
-
-class FreeSpacePoller:
-    """Reads the free space of one folder after another, twice a second; the folder need not exist."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self.free_bytes = free_bytes(folder)
-        """Of the folder that is followed; None if unknown."""
-        self._changing = threading.Lock()
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)
-        self._thread.start()
-
-    def set_folder(self, folder: Path) -> None:
-        with self._changing:
-            self._folder = folder
-            self.free_bytes = free_bytes(folder)
-
     def stop(self) -> None:
+        """End, without waiting for a disk that hangs."""
         self._stopping.set()
 
     def _poll(self) -> None:
@@ -138,3 +129,7 @@ class FreeSpacePoller:
             with self._changing:
                 if folder == self._folder:
                     self.free_bytes = free
+
+
+def _megabytes(size: float) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from app.acquisition import messages
-from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
+from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
 from app.acquisition.live_client import LiveIdentifier
 from app.acquisition.pullback.plan import ObservedSlip
@@ -125,8 +125,7 @@ class Engine:
         self._recording: Recording | None = None
         self._sequence = RunSequence()
         self._last_slip: ObservedSlip | None = None
-        self._space = FreeSpacePoller(Path(tempfile.gettempdir()))
-        self._disk: DiskSpaceMonitor | None = None
+        self._disk = DiskSpaceMonitor(Path(tempfile.gettempdir()))
         self._health_due_s = 0.0
         self._is_asked_to_quit = False
         self._is_quitting = False
@@ -143,7 +142,7 @@ class Engine:
             self._finish(messages.EndReason.WRITE_ERROR, message_of(error))
             raise
         finally:
-            self._space.stop()
+            self._disk.stop()
             self._live.stop()
             self._writer.stop()
 
@@ -246,8 +245,7 @@ class Engine:
         metadata = build_metadata(run, self._stand, self._gauges, self._stream)
         self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
         journal = create_run_journal(self._port, run, metadata)
-        self._disk = DiskSpaceMonitor(folder, demand)
-        self._space.set_folder(folder)
+        self._disk.begin(folder, demand)
         if self._writer.failure is not None:
             self._writer.abandon()
             self._writer = WriterClient.start()
@@ -334,17 +332,17 @@ class Engine:
                 missing_estimated=losses.missing_estimated,
                 damaged=losses.damaged,
                 overloaded=losses.overloaded,
-                free_disk_bytes=self._space.free_bytes or 0,
+                free_disk_bytes=self._disk.free_bytes or 0,
                 bytes_per_s=self._disk_demand().bytes_per_s,
             )
         )
 
     def _follow_disk(self) -> None:
         recording = self._recording
-        if recording is None or self._disk is None or recording.is_ending:
+        if recording is None or recording.is_ending:
             return
         try:
-            warning = self._disk.update(self._space.free_bytes, recording.journal_bytes)
+            warning = self._disk.check(recording.journal_bytes)
         except DiskSpaceError as error:
             _log.warning("%s", error)
             self._end_all(messages.EndReason.DISK_FULL, message_of(error))

@@ -53,15 +53,22 @@ def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
 
 
 def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_path):
-    watch, journal_bytes = DiskSpaceMonitor(tmp_path, DEMAND), 10_000_000
+    monitor, journal_bytes = DiskSpaceMonitor(tmp_path), 10_000_000
+    monitor.begin(tmp_path, DEMAND)
+    monitor.stop()
     per_s = DEMAND.run_bytes_per_s + DEMAND.journal_bytes_per_s
-    closing = journal_bytes + (4 << 20)
-    assert watch.update(int(closing + 61 * per_s), journal_bytes) == EMPTY
-    assert "enough for 59 s more" in str(watch.update(int(closing + 59 * per_s), journal_bytes))
-    assert watch.update(int(closing + 59 * per_s), journal_bytes) == EMPTY
+
+    def check(spare_s: float):
+        monitor.free_bytes = int(journal_bytes + (4 << 20) + spare_s * per_s)
+        return monitor.check(journal_bytes)
+
+    assert check(61) == EMPTY
+    assert "enough for 59 s more" in str(check(59))
+    assert check(59) == EMPTY
     with pytest.raises(DiskSpaceError, match="which closing this run takes"):
-        watch.update(int(closing + 2.9 * per_s), journal_bytes)
-    assert watch.update(None, journal_bytes) == EMPTY
+        check(2.9)
+    monitor.free_bytes = None
+    assert monitor.check(journal_bytes) == EMPTY
 
 
 def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):

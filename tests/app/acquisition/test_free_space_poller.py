@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from app.acquisition import disk_space
-from app.acquisition.disk_space import FreeSpacePoller
+from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor
+
+DEMAND = DiskDemand(1000.0, 9000.0)
 
 
 def wait_for(condition) -> None:
@@ -36,7 +38,7 @@ def disks(monkeypatch):
 
 @pytest.fixture
 def space(disks):
-    made = FreeSpacePoller(Path("/a"))
+    made = DiskSpaceMonitor(Path("/a"))
     yield made
     disks[Path("/hangs")].set()
     made.stop()
@@ -48,9 +50,9 @@ def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
     assert space.free_bytes == 10
     disks[Path("/a")] = 11
     wait_for(lambda: space.free_bytes == 11)
-    space.set_folder(Path("/b"))
+    space.begin(Path("/b"), DEMAND)
     assert space.free_bytes == 20
-    space.set_folder(Path("/gone"))
+    space.begin(Path("/gone"), DEMAND)
     assert space.free_bytes is None
 
 
@@ -58,7 +60,7 @@ def test_a_disk_that_begins_to_hang_holds_nobody_up(disks, space):
     disks[Path("/a")] = disks[Path("/hangs")]
     time.sleep(0.05)
     assert space.free_bytes == 10, "what was known last"
-    space.set_folder(Path("/b"))
+    space.begin(Path("/b"), DEMAND)
     assert space.free_bytes == 20
     disks[Path("/hangs")].set()
     time.sleep(0.05)
