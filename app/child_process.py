@@ -29,8 +29,7 @@ Command = TypeVar("Command")
 Event = TypeVar("Event")
 Decoded = TypeVar("Decoded")
 
-READ_BYTES = 1 << 16
-"""Of one read: what a pipe holds on Linux."""
+READ_BYTES = 1 << 16  # of one read: what a pipe holds on Linux
 
 _KILLED_S = 5.0
 """Wait for a killed process no longer: one that is blocked by a dead disk does not end even then."""

@@ -27,10 +27,8 @@ MAX_WINDOWS = 5
 OVERLOAD_FLAGS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _STALE_S = 0.1
 """Samples that were sent before the request may still be under way for so long."""
-_VALID_FRACTION = 0.5
-"""Least fraction of valid samples in a window: below it the gauge is hardly in range."""
-_STEADY = 6.0
-"""Standard errors of the difference of the halves up to which a window counts as steady."""
+_VALID_FRACTION = 0.5  # least fraction of valid samples in a window: below it the gauge is hardly in range
+_STEADY = 6.0  # standard errors of the difference of the halves up to which a window counts as steady
 
 
 @dataclass(frozen=True, slots=True)

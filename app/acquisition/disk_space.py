@@ -10,15 +10,11 @@ from app.runs.disk import MARGIN_BYTES, free_bytes
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
-ROW_BYTES = 41
-"""Of one sample in a run file: time, two readings, status, two counts as float64."""
+ROW_BYTES = 41  # of one sample in a run file: time, two readings, status, two counts as float64
 
-_RECORD_BYTES = 24.0
-"""Header of a journal record; a read is one record."""
-_READS_PER_S = 250.0
-"""Upper bound: one read each 4 ms."""
-_LONGEST_S = 20.0
-"""Longest time from release to end of a run that lasts until rest."""
+_RECORD_BYTES = 24.0  # header of a journal record; a read is one record
+_READS_PER_S = 250.0  # upper bound: one read each 4 ms
+_LONGEST_S = 20.0  # longest time from release to end of a run that lasts until rest
 _CLOSING_BYTES = 4 * MARGIN_BYTES
 _CLOSING_S = 3.0
 """A run is ended while there is space for so many more seconds, and to close it regularly."""

@@ -57,12 +57,10 @@ _SWITCH_S = 0.001
 _WAIT_S = 0.05
 _READS_PER_STEP = 64
 """Most reads taken before they are followed, should decoding fall behind: the history must reach back."""
-_HISTORY_S = 10.0
-"""Time of samples that are kept before a run."""
+_HISTORY_S = 10.0  # time of samples that are kept before a run
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is confirmed only after a while."""
-_CONNECT_S = 60.0
-"""The owner must send the first command within this time."""
+_CONNECT_S = 60.0  # the owner must send the first command within this time
 _HEALTH_PERIOD_S = 0.5
 _STEP_PERIOD_S = 0.1
 """Between two steps that nobody waits for: a step costs about the same for few samples as for many."""

@@ -22,13 +22,11 @@ _WAIT_S = 0.1
 class EngineClient:
     """An engine in a process of its own, which outlives this handle only to finish a run."""
 
-    _QUEUE_EVENTS = 1024
-    """Health and live results are dropped while so many events wait."""
+    _QUEUE_EVENTS = 1024  # health and live results are dropped while so many events wait
     _CLOSE_S = 180.0
     """An engine that is to end is killed after so long without an event. Closing a run takes as long as the
     run is large; the engine sends its health meanwhile."""
-    _SEND_S = 1.0
-    """An engine that takes no command for so long hangs; the command is lost."""
+    _SEND_S = 1.0  # an engine that takes no command for so long hangs; the command is lost
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
         self.process_id = process.pid

@@ -21,10 +21,8 @@ from config.schema import Gauge, GaugeCheck
 class ReferenceStep:
     """The known step that a gauge is checked with."""
 
-    value: float
-    """How far it is moved (m), or by how many counts the shunt resistor shifts it."""
-    standard_uncertainty: float | None = None
-    """In the same unit."""
+    value: float  # how far it is moved (m), or by how many counts the shunt resistor shifts it
+    standard_uncertainty: float | None = None  # in the same unit
     unit: Literal["m", "count"] = "m"
     kind: Literal["displacement", "shunt"] = "displacement"
     """`displacement`, or `shunt`, which shifts the amplifier's input while nothing moves."""

@@ -59,8 +59,7 @@ class PullbackSituation:
     simulated: bool = False
     note: Message | str = ""
     """What did not go as expected."""
-    loss_reason: Message | str = ""
-    """Why the device is lost; empty while it is there."""
+    loss_reason: Message | str = ""  # why the device is lost; empty while it is there
 
     @property
     def is_device_lost(self) -> bool:

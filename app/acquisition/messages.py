@@ -12,33 +12,25 @@ from app.runs.metadata import Conditions, RunMetadata
 from drivers.clock import TimeBase
 from messages.message import EMPTY, Message
 
-_GUESS = 0.2
-"""Relative standard uncertainty above which a number is of no use to an operator."""
+_GUESS = 0.2  # relative standard uncertainty above which a number is of no use to an operator
 
 
 class PullbackState(StrEnum):
     """State of a pullback test; `guidance` has an instruction to the operator for each."""
 
     CONNECTING = "connecting"
-    IDLE = "idle"
-    """Samples flow into the ring; nothing is recorded."""
-    RECENTRE = "recentre"
-    """The plate stands where its next slip would leave the range of gauge 2."""
-    ZERO = "zero"
-    """The rest before the pull is being measured; its mean is the zero."""
-    PULLING = "pulling"
-    """The zero is known: the table is to be pulled back, or is on its way."""
-    HELD = "held"
-    """Pulled back as far as wanted: it is checked for drift."""
+    IDLE = "idle"  # samples flow into the ring; nothing is recorded
+    RECENTRE = "recentre"  # the plate stands where its next slip would leave the range of gauge 2
+    ZERO = "zero"  # the rest before the pull is being measured; its mean is the zero
+    PULLING = "pulling"  # the zero is known: the table is to be pulled back, or is on its way
+    HELD = "held"  # pulled back as far as wanted: it is checked for drift
     ARMED = "armed"
     """Held steadily: the release is awaited. One from another state is recorded too, with a remark."""
     RELEASED = "released"
     SLIPPING = "slipping"
-    NO_SLIP = "no-slip"
-    """Released, but the plate stays on the table."""
+    NO_SLIP = "no-slip"  # released, but the plate stays on the table
     TAIL = "tail"
-    RECORDING = "recording"
-    """Everything is recorded, whatever the stand does (trigger `none`)."""
+    RECORDING = "recording"  # everything is recorded, whatever the stand does (trigger `none`)
     CLOSING = "closing"
 
 
@@ -144,17 +136,14 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
 class StandPosition(msgspec.Struct, frozen=True):
     """Where table and plate stand, and where they should (m, as the gauges read); None where not known."""
 
-    pullback_m: float | None = None
-    """Wanted, from the zero, without sign."""
+    pullback_m: float | None = None  # wanted, from the zero, without sign
     tolerance_m: float = 0.0
     table_zero_m: float | None = None
     relative_zero_m: float | None = None
     held_m: float | None = None
     """Where the table was held last."""
-    side: int = 0
-    """Side to which the table is pulled: 1 or -1 by the sign of gauge 1, 0 while unknown."""
-    plate_m: float | None = None
-    """Reading of gauge 2 before the pull."""
+    side: int = 0  # side to which the table is pulled: 1 or -1 by the sign of gauge 1, 0 while unknown
+    plate_m: float | None = None  # reading of gauge 2 before the pull
     plate_wanted_m: float | None = None
     """Where the plate must be put, while it stands where its next slip does not fit."""
 
@@ -235,12 +224,9 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     slip_end_s: float | None = None
     narrowing: tuple[str, ...] = ()
     """What waiting longer would still narrow, by the names of INTERFACE."""
-    may_stop: bool = False
-    """Waiting longer does not narrow f_d."""
-    is_enough: bool = False
-    """Nor T, nor n1: a run without a set duration ends now."""
-    message: Message = EMPTY
-    """Why there are no more of these, where something went wrong."""
+    may_stop: bool = False  # waiting longer does not narrow f_d
+    is_enough: bool = False  # nor T, nor n1: a run without a set duration ends now
+    message: Message = EMPTY  # why there are no more of these, where something went wrong
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):

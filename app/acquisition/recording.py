@@ -26,8 +26,7 @@ from drivers.clock import TimeBase
 from drivers.samples import Losses
 from messages.message import EMPTY, Message, message, message_of
 
-_NOTES_MAX = 100
-"""Of a run: a cable that is loose for hours gives a new note each time."""
+_NOTES_MAX = 100  # of a run: a cable that is loose for hours gives a new note each time
 _FOLLOW_S = 0.07
 """How often a run is followed that may wait: what is done for so many samples at once costs less."""
 
@@ -35,12 +34,9 @@ _FOLLOW_S = 0.07
 class Latency(Enum):
     """How soon new samples must be processed."""
 
-    BATCHED = auto()
-    """Nobody at the stand waits for it."""
-    INTERACTIVE = auto()
-    """It may call for the operator's next step."""
-    IMMEDIATE = auto()
-    """The table is held and may be released, which must be reported at once."""
+    BATCHED = auto()  # nobody at the stand waits for it
+    INTERACTIVE = auto()  # it may call for the operator's next step
+    IMMEDIATE = auto()  # the table is held and may be released, which must be reported at once
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,7 @@ _PAGE_BYTES = 4096
 _ROW_BYTES = 2 * 8 + 1
 _LAPPED_TRIES = 3
 """A reader that the writer has overtaken so often returns what is left."""
-_HELD_S = 60.0
-"""Time that the ring should hold, within `_HELD_ROWS`."""
+_HELD_S = 60.0  # time that the ring should hold, within `_HELD_ROWS`
 _HELD_ROWS = (1 << 16, 1 << 21)
 
 
@@ -46,10 +45,8 @@ _HELD_ROWS = (1 << 16, 1 << 21)
 class RingRows(CalibratedBlock):
     """Consecutive rows of a ring."""
 
-    time_s: Floats
-    """(n,) seconds since the first sample of the stream."""
-    lost: int = 0
-    """Rows between the one asked for and the first one: overwritten before they could be read."""
+    time_s: Floats  # (n,) seconds since the first sample of the stream
+    lost: int = 0  # rows between the one asked for and the first one: overwritten before they could be read
 
 
 def timed_rows(block: CalibratedBlock, rate_hz: float, lost: int = 0) -> RingRows:

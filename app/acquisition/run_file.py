@@ -83,8 +83,7 @@ class UncommittedRows:
         return [rows for rows in rest if len(rows)]
 
 
-_BATCH_S = 0.05
-"""Rows are passed to the writer in batches: block by block costs several times as much."""
+_BATCH_S = 0.05  # rows are passed to the writer in batches: block by block costs several times as much
 _CLOSING_S = 120.0
 _SLOW_BYTES_PER_S = 5e6
 """And so much longer for what the writer copies and reads again, on a slow disk."""

@@ -24,8 +24,7 @@ class FileSync(threading.Thread):
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(name="journal sync", daemon=True)
-        self.failure: OSError | None = None
-        """Known when the thread has ended."""
+        self.failure: OSError | None = None  # known when the thread has ended
         self._descriptor = os.dup(descriptor)
         self.start()
 

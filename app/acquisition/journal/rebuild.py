@@ -42,8 +42,7 @@ class ReplayedReads:
     losses: Losses
     start: int
     """Byte of the journal at which the first record begins."""
-    is_in_run: bool
-    """They came after the run file was begun."""
+    is_in_run: bool  # they came after the run file was begun
 
 
 class Replay:

@@ -39,8 +39,7 @@ _log = logging.getLogger(__name__)
 
 Progress = Callable[[float], None]
 
-_ROOM_RATIO = 8
-"""Bytes of a run file for each of its journal, at most: a device may send few bytes for a row."""
+_ROOM_RATIO = 8  # bytes of a run file for each of its journal, at most: a device may send few bytes for a row
 _WRITER_S = 20.0
 """The writer of a dead engine closes its file by itself, which takes as long as that is large."""
 
@@ -49,10 +48,8 @@ class RecoveryState(StrEnum):
     """What became of a journal."""
 
     RECOVERED = "recovered"
-    WHOLE = "whole"
-    """The run file holds all of it already; only the journal was left over."""
-    EMPTY = "empty"
-    """It ended before the first byte came; it was removed."""
+    WHOLE = "whole"  # the run file holds all of it already; only the journal was left over
+    EMPTY = "empty"  # it ended before the first byte came; it was removed
     BEING_RECORDED = "being-recorded"
     FAILED = "failed"
 

@@ -9,30 +9,21 @@ import numpy as np
 
 from drivers.arrays import Floats
 
-BIN_S = 0.002
-"""Length of a short average: a longer one has less noise, and a release is noticed later."""
-_KEPT_S = 1.6
-"""A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
-_PARTS = 4
-"""A stretch is compared in quarters: their means differ if it moves."""
-_START_GRID = 200
-"""Trial beginnings of the parabola over the stretch."""
-_NORMAL_MEDIAN = 0.6744897501960817
-"""Median of |x| for a standard normal x."""
-_RESOLUTION_M = 0.5e-6
-"""Least value of the noise: readings of a coarse or quiet gauge repeat exactly."""
-_LEVEL_ERRORS = 6.0
-"""Standard errors by which the quarters of a stretch that stands still may differ."""
-_DRIFT_ERRORS = 4.0
-"""Standard errors above which a drift is taken as real."""
+BIN_S = 0.002  # length of a short average: a longer one has less noise, and a release is noticed later
+_KEPT_S = 1.6  # a release is confirmed within 1.5 s, and then dated by the readings about its beginning
+_PARTS = 4  # a stretch is compared in quarters: their means differ if it moves
+_START_GRID = 200  # trial beginnings of the parabola over the stretch
+_NORMAL_MEDIAN = 0.6744897501960817  # median of |x| for a standard normal x
+_RESOLUTION_M = 0.5e-6  # least value of the noise: readings of a coarse or quiet gauge repeat exactly
+_LEVEL_ERRORS = 6.0  # standard errors by which the quarters of a stretch that stands still may differ
+_DRIFT_ERRORS = 4.0  # standard errors above which a drift is taken as real
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BinAverages:
     """Averages over consecutive bins of equal length; bins without a single reading are left out."""
 
-    center: Floats
-    """(n,) sample index of the middle of each bin."""
+    center: Floats  # (n,) sample index of the middle of each bin
     table_m: Floats
     relative_m: Floats
     """(n,) mean displacements (m), NaN where gauge 2 has no reading."""
@@ -208,8 +199,7 @@ def _median(values: Floats) -> float:
 _ZEROS_KEPT_S = 10.0
 _KNOWN_S = 0.15
 """The zero is known when the levels of so long a time agree; each is itself a mean over 0.3 s."""
-_BEFORE_S = 1.3
-"""The zero is taken so long before the pull is noticed: a smooth pull begins unnoticed."""
+_BEFORE_S = 1.3  # the zero is taken so long before the pull is noticed: a smooth pull begins unnoticed
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,22 +30,14 @@ SILENT_PLATE_NOTE = message(
 
 _RELEASE_NOISES = 6.0
 """Standard deviations of the noise that a release must exceed: fewer would be noticed by chance."""
-_CREEP = 0.01
-"""Fraction of the pullback that a release must exceed, and that a hold may move: less is creep."""
-_RELEASE_FIT_S = 0.04
-"""Readings before the notice to which the parabola of the release is fitted."""
-_PARABOLA_S = 0.01
-"""Time after a release was noticed during which the table moves by the square of time."""
-_CONFIRM_S = 1.5
-"""A table that has not swung to the other side by then was let down."""
-_STUCK_S = 0.6
-"""Longer than a period: within one, the plates stick and slip again."""
-_REST_S = 1.0
-"""Window over which rest is judged."""
-_OVERSHOOT = 0.05
-"""Fraction of the pullback by which a released table swings to the other side, at least."""
-_REST_NOISES = 0.5
-"""At rest, the motion is less than this part of the noise of a sample, plus `_REST_M`."""
+_CREEP = 0.01  # fraction of the pullback that a release must exceed, and that a hold may move: less is creep
+_RELEASE_FIT_S = 0.04  # readings before the notice to which the parabola of the release is fitted
+_PARABOLA_S = 0.01  # time after a release was noticed during which the table moves by the square of time
+_CONFIRM_S = 1.5  # a table that has not swung to the other side by then was let down
+_STUCK_S = 0.6  # longer than a period: within one, the plates stick and slip again
+_REST_S = 1.0  # window over which rest is judged
+_OVERSHOOT = 0.05  # fraction of the pullback by which a released table swings to the other side, at least
+_REST_NOISES = 0.5  # at rest, the motion is less than this part of the noise of a sample, plus `_REST_M`
 _REST_M = 1e-6
 _STUCK_M = 5e-6
 """Motion of the plate against the table that still counts as sticking."""
@@ -70,10 +62,8 @@ class Hold:
     """A hold of the table; a release is `bins_to_release` averages in a row beyond the limit."""
 
     def __init__(self, level: StationaryLevel, side: float, pulled_m: float, bins_to_release: int) -> None:
-        self.start = level.since
-        """Sample at which it began."""
-        self.since = level.since
-        """Sample from which on it has not crept noticeably."""
+        self.start = level.since  # sample at which it began
+        self.since = level.since  # sample from which on it has not crept noticeably
         self._level_m = level.mean_m
         self._side = side
         self._pulled_m = pulled_m

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from app.acquisition.messages import EndReason, PullbackState
 from messages.message import EMPTY, Message
 
-_USUAL = 1.5
-"""Largest slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand."""
-_MARGIN = 0.2
-"""Fraction by which the next slip may exceed the last one."""
-_USED = 0.98
-"""Fraction of a gauge's range that is used."""
+_USUAL = 1.5  # largest slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand
+_MARGIN = 0.2  # fraction by which the next slip may exceed the last one
+_USED = 0.98  # fraction of a gauge's range that is used
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +82,7 @@ class PullbackPlan:
     rate_hz: float
     pullback_m: float | None = None
     """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
-    duration_s: float | None = None
-    """Time after release; None until rest, or `enough_s`."""
+    duration_s: float | None = None  # time after release; None until rest, or `enough_s`
     trigger_timeout_s: float = math.inf
     enough_s: float = 20.0
     """Time after release at which waiting longer no longer helps (s)."""
@@ -100,8 +96,7 @@ class PullbackPlan:
     gauge_2_on_base: bool = False
     expected_excursion: Excursion | None = None
     """How far the plate is expected to go; None takes the largest of any plate."""
-    side: int = 0
-    """Side to which the table was pulled last: 1, -1, or 0 if unknown."""
+    side: int = 0  # side to which the table was pulled last: 1, -1, or 0 if unknown
 
     @property
     def target_m(self) -> float | None:

@@ -49,44 +49,30 @@ _TIMEOUT_CAUSES = {
     PullbackState.ARMED: message("the table was held and never let go. Let go at once when armed"),
 }
 
-_TICK_S = 0.02
-"""Interval of slow checks; the release is looked for at each bin."""
-_ZERO_S = 0.3
-"""Length of a rest level: a longer one has less noise, but needs a calmer stand."""
-_HOLD_S = 0.2
-"""Time in which the table must stand still to count as held."""
+_TICK_S = 0.02  # interval of slow checks; the release is looked for at each bin
+_ZERO_S = 0.3  # length of a rest level: a longer one has less noise, but needs a calmer stand
+_HOLD_S = 0.2  # time in which the table must stand still to count as held
 _REFERENCE_S = 0.06
 """Length of the reference before a release: the mean has less noise the longer it is, but more creep."""
-_STEADY_S = 0.3
-"""The table must be held for so long, without drift, to be armed."""
+_STEADY_S = 0.3  # the table must be held for so long, without drift, to be armed
 _DRIFT_S = 1.0
 _DRIFT_M_PER_S = 50e-6
 """Fastest drift at which a zero is taken and a hold is armed."""
-_DRIFT_LEEWAY = 2.0
-"""An armed hold may drift so much faster than one that is to be armed."""
+_DRIFT_LEEWAY = 2.0  # an armed hold may drift so much faster than one that is to be armed
 
 # Fractions of the pullback:
-_CREEP = 0.01
-"""Moving less than this still counts as standing still."""
-_PULL_NOTICED = 0.02
-"""Shortest motion that is noticed as a pull, unless the noise needs more."""
-_PULLED = 0.5
-"""Above this the table counts as pulled back."""
-_BACK = 0.5
-"""Fraction of what is noticed as a pull: within it, the table is where it was before."""
+_CREEP = 0.01  # moving less than this still counts as standing still
+_PULL_NOTICED = 0.02  # shortest motion that is noticed as a pull, unless the noise needs more
+_PULLED = 0.5  # above this the table counts as pulled back
+_BACK = 0.5  # fraction of what is noticed as a pull: within it, the table is where it was before
 
 _PULL_NOISES = 8.0
 """Standard deviations of the noise that a pull must exceed to be noticed: rare in a wait of minutes."""
-_INSET = 0.02
-"""Fraction of its allowed range by which the plate must be inside, once it had to be put back."""
-_LEEWAY = 1.25
-"""A hold may deviate so much more from the target than when it was accepted, before it is lost."""
-_HINT_AFTER_S = 2.0
-"""An operator who knows what to do is faster; a hint before that would flicker."""
-_WARNING_S = 60.0
-"""Time before the timeout at which the operator is warned; half of a short timeout."""
-_SILENT_S = 0.5
-"""Longer than any gap between two samples, at the slowest rate of any driver."""
+_INSET = 0.02  # fraction of its allowed range by which the plate must be inside, once it had to be put back
+_LEEWAY = 1.25  # a hold may deviate so much more from the target than when it was accepted, before it is lost
+_HINT_AFTER_S = 2.0  # an operator who knows what to do is faster; a hint before that would flicker
+_WARNING_S = 60.0  # time before the timeout at which the operator is warned; half of a short timeout
+_SILENT_S = 0.5  # longer than any gap between two samples, at the slowest rate of any driver
 
 _WAITING = (
     PullbackState.RECENTRE,

@@ -10,8 +10,7 @@ from app.runs.blocks import CalibratedBlock
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
-_CONTEXT_S = 1.0
-"""Time before arming in which a rest counts for the zero."""
+_CONTEXT_S = 1.0  # time before arming in which a rest counts for the zero
 _SEEN_WITHOUT_TRIGGER = (
     PullbackState.RELEASED,
     PullbackState.SLIPPING,

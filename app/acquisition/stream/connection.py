@@ -162,8 +162,7 @@ class Connection:
         self._ended = ended
 
 
-_OFTEN_S = 0.2
-"""Between two attempts at first: a cable that was loose is back soon."""
+_OFTEN_S = 0.2  # between two attempts at first: a cable that was loose is back soon
 _SELDOM_S = 1.0
 _OFTEN_UNTIL_S = 30.0
 _UNWATCHED_S = 1.0

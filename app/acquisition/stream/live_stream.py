@@ -32,10 +32,8 @@ from messages.message import EMPTY, Message, as_message, message, message_of
 
 _log = logging.getLogger(__name__)
 
-PATIENCE_S = 10.0
-"""A run waits so long for a lost device; the search goes on."""
-_BYTES_PER_SAMPLE = 25.0
-"""A line of text with its time and two readings; assumed before anything has come."""
+PATIENCE_S = 10.0  # a run waits so long for a lost device; the search goes on
+_BYTES_PER_SAMPLE = 25.0  # a line of text with its time and two readings; assumed before anything has come
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,8 +43,7 @@ class DecodedRead:
     data: bytes
     arrival_ns: int
     """Host's monotonic time after the read."""
-    rows: tuple[CalibratedBlock, ...]
-    """In order, without holes."""
+    rows: tuple[CalibratedBlock, ...]  # in order, without holes
     losses: Losses
 
 
@@ -134,8 +131,7 @@ class LiveStream:
         gauges: Gauges,
         reopen: Callable[[], OpenPort],
     ) -> None:
-        self.read_queue = read_queue
-        """Where reads wait to be decoded; a journal may take them before that."""
+        self.read_queue = read_queue  # where reads wait to be decoded; a journal may take them before that
         self.losses = Losses()
         self.rate_hz = source.rate_hz
         self._connection: Connection | None = connection

@@ -24,10 +24,8 @@ _WINDOW_S = 4.0
 _HOLE_S = 1.0
 _HOLE_SAMPLES = 5.0
 """While nothing was read for so long, the host or the device stood still: the window around it is dropped."""
-_HOLES_FRACTION = 0.1
-"""A stream with more of such holes gives no rate: most of it may have come late."""
-_SETTLING_S = 0.5
-"""What comes first was held while the device was started: its arrival times are not used."""
+_HOLES_FRACTION = 0.1  # a stream with more of such holes gives no rate: most of it may have come late
+_SETTLING_S = 0.5  # what comes first was held while the device was started: its arrival times are not used
 
 
 class RateMonitor:
@@ -122,8 +120,7 @@ def rate_note(scale: float, nominal_hz: float) -> Message:
     return message(RATE_TEMPLATE, rate_hz=nominal_hz / scale, nominal_hz=nominal_hz)
 
 
-STALLED_S = 3.0
-"""A device that sends nothing intelligible for so long has stalled; a slow one has longer."""
+STALLED_S = 3.0  # a device that sends nothing intelligible for so long has stalled; a slow one has longer
 
 _STALLED_SAMPLES = 5.0
 _KEPT_BYTES = 4096

@@ -161,8 +161,7 @@ class GaugesPresenter(Presenter[GaugesState]):
             self._update(health=(), health_note=sentence(failure.message))
 
 
-_SOON: Final = datetime.timedelta(days=30)
-"""Time that a laboratory usually needs to arrange a calibration."""
+_SOON: Final = datetime.timedelta(days=30)  # time that a laboratory usually needs to arrange a calibration
 
 
 def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:

@@ -74,10 +74,8 @@ class PortCard:
     """USB chip or board, and USB numbers."""
     status: Chip = EMPTY_CHIP
     """The device that was recognised, or why none was; empty before the port is probed."""
-    description: tuple[str, ...] = ()
-    """How the device was verified, problems and remedies."""
-    suggested_form: ConnectForm | None = None
-    """Form of the Start screen that connects to the device."""
+    description: tuple[str, ...] = ()  # how the device was verified, problems and remedies
+    suggested_form: ConnectForm | None = None  # form of the Start screen that connects to the device
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +128,7 @@ class CalibrationData:
 class CalibrationFit:
     """Curve fitted to the points."""
 
-    dial_mm: Floats
-    """(n,) float64: dial reading, and dial reading minus curve, in the order of the points."""
+    dial_mm: Floats  # (n,) float64: dial reading, and dial reading minus curve, in the order of the points
     residual_um: Floats
     upward: NDArray[np.bool_]
     """(n,) bool: whether the dial was rising."""

@@ -85,8 +85,7 @@ class GaugesScreen(QWidget):
         row.setContentsMargins(around, around, 8, around)
 
 
-FOCUS_RING = 2
-"""What is left free around the cards for it (px)."""
+FOCUS_RING = 2  # what is left free around the cards for it (px)
 
 
 class CardsColumn(QWidget):
