@@ -110,12 +110,10 @@ class QuantityDefinition:
 
     name: str  # key in JSON, with the SI unit
     symbol: Symbol
-    unit: str
-    """SI, as in JSON; "1" for pure numbers."""
+    unit: str  # SI, as in JSON; "1" for pure numbers
     description: str  # a few words for people; English, marked for translation
     display: Unit
-    display_at: dict[Place, Unit] = field(default_factory=dict)
-    """Other units, by place."""
+    display_at: dict[Place, Unit] = field(default_factory=dict)  # other units, by place
     column: TableColumn | None = None  # None for quantities that the campaign's table does not hold
     is_minor: bool = False  # listed in reports only
 
@@ -158,107 +156,57 @@ KILOGRAM = Unit("kg")
 ACCELERATION = Unit("m/s²", latex="m/s$^2$")
 _IN_METRES = {Place.TABLE: METRES_PER_SECOND, Place.REPORT: METRES_PER_SECOND}
 
+_Row = QuantityDefinition
 CATALOGUE: Final = (
-    QuantityDefinition(
-        "friction_dynamic", Symbol("f", "d"), "1", N_("dynamic friction"), _NUMBER,
-        column=TableColumn(
-            8, "friction_dynamic",
-            missing=N_("Nothing slipped, or no law could be fitted: f_d is not known."),
-        ),
-    ),
-    QuantityDefinition(
-        "friction_static", Symbol("f", "s"), "1", N_("static friction"), _NUMBER,
-        column=TableColumn(
-            7, "friction_static", missing=N_("No stick ended in a slip: f_s has no value.")
-        ),
-    ),
-    QuantityDefinition(
-        "friction_static_lower", Symbol("f", "s", relation="≥"), "1", N_("static friction, at least"), _NUMBER
-    ),
-    QuantityDefinition(
-        "friction_static_upper", Symbol("f", "s", relation="≤"), "1", N_("static friction, at most"), _NUMBER
-    ),
-    QuantityDefinition(
-        "stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"), _MILLIMETRES_PER_SECOND
-    ),
-    QuantityDefinition("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), MILLIRADIAN),
-    QuantityDefinition(
-        "period_s", Symbol("T"), "s", N_("period"), MILLISECOND, {Place.TABLE: SECOND},
-        column=TableColumn(3, "period_s", is_of_stand=True),
-    ),
-    QuantityDefinition(
-        "log_decrement", Symbol("δ", ascii="log decrement"), "1", N_("log decrement"), _NUMBER
-    ),
-    QuantityDefinition(
-        "log_decrement_classical", Symbol("δ", "c", ascii="log decrement of turning points"), "1",
-        N_("log decrement of the turning points"), _NUMBER, is_minor=True,
-    ),
-    QuantityDefinition(
-        "damping_n1_per_s", Symbol("n", "1"), "1/s", N_("damping"), PER_SECOND,
-        column=TableColumn(5, "damping_n1_per_s", is_of_stand=True),
-    ),
-    QuantityDefinition(
-        "damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), PER_SECOND,
-        column=TableColumn(6, "damping_n2_per_s", is_of_stand=True),
-    ),
-    QuantityDefinition("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), PER_SECOND),
-    QuantityDefinition(
-        "stiffness_n_per_m", Symbol("c"), "N/m", N_("stiffness"), Unit("N/m"), {Place.WINDOW: Unit("kN/m",
-        1e-3)},
-        column=TableColumn(2, "stiffness_as_printed", is_of_stand=True),
-    ),
-    QuantityDefinition(
-        "damping_coefficient_kg_per_s", Symbol("μ", ascii="mu"), "kg/s", N_("damping coefficient"),
-        Unit("kg/s")
-    ),
-    QuantityDefinition(
-        "frequency_k1_rad_per_s", Symbol("k", "1"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
-        is_minor=True,
-    ),
-    QuantityDefinition(
-        "frequency_k2_rad_per_s", Symbol("k", "2"), "rad/s", N_("circular frequency, table alone"),
-        _RADIANS_PER_SECOND, is_minor=True,
-    ),
-    QuantityDefinition(
-        "frequency_k_rad_per_s", Symbol("k"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
-        is_minor=True
-    ),
-    QuantityDefinition(
-        "damping_ratio", Symbol("ζ", ascii="damping ratio"), "1", N_("damping ratio"), _NUMBER, is_minor=True
-    ),
-    QuantityDefinition("pullback_m", Symbol("u", "0"), "m", N_("pullback"), MILLIMETRE),
-    QuantityDefinition(
-        "residual_displacement_m", Symbol("u", "s"), "m", N_("residual displacement"), MILLIMETRE,
-        column=TableColumn(
-            4, "residual_displacement_m", is_proportional=False,
-            missing=N_("Slip had not ended when the record did: u_s is not known."),
-        ),
-    ),
-    QuantityDefinition(
-        "coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), MILLIMETRE
-    ),
-    QuantityDefinition(
-        "table_velocity_max_m_per_s", Symbol("v", "max"), "m/s", N_("table velocity"),
-        _MILLIMETRES_PER_SECOND,
-        _IN_METRES, column=TableColumn(9, "velocity_max_m_per_s"),
-    ),
-    QuantityDefinition(
-        "plate_velocity_max_m_per_s", Symbol("v", "2"), "m/s", N_("plate velocity"), _MILLIMETRES_PER_SECOND,
-        _IN_METRES, is_minor=True,
-    ),
-    QuantityDefinition(
-        "table_acceleration_max_m_per_s2", Symbol("a", "max"), "m/s2", N_("table acceleration"),
-        ACCELERATION,
-        column=TableColumn(10, "acceleration_max_m_per_s2"),
-    ),
-    QuantityDefinition(
-        "plate_acceleration_max_m_per_s2", Symbol("a", "2"), "m/s2", N_("plate acceleration"), ACCELERATION,
-        is_minor=True,
-    ),
-    QuantityDefinition(
-        "plate_mass_kg", Symbol("m", "2"), "kg", N_("plate mass"), KILOGRAM,
-        column=TableColumn(1, "plate_mass_kg"), is_minor=True,
-    ),
+    _Row("friction_dynamic", Symbol("f", "d"), "1", N_("dynamic friction"), _NUMBER,
+         column=TableColumn(8, "friction_dynamic",
+                            missing=N_("Nothing slipped, or no law could be fitted: f_d is not known."))),
+    _Row("friction_static", Symbol("f", "s"), "1", N_("static friction"), _NUMBER,
+         column=TableColumn(7, "friction_static", missing=N_("No stick ended in a slip: f_s has no value."))),
+    _Row("friction_static_lower", Symbol("f", "s", relation="≥"), "1", N_("static friction, at least"),
+         _NUMBER),
+    _Row("friction_static_upper", Symbol("f", "s", relation="≤"), "1", N_("static friction, at most"),
+         _NUMBER),
+    _Row("stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"),
+         _MILLIMETRES_PER_SECOND),
+    _Row("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), MILLIRADIAN),
+    _Row("period_s", Symbol("T"), "s", N_("period"), MILLISECOND, {Place.TABLE: SECOND},
+         column=TableColumn(3, "period_s", is_of_stand=True)),
+    _Row("log_decrement", Symbol("δ", ascii="log decrement"), "1", N_("log decrement"), _NUMBER),
+    _Row("log_decrement_classical", Symbol("δ", "c", ascii="log decrement of turning points"), "1",
+         N_("log decrement of the turning points"), _NUMBER, is_minor=True),
+    _Row("damping_n1_per_s", Symbol("n", "1"), "1/s", N_("damping"), PER_SECOND,
+         column=TableColumn(5, "damping_n1_per_s", is_of_stand=True)),
+    _Row("damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), PER_SECOND,
+         column=TableColumn(6, "damping_n2_per_s", is_of_stand=True)),
+    _Row("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), PER_SECOND),
+    _Row("stiffness_n_per_m", Symbol("c"), "N/m", N_("stiffness"), Unit("N/m"),
+         {Place.WINDOW: Unit("kN/m", 1e-3)}, column=TableColumn(2, "stiffness_as_printed", is_of_stand=True)),
+    _Row("damping_coefficient_kg_per_s", Symbol("μ", ascii="mu"), "kg/s", N_("damping coefficient"),
+         Unit("kg/s")),
+    _Row("frequency_k1_rad_per_s", Symbol("k", "1"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
+         is_minor=True),
+    _Row("frequency_k2_rad_per_s", Symbol("k", "2"), "rad/s", N_("circular frequency, table alone"),
+         _RADIANS_PER_SECOND, is_minor=True),
+    _Row("frequency_k_rad_per_s", Symbol("k"), "rad/s", N_("circular frequency"), _RADIANS_PER_SECOND,
+         is_minor=True),
+    _Row("damping_ratio", Symbol("ζ", ascii="damping ratio"), "1", N_("damping ratio"), _NUMBER,
+         is_minor=True),
+    _Row("pullback_m", Symbol("u", "0"), "m", N_("pullback"), MILLIMETRE),
+    _Row("residual_displacement_m", Symbol("u", "s"), "m", N_("residual displacement"), MILLIMETRE,
+         column=TableColumn(4, "residual_displacement_m", is_proportional=False,
+                            missing=N_("Slip had not ended when the record did: u_s is not known."))),
+    _Row("coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), MILLIMETRE),
+    _Row("table_velocity_max_m_per_s", Symbol("v", "max"), "m/s", N_("table velocity"),
+         _MILLIMETRES_PER_SECOND, _IN_METRES, column=TableColumn(9, "velocity_max_m_per_s")),
+    _Row("plate_velocity_max_m_per_s", Symbol("v", "2"), "m/s", N_("plate velocity"), _MILLIMETRES_PER_SECOND,
+         _IN_METRES, is_minor=True),
+    _Row("table_acceleration_max_m_per_s2", Symbol("a", "max"), "m/s2", N_("table acceleration"),
+         ACCELERATION, column=TableColumn(10, "acceleration_max_m_per_s2")),
+    _Row("plate_acceleration_max_m_per_s2", Symbol("a", "2"), "m/s2", N_("plate acceleration"), ACCELERATION,
+         is_minor=True),
+    _Row("plate_mass_kg", Symbol("m", "2"), "kg", N_("plate mass"), KILOGRAM,
+         column=TableColumn(1, "plate_mass_kg"), is_minor=True),
 )  # fmt: skip
 """Every quantity that an analysis finds, in the order of reports."""
 
