@@ -29,8 +29,7 @@ class PublishedRow:
 
     series: str
     plate_mass_kg: float
-    stiffness_as_printed: float
-    """In a unit that the print leaves open."""
+    stiffness_as_printed: float  # in a unit that the print leaves open
     period_s: float
     residual_displacement_m: float
     damping_n1_per_s: float

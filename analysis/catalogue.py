@@ -29,8 +29,7 @@ class Symbol:
 
     letter: str
     index: str = ""
-    ascii: str = ""
-    """What a terminal shows in place of letter and index where those are not ASCII."""
+    ascii: str = ""  # what a terminal shows in place of letter and index where those are not ASCII
     relation: str = ""  # ≥ or ≤ where the quantity is a bound, else ""
 
     @property

@@ -13,16 +13,13 @@ from decimal import Decimal
 MINUS = "\u2212"
 THIN_SPACE = "\u202f"
 NO_BREAK_SPACE = "\u00a0"
-_NEGLIGIBLE = 1e-9
-"""Relative uncertainty below which only rounding errors of a simulated record remain."""
+_NEGLIGIBLE = 1e-9  # relative uncertainty below which only rounding errors of a simulated record remain
 _DIGITS, _DIGITS_OF_EXACT = 6, 9
 """Significant digits of a value without an uncertainty, and of one whose uncertainty is negligible."""
 _SMALL_M = 0.9995e-3  # three digits of it are still less than 1000 µm
 _LARGE_M = 0.5
-_FIXED_POINT = 1e-5, 1e9
-"""Sizes that are written without an exponent."""
-_HYPHEN_OF_NUMBER = re.compile(r"(?<![^\s(])-(?=\d)")
-"""A hyphen that stands for a minus sign, not one within a name."""
+_FIXED_POINT = 1e-5, 1e9  # sizes that are written without an exponent
+_HYPHEN_OF_NUMBER = re.compile(r"(?<![^\s(])-(?=\d)")  # a minus sign, no hyphen of a name
 _PREFIXES = ("", "m", "µ", "n", "p")
 
 
@@ -31,8 +28,7 @@ class FormattedValue:
     """A value and its standard uncertainty, rounded to the same decimal place."""
 
     value: str
-    uncertainty: str = ""
-    """"" where it is unknown or negligible."""
+    uncertainty: str = ""  # "" where it is unknown or negligible
     unit: str = ""  # "" for pure numbers
 
     def __str__(self) -> str:

@@ -17,14 +17,11 @@ from messages.message import Message, message
 
 SECONDS_MIN: Final = 1.0
 SAMPLES_MIN: Final = 20
-_SEGMENT_S: Final = 1.0
-"""Of the spectrum: a hertz apart, and whole cycles of both mains."""
+_SEGMENT_S: Final = 1.0  # of the spectrum: a hertz apart, and whole cycles of both mains
 _BLOCKS: Final = 10
-_LINE_HZ: Final = 2.0
-"""Half width of a spectral line: the main lobe of Hann's window at 1 s, and the drift of the mains."""
+_LINE_HZ: Final = 2.0  # half width of a line: main lobe of Hann's window at 1 s, drift of the mains
 _BESIDE_HZ: Final = (3.5, 7.5)  # distances from a line between which the background is measured
-_STANDS_OUT: Final = 3.0
-"""Power of a line over that of the background: chance exceeds it rarely in a mean over segments."""
+_STANDS_OUT: Final = 3.0  # power over the background's: chance exceeds it rarely in a mean over segments
 _MOTION_HZ: Final = 25.0  # stands swing below 10 Hz; mains hum begins at 50 Hz
 _COARSE: Final = 20  # with fewer distinct values, the steps of the converter look like clipping or repeats
 
@@ -40,8 +37,7 @@ class GaugeSamples:
     displacement_m: Floats  # (n,) float64: by its calibration (m); NaN where a sample is missing or damaged
     overloaded: NDArray[np.bool_]
     rate_hz: float
-    range_m: float | None = None
-    """It reads from -range_m to range_m."""
+    range_m: float | None = None  # it reads from -range_m to range_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,25 +63,19 @@ class GaugeHealth:
     samples: int  # looked at, absent ones included
     duration_s: float
     mean_m: float
-    noise_rms_m: float
-    """Standard deviation of a sample about a straight line, without the hum but with the swing."""
+    noise_rms_m: float  # of a sample about a straight line, without the hum but with the swing
     drift_m_per_min: float
-    drift_standard_uncertainty_m_per_min: float
-    """From the scatter of ten means."""
+    drift_standard_uncertainty_m_per_min: float  # from the scatter of ten means
     hum: tuple[Hum, ...]
-    oscillation_amplitude_m: float
-    """Of the strongest line below 25 Hz if it is most of the signal (the table moves), otherwise 0."""
+    oscillation_amplitude_m: float  # of a line below 25 Hz that is most of the signal, else 0
     resolution_m: float  # smallest difference between readings: the converter's step
     distinct_values: int
-    largest_reading_m: float
-    """Largest distance of a reading from the calibration's zero."""
+    largest_reading_m: float  # largest distance of a reading from the calibration's zero
     range_m: float | None  # of the gauge, to either side
     missing_fraction: float
     overload_fraction: float
-    clipped_fraction: float
-    """Fraction at the very largest or smallest reading."""
-    repeated_fraction: float
-    """Fraction equal to the sample before, where the converter is fine enough to tell."""
+    clipped_fraction: float  # fraction at the very largest or smallest reading
+    repeated_fraction: float  # equal to the sample before, where the converter is fine enough to tell
     spectrum: Spectrum
 
     @property
@@ -210,11 +200,9 @@ DRIFT_M_PER_MIN: Final = (0.1e-3, 1e-3)
 HUM_M: Final = (10e-6, 100e-6)  # a third of the noise that is still good, and a percent of a pullback of 9 mm
 _RANGE: Final = (0.4, 0.95)
 """A zero beyond 40 % of the range leaves less room on one side than a pullback needs; 95 % clips at once."""
-_MISSING: Final = (1e-3, 0.05)
-"""Set by judgement: a sound serial link loses less than one sample in a thousand."""
+_MISSING: Final = (1e-3, 0.05)  # by judgement: a sound serial link loses less than one sample in a thousand
 _OVERLOADED: Final = (0.0, 0.01)  # a gauge at rest is never overloaded
-_CLIPPED: Final = (0.02, 0.2)
-"""Noise alone puts less than 2 % of the readings onto their extreme values with more than 20 steps."""
+_CLIPPED: Final = (0.02, 0.2)  # noise alone puts under 2 % onto the extreme values with over 20 steps
 _REPEATED: Final = 0.25  # white noise over 20 steps or more repeats a reading in less than one of ten samples
 _OSCILLATION_M: Final = 10e-6  # the table moves; below, the line is counted as noise
 _DRIFT_SIGMAS: Final = 4.0  # chance lets one gauge in some thousands drift by so many standard uncertainties

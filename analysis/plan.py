@@ -30,17 +30,14 @@ from analysis.uncertainty import UncertaintyBudget, propagate_expected
 from messages.i18n import N_
 from messages.message import joined, message
 
-CLOCK_UNCERTAINTY = 5e-5
-"""Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
+CLOCK_UNCERTAINTY = 5e-5  # relative, of a device's rate after ten seconds beside a quiet host (decision 6)
 _NOTHING_STATED = GaugeUncertainty()
-_RELEASE_PHASE = 0.3
-"""Position of the release between two samples: a real one hardly ever coincides with a sample."""
+_RELEASE_PHASE = 0.3  # of the release between two samples: a real one hardly ever coincides with one
 _SETTLED_S = 60.0  # simulated at least so long, so that the motion has ended whatever is recorded
 _NOISE_MIN_M = 1e-7  # with less, rounding errors decide the normal equations
 _FRICTION_MIN = 1e-4  # the search does not look for less
 _PER_PERIOD = 400  # points a period: extremes of a sine are then exact to 3e-5 of the amplitude
-_READINGS_MAX, _PERIODS_MAX = 1e7, 1e4
-"""More than the memory of a small computer holds, and than any test lasts."""
+_READINGS_MAX, _PERIODS_MAX = 1e7, 1e4  # more than a small computer holds, and than any test lasts
 _TESTS_MAX = 1000  # in a row without re-centring; more counts as any number
 
 
@@ -55,16 +52,14 @@ class PlannedTest:
     rate_hz: float = 1000.0
     duration_s: float = 10.0
     hold_s: float = 1.0
-    noise_m: float = 2e-5
-    """Standard deviation of the readings of both gauges; at least 0.1 µm."""
+    noise_m: float = 2e-5  # standard deviation of the readings of both gauges; at least 0.1 µm
     table_mass_uncertainty_kg: float = 0.0
     plate_mass_uncertainty_kg: float = 0.0
     gravity_uncertainty_m_per_s2: float = 0.0
     clock_scale_uncertainty: float = CLOCK_UNCERTAINTY
     table_gauge: GaugeUncertainty = _NOTHING_STATED
     relative_gauge: GaugeUncertainty = _NOTHING_STATED
-    gauge_2_measures_plate: bool = False
-    """Gauge 2 measures against the base instead of the table."""
+    gauge_2_measures_plate: bool = False  # gauge 2 measures against the base instead of the table
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "duration_s", "hold_s", "noise_m"):
@@ -135,14 +130,11 @@ class Plan:
     law: FrictionLaw
     motion: Motion
     msk64_degree: str
-    rest_s: float | None
-    """Time after the release at which the swing is as small as the noise; None without damping."""
+    rest_s: float | None  # after the release, when the swing is as small as the noise; None without damping
     table_use: RangeUse
     relative_use: RangeUse  # from a centred plate
-    tests_without_recentring: int | None
-    """Tests that fit the range of gauge 2 without re-centring the plate; None for any number."""
-    results: dict[str, Quantity]
-    """friction_dynamic, and friction_static of a law that has one; absent where undetermined."""
+    tests_without_recentring: int | None  # that fit the range of gauge 2; None for any number
+    results: dict[str, Quantity]  # friction_dynamic and friction_static; absent where undetermined
     budget: list[BudgetLine]
     warnings: list[ResultWarning]
 

@@ -14,8 +14,7 @@ class Quantity:
 
     value: float
     standard_uncertainty: float
-    interval_95: tuple[float, float]
-    """95 % coverage interval in `unit`, not necessarily symmetric."""
+    interval_95: tuple[float, float]  # 95 % coverage interval in `unit`, not necessarily symmetric
     unit: str  # "1" for pure numbers
 
     @classmethod
@@ -130,5 +129,4 @@ class BudgetLine:
 
     source: Source
     contribution_to: str
-    standard_uncertainty: float
-    """In the unit of the result. NaN where the source matters but its uncertainty is not stated."""
+    standard_uncertainty: float  # in the unit of the result; NaN where it matters but is not stated

@@ -35,8 +35,7 @@ class Truth:
     """Plateau before release (s); with `pull_s`, a rest and a slow pull come before it. A negative hold
     starts the record after the release."""
     pull_s: float = 0.0
-    release_phase: float = 0.3
-    """Where between two samples the release lies (0 to 1)."""
+    release_phase: float = 0.3  # where between two samples the release lies (0 to 1)
     noise_m: float = 2e-5  # standard deviation of white noise
     step_m: float = 0.0  # of the converter; 0: none
     offsets_m: tuple[float, float] = (3e-4, 6e-3)

@@ -25,20 +25,17 @@ _SOURCES = {
     Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
 _UNITS = {row.name: row.unit for row in CATALOGUE}
-LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
-"""Of a plane set with a hydraulic level: within 2 mrad, rectangular (JCGM 100, 4.3.7)."""
+LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5  # plane within 2 mrad, rectangular (JCGM 100, 4.3.7)
 _SHARE_MIN = 1e-3  # a law less likely than this adds less than its last digit to a standard uncertainty
 COVERAGE_FACTOR_95 = 1.959963984540054  # coverage factor of a 95 % interval of a normal distribution
-_CORRELATED = 3.5
-"""Excess scatter of block means, in standard deviations of white noise, from which noise is correlated."""
+_CORRELATED = 3.5  # excess scatter of block means, in sigmas of white noise, of correlated noise
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParameterUncertainty:
     """Linearised distribution of the parameters about a fit."""
 
-    shifts: dict[Source, Floats]
-    """(p,) float64 by source: shift of every parameter by one standard uncertainty of the source."""
+    shifts: dict[Source, Floats]  # (p,) by source: shift by one standard uncertainty of it
     noise_covariance: Floats  # (16, 16) float64: covariance from the noise of the readings
 
     def standard_uncertainty(self, weights: Floats) -> float:

@@ -24,10 +24,8 @@ class CalibrationCurve:
     """A polynomial displacement(count), fitted by least squares."""
 
     polynomial: Polynomial  # m of count
-    covariance: Floats
-    """(p, p) float64: of the coefficients in the window of the polynomial, for a scatter of 1 m."""
-    scatter_m: float
-    """Standard deviation of the points about the curve, with `freedom` degrees of freedom (m)."""
+    covariance: Floats  # (p, p) float64: of the coefficients in the polynomial's window, for a scatter of 1 m
+    scatter_m: float  # standard deviation of the points about the curve (m)
     degrees_of_freedom: int
 
     @property
@@ -122,10 +120,8 @@ class GaugeCharacteristics:
     nonlinearity_m: float
     """Largest deviation from the curve at any step on the way up or down, averaged over the rounds. It
     includes the hysteresis."""
-    hysteresis_m: float | None
-    """Largest difference between the ways up and down at one step, averaged over the rounds."""
-    repeatability_m: float | None
-    """Standard deviation of readings at one step in one direction from round to round, pooled."""
+    hysteresis_m: float | None  # largest difference between up and down at one step, mean over the rounds
+    repeatability_m: float | None  # pooled standard deviation of a step in one direction between rounds
     zero_drift_m: float | None  # difference between the last and the first reading at the lowest step
 
 
@@ -165,11 +161,9 @@ def step_means(readings: CalibrationPoints) -> tuple[Floats, Floats]:
     return counts, dial_m
 
 
-_DOUBTFUL: Final = 8.0
-"""A residual of so many median absolute residuals is 5 standard deviations: no chance in a calibration."""
+_DOUBTFUL: Final = 8.0  # median absolute residuals: 5 standard deviations, no chance in a calibration
 _SQRT12: Final = math.sqrt(12.0)
-_NORMAL_95: Final = 1.959963984540054
-"""Half of a 95 % interval in standard uncertainties of a normal distribution."""
+_NORMAL_95: Final = 1.959963984540054  # half of a normal 95 % interval in standard uncertainties
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,8 +171,7 @@ class DialGauge:
     """Dial gauge that measures the displacements."""
 
     resolution_m: float = 1e-5  # to which it is read (m); the reading error is rectangular, ± half of it
-    standard_uncertainty_m: float | None = None
-    """Of its certificate (m): the reproducible error at each position. None: not stated."""
+    standard_uncertainty_m: float | None = None  # reproducible error by its certificate (m)
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -204,17 +197,14 @@ class Calibration:
 
     gain_m_per_count: Quantity  # the 95 % intervals count the degrees of freedom (JCGM 100, G.4)
     zero_count: Quantity
-    polynomial: tuple[float, ...]
-    """1/m, 1/m^2; empty for a line."""
+    polynomial: tuple[float, ...]  # 1/m, 1/m^2; empty for a line
     zero_standard_uncertainty_m: float  # of the displacement at `zero_count`
     displacement_standard_uncertainty_m: float
     """Largest combined one of a displacement within the readings (m), without sources that are not stated."""
     characteristics: GaugeCharacteristics
-    scatter_m: float
-    """Standard deviation of the steps about the curve (m)."""
+    scatter_m: float  # standard deviation of the steps about the curve (m)
     points: CalibrationPoints
-    residual_m: Floats
-    """(n,) float64: dial reading minus curve (m)."""
+    residual_m: Floats  # (n,) float64: dial reading minus curve (m)
     budget: tuple[BudgetLine, ...]  # of `gain_m_per_count` (relative), `zero` and `displacement` (m)
     warnings: tuple[ResultWarning, ...]
 

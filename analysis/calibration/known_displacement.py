@@ -9,10 +9,8 @@ from analysis.calibration.points import CalibrationError
 from analysis.quantities import BudgetLine, BudgetSource, ResultWarning, result_warning
 from messages.i18n import N_
 
-COVERAGE: Final = 2.0
-"""Tolerance over the combined standard uncertainty: coverage of about 95 % (JCGM 100, 6.3)."""
-_BLUNT: Final = 0.05
-"""A tolerance above this share of the displacement passes errors of a gain that matter for f_d."""
+COVERAGE: Final = 2.0  # tolerance over the combined standard uncertainty: about 95 % (JCGM 100, 6.3)
+_BLUNT: Final = 0.05  # a tolerance above this share passes errors of a gain that matter for f_d
 _BOTH_ENDS: Final = math.sqrt(2.0)
 _SQRT12: Final = math.sqrt(12.0)
 
@@ -22,11 +20,9 @@ class MeanReading:
     """Mean reading of a gauge at rest."""
 
     displacement_m: float
-    noise_m: float
-    """Standard deviation of one sample (m)."""
+    noise_m: float  # standard deviation of one sample (m)
     samples: int
-    creep_m: float = 0.0
-    """Mean of the second half minus that of the first (m)."""
+    creep_m: float = 0.0  # mean of the second half minus that of the first (m)
 
     @property
     def standard_uncertainty_m(self) -> float:
@@ -39,8 +35,7 @@ class CalibrationClaim:
     """Stated uncertainties of a calibration; None is "not stated"."""
 
     gain_relative: float | None = None
-    nonlinearity_m: float | None = None
-    """Largest deviation from the curve (m)."""
+    nonlinearity_m: float | None = None  # largest deviation from the curve (m)
     repeatability_m: float | None = None
 
 
@@ -50,8 +45,7 @@ class ReferenceDisplacement:
 
     displacement_m: float  # with its sign (m)
     standard_uncertainty_m: float | None = None
-    is_electric: bool = False
-    """A shunt: the gauge does not move, so non-linearity and repeatability do not contribute."""
+    is_electric: bool = False  # a shunt: non-linearity and repeatability do not contribute
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.displacement_m) or self.displacement_m == 0.0:
@@ -72,8 +66,7 @@ class DisplacementCheck:
 
     expected_m: float  # known displacement, and that of the gauge: its reading there minus the one at rest
     measured_m: float
-    standard_uncertainty_m: float
-    """Combined, of their difference, from stated sources (m)."""
+    standard_uncertainty_m: float  # combined, of their difference, from stated sources (m)
     budget: tuple[BudgetLine, ...]  # of `measured_m` minus `expected_m` (m); NaN where not stated
     warnings: tuple[ResultWarning, ...]
 

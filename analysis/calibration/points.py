@@ -15,8 +15,7 @@ from messages.message import message
 IntArray = NDArray[np.int64]
 
 POLYNOMIAL_DEGREES = (1, 2, 3)
-_SPACING_SHARE = 0.5
-"""Readings closer than this share of the median spacing belong to one step."""
+_SPACING_SHARE = 0.5  # readings closer than this share of the median spacing belong to one step
 
 
 class CalibrationError(AnalysisError, ValueError):

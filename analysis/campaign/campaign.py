@@ -29,8 +29,7 @@ class Campaign:
     rows: tuple[SeriesRow, ...]  # in the paper's order
     effects: Effects
     ratios: tuple[ContactRatio, ...]
-    msk64_degrees: tuple[str, ...]
-    """Degrees that the table reached, each once, lowest first."""
+    msk64_degrees: tuple[str, ...]  # degrees that the table reached, each once, lowest first
     excluded: tuple[Excluded, ...]
     warnings: tuple[ResultWarning, ...]
 

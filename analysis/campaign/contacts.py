@@ -22,14 +22,11 @@ class ContactFriction:
     """Friction of one contact over its series."""
 
     contact: str  # code, "" where it is not known
-    dynamic: Quantity | None
-    """Mean over the series, with the scatter between series and shared errors; None where undetermined."""
+    dynamic: Quantity | None  # mean over the series; None where undetermined
     static: Quantity | None
-    dynamic_of_series: dict[str, Quantity]
-    """By the labels of the series; f_s is the middle of its bounds where no law determined it."""
+    dynamic_of_series: dict[str, Quantity]  # by label; f_s from its bounds where no law determined it
     static_of_series: dict[str, Quantity]
-    static_at_least: dict[str, float]
-    """Lower bounds, by the labels of series without an upper one."""
+    static_at_least: dict[str, float]  # lower bounds, by the labels of series without an upper one
 
 
 def friction_by_contact(rows: Sequence[SeriesRow]) -> tuple[ContactFriction, ...]:
@@ -92,13 +89,10 @@ class ContactRatio:
     """f_s / f_d of one contact."""
 
     contact: str
-    ratio: Quantity | None
-    """Mean over the series that determined f_s, with their scatter; None without any."""
+    ratio: Quantity | None  # mean over the series that determined f_s, with their scatter; None without any
     series: int
-    between_series: float | None
-    """Standard deviation of the ratio between series; None with fewer than two."""
-    bounds: tuple[float | None, float | None]
-    """Smallest lower and largest upper bound of the other series; None where there are none."""
+    between_series: float | None  # standard deviation of the ratio between series; None with fewer than two
+    bounds: tuple[float | None, float | None]  # smallest lower, largest upper of the other series
 
 
 def friction_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[ContactRatio, ...]:

@@ -21,8 +21,7 @@ from messages.message import Message, joined, message
 
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
-_NAMED: Final = 3
-"""Sizes of an effect that its sentence names."""
+_NAMED: Final = 3  # sizes of an effect that its sentence names
 _LARGEST: Final = 700.0  # difference of logarithms above which a ratio overflows
 
 
@@ -51,16 +50,13 @@ class Effect:
     """One cause, tested with all others in the model."""
 
     cause: Cause
-    found: bool | None
-    """Whether f_d depends on it, at the 5 % level; None where the campaign cannot tell."""
+    found: bool | None  # whether f_d depends on it, at the 5 % level; None where the campaign cannot tell
     sentence: Message
     statistic: float | None = None
     p_value: float | None = None
     degrees_of_freedom: tuple[int, int] | None = None
-    sizes: tuple[EffectSize, ...] = ()
-    """The sentence names the first."""
-    size_seen: float | None = None
-    """Relative change of f_d, for the step of the first size, that is found with a chance of 80 %."""
+    sizes: tuple[EffectSize, ...] = ()  # the sentence names the first
+    size_seen: float | None = None  # change of f_d, per first step, found with a chance of 80 %
 
 
 @dataclass(frozen=True, slots=True)

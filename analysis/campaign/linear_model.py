@@ -21,8 +21,7 @@ class Observations:
     """Values of the model, with the covariance of their errors."""
 
     values: Floats
-    variances: Floats
-    """(n,) float64: of the independent errors, from repeats."""
+    variances: Floats  # (n,) float64: of the independent errors, from repeats
     shared: Floats  # (n, n) float64: covariance of the shared errors
     degrees_of_freedom: int  # of `variances`; 0 where they come from single runs
 
@@ -131,8 +130,7 @@ def _noncentrality(count: int, degrees: int) -> float:
 
 
 FRICTION = "friction_dynamic"
-_INFLATION_MAX: Final = 10.0
-"""Variance inflation of the velocity's coefficient above which it is confounded with the plate mass."""
+_INFLATION_MAX: Final = 10.0  # variance inflation above which velocity and plate mass are confounded
 _NOTHING: Final = 1e-9  # relative variation that is rounding
 _VAGUE: Final = 1e100  # relative uncertainty whose square overflows
 
@@ -147,8 +145,7 @@ class DesignMatrix:
     means, where they are not confounded."""
     mass: int | None  # index of its column; None where confounded
     velocity: int | None
-    velocity_follows: bool
-    """The velocity varies only with contact, pullback and plate mass."""
+    velocity_follows: bool  # the velocity varies only with contact, pullback and plate mass
     velocities: tuple[float, float]  # least and largest (m/s)
 
     @property

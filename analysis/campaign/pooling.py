@@ -36,8 +36,7 @@ class RunValue:
 
     run: str
     value: float
-    repeatable: float
-    """Standard uncertainty of this run alone; above 0."""
+    repeatable: float  # standard uncertainty of this run alone; above 0
     common: dict[SharedError, float]  # standard uncertainties of errors shared with other runs
     half_widths: tuple[float, float]  # of the 95 % interval, below and above the value
     unit: str
@@ -120,17 +119,14 @@ class PooledQuantity:
 
     quantity: Quantity  # weighted mean; its uncertainty includes errors that repeats share
     runs: int
-    repeatable: float
-    """Part of the standard uncertainty that repeats reduce."""
+    repeatable: float  # part of the standard uncertainty that repeats reduce
     common: dict[SharedError, float]  # other parts, by shared error
-    between_runs: float | None
-    """Standard deviation between runs beyond the noise of the readings; None without repeats."""
+    between_runs: float | None  # standard deviation beyond the readings' noise; None without repeats
     scatter: float | None  # standard deviation of the runs' values; None without repeats
     birge_ratio: float | None
     """Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that each
     run states for itself; None without repeats."""
-    degrees_of_freedom: float
-    """Of the scatter used for this series: its own plus those lent by its contact; 0 without repeats."""
+    degrees_of_freedom: float  # of the scatter: own plus those lent by the contact; 0 without repeats
     outliers: tuple[str, ...] = ()  # runs too far from the others; they are not left out
 
 

@@ -17,8 +17,7 @@ from messages.i18n import N_
 STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
 TABLE_VELOCITY = "table_velocity_max_m_per_s"
 _MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
-_CHANCE = 0.01
-"""Chance that runs which agree get the warning that they differ."""
+_CHANCE = 0.01  # chance that runs which agree get the warning that they differ
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -27,10 +26,8 @@ class SeriesRow:
 
     label: str  # code of the series, with the difference where it has several rows; unique in a campaign
     series: SeriesKey
-    quantities: dict[str, PooledQuantity]
-    """By name, for every column of the table and both bounds of f_s; absent where no run determined it."""
-    msk64_degree: str
-    """Of the pooled v_max; two with a slash where its interval crosses a bound; "" without v_max."""
+    quantities: dict[str, PooledQuantity]  # by name, with both bounds of f_s; absent where undetermined
+    msk64_degree: str  # of the pooled v_max; `VI/VII` where its interval crosses a bound; "" without v_max
     runs: tuple[str, ...]
     warnings: tuple[ResultWarning, ...] = ()
 

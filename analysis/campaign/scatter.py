@@ -21,8 +21,7 @@ class RepeatedValues:
 
     values: Floats  # (n,) float64
     variances: Floats  # (n,) float64: of each run by itself
-    scales: Floats
-    """(n,) float64: size of a unit deviation between runs, for each value."""
+    scales: Floats  # (n,) float64: size of a unit deviation between runs, for each value
     series: NDArray[np.intp]  # (n,) int: index of the series of each value, from 0 without gaps
 
     @property

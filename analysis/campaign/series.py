@@ -40,8 +40,7 @@ class RunResult:
 
     name: str  # path or label of the run
     series: SeriesKey
-    results: dict[str, Quantity]
-    """By name; absent where undetermined. `plate_mass_kg` may be among them."""
+    results: dict[str, Quantity]  # by name; absent where undetermined. `plate_mass_kg` may be among them.
     budget: tuple[BudgetLine, ...] = ()  # lines of all results
     calibration_id: str = ""  # runs with the same calibrations share their errors
     stand_id: str = ""  # runs on the same stand share the errors of masses, gravity and clock

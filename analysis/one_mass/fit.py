@@ -15,12 +15,10 @@ from analysis.preparation.oscillation import DampedCosine, fit_damped_cosine
 from analysis.record import RecordError
 
 _STEP = 1e-30
-COULOMB = 4
-"""Place of x_k among the parameters."""
+COULOMB = 4  # place of x_k among the parameters
 _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
-_GROWTH = 20.0
-"""Largest natural logarithm by which a trial swing may grow over the record."""
+_GROWTH = 20.0  # largest natural logarithm by which a trial swing may grow over the record
 _FAR = 1e12  # residual, in units of the swing, of trial parameters that are none
 
 
@@ -31,8 +29,7 @@ class Parameters(NamedTuple):
     turning: float
     omega_rad_per_s: float
     damping_n_per_s: float
-    coulomb: float
-    """x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left."""
+    coulomb: float  # x_k, in the unit of displacement; below zero where no Coulomb friction is left
     offset: float  # zero of the readings, in their own unit
 
     @property
@@ -66,13 +63,11 @@ class OneMassFit:
     """A fitted decay."""
 
     parameters: Parameters
-    covariance: Floats
-    """(6, 6) float64: type A, for white residuals; zero in rows of what was held."""
+    covariance: Floats  # (6, 6) float64: type A, for white residuals; zero in rows of what was held
     channel: Channel  # readings that were fitted
     residual: Floats  # (n,) float64: reading minus curve, in the unit of the readings
     cost: float
-    order: int
-    """Derivative of the displacement that the readings are."""
+    order: int  # derivative of the displacement that the readings are
 
     @property
     def rms(self) -> float:

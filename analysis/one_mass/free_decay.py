@@ -30,8 +30,7 @@ from messages.message import message
 _RARE = 1e-3  # chance at which noise alone is called a pattern, per test
 _BAND = 3.29  # standard deviations within which 99.9 % of a normal distribution lie
 _COMPUTED = 1e-9
-_ROUNDED_SHARE = 0.25
-"""Rounding makes residuals of any colour once it makes this share of their variance."""
+_ROUNDED_SHARE = 0.25  # rounding makes residuals of any colour once it makes this share of their variance
 _ROUNDED_LINE = 1.0 / 3.0  # lines up to this share of a rounding step may be harmonics of the rounding itself
 
 
@@ -40,8 +39,7 @@ class SpectralLine:
     """A line that stands out of the spectrum of residuals."""
 
     frequency_hz: float
-    amplitude: float
-    """As a steady sine, in the unit of the residuals."""
+    amplitude: float  # as a steady sine, in the unit of the residuals
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +48,7 @@ class ResidualAssessment:
 
     adequate: bool  # they are noise, or the rounding of the converter
     rms: float
-    noise: float
-    """Root mean square of their part which neighbours do not share."""
+    noise: float  # root mean square of their part which neighbours do not share
     line: SpectralLine | None
 
 
@@ -124,21 +121,16 @@ def _is_even(residual: Floats) -> bool:
 
 
 PERIODS_MIN = 2.0
-_BEFORE_CROSSING = 0.2
-"""The mass surely moves freely from this share of a period before it first passes the middle."""
-_SIGNAL_MIN = 20.0
-"""Least ratio of mean squares, oscillation over residual: noise reaches about 5 at its best frequency."""
+_BEFORE_CROSSING = 0.2  # of a period before it first passes the middle the mass surely moves freely
+_SIGNAL_MIN = 20.0  # least ratio of mean squares, oscillation over residual: noise reaches about 5
 _EXPLAINED_MIN = 0.75
-_LOSS_MIN = 3e-3
-"""Least share of the amplitude that must be lost over the record; with less, damping is not determined."""
-_AMPLITUDE = (1, 3, 4)
-"""Places of swing, damping and friction among the parameters; the frequency is known far better."""
+_LOSS_MIN = 3e-3  # of the amplitude, lost over the record: with less, damping is not determined
+_AMPLITUDE = (1, 3, 4)  # places of swing, damping and friction; the frequency is known far better
 _SIGMAS = 3.0
 _SPIKE_SIGMAS = 6.0
 _SPIKES_MAX = 0.02
 _REST_READINGS_MIN = 8
-_STEPS_SEEN = 3.0
-"""Swings under this many rounding steps look as if they stopped."""
+_STEPS_SEEN = 3.0  # swings under this many rounding steps look as if they stopped
 _GAP_PERIODS_MAX = 1000.0  # without a reading for longer than this, it was the clock that jumped
 
 
@@ -149,8 +141,7 @@ class FreeDecayFit:
     fit: OneMassFit  # with viscous and Coulomb damping
     viscous: OneMassFit  # the same readings without Coulomb damping
     verdict: ResidualAssessment
-    adequate: bool
-    """The residuals are noise, and nothing moves after the motion should have ended."""
+    adequate: bool  # the residuals are noise, and nothing moves after the motion should have ended
     unit: str  # of the readings, and of what is left of them
     warnings: list[ResultWarning]
 

@@ -24,8 +24,7 @@ MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
 
 _ORDERS: Final[dict[str, int]] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _PER_TIME: Final = ("", "/s", "/s²")
-_SIGNIFICANT_SIGMAS: Final = 3.3
-"""Coulomb friction is claimed when x_k is so many standard uncertainties above zero: 1 in 2000 by chance."""
+_SIGNIFICANT_SIGMAS: Final = 3.3  # of x_k above zero, to claim friction: 1 in 2000 by chance
 
 
 def identify_one_mass(

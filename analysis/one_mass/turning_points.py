@@ -19,12 +19,10 @@ _CLASSICAL_SHARE = 0.1  # the classical log decrement counts the swings above th
 class TurningPoints:
     """Measured extremes of a decay."""
 
-    number: "np.ndarray[tuple[int], np.dtype[np.int64]]"
-    """(k,) int64: half cycles since the first; increasing, not necessarily without gaps."""
+    number: "np.ndarray[tuple[int], np.dtype[np.int64]]"  # (k,): half cycles since the first, with gaps
     time_s: Floats
     value: Floats
-    side: Floats
-    """(k,) float64: +1 for a maximum, -1 for a minimum."""
+    side: Floats  # (k,) float64: +1 for a maximum, -1 for a minimum
     noise_gain: Floats  # (k,) float64: standard uncertainty of `value` per unit of noise in a reading
 
 

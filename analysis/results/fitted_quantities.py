@@ -142,8 +142,7 @@ def msk64_degree(velocity_max_m_per_s: float) -> str:
 
 CHI_SQUARE_RISE_95 = 3.841458820694124  # rise of chi-square at the ends of a 95 % interval
 _QUADRATIC = 0.15  # relative deviation from that rise up to which a parabola is good enough
-_DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)
-"""Distances at which chi-square is evaluated, in units of the half interval of a parabola."""
+_DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)  # in half intervals of a parabola
 _HOPELESS = 14.0  # rise from which on a density of exp(-rise / 2) adds nothing to the interval
 _FINE = 2001
 _PROFILE_STEPS = 8
@@ -165,11 +164,9 @@ class Profile:
     problem: FitProblem
     law: FrictionLaw
     parameter: int
-    parameters: Floats
-    """(p,) float64: the fit."""
+    parameters: Floats  # (p,) float64: the fit
     follow: Floats  # (p,) float64: how the others follow a step of one in the parameter, by a parabola
-    deviation: float
-    """Standard uncertainty of the parameter by the noise, the known parameters being as fitted."""
+    deviation: float  # standard uncertainty by the noise, the known parameters being as fitted
     white: float  # its variance over that by white noise as stated
 
     @classmethod
@@ -241,12 +238,10 @@ def distribution(shifts: Floats, rises: Floats) -> ProfileInterval:
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _READINGS = 3000
-_FIRST_STEP = 1e-4
-"""Of the way up along f_s, relative to the likeliest; each next step is twice as long."""
+_FIRST_STEP = 1e-4  # of the way up along f_s, relative to the likeliest; each next step is twice as long
 _FARTHEST = 3.0  # f_s over the likeliest where the way ends
 _STEPS, _HALVINGS = 6, 5
-_SLIP_DOUBT = 2.0
-"""Later slips take back part of the first one: what gauge 2 shows in the end is as much smaller."""
+_SLIP_DOUBT = 2.0  # later slips take back part of the first one: gauge 2 shows as much less in the end
 
 
 def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> None:
@@ -391,8 +386,7 @@ def _largest_demand(parameters: Floats, phase: Floats) -> float:
 
 
 _DRAWS = 40  # of parameters, for the scatter of the end of slip: it is known to a ninth
-_PLAUSIBLE = 2.0
-"""Laws whose BIC is higher by less than so many times the price of a parameter may be the true ones."""
+_PLAUSIBLE = 2.0  # times the price of a parameter by which the BIC of a law that may be true is higher
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,7 @@ from messages.message import message
 
 _BAND = 3.2905  # 99.9 % of a normal distribution lie within this many standard deviations
 _BEND_SIGMAS = 5.0
-_NEGLIGIBLE = 0.25
-"""Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
+_NEGLIGIBLE = 0.25  # of the noise's variance: smaller residuals may have any colour, by rounding
 
 
 def identifiable_fits(fits: list[Fit]) -> list[Fit]:
@@ -168,8 +167,7 @@ class JointFit:
     record: Record
     decay: FreeDecay
     problem: FitProblem
-    chosen: Fit
-    """The likeliest law (lowest BIC) among `candidates`."""
+    chosen: Fit  # the likeliest law (lowest BIC) among `candidates`
     candidates: list[Fit]  # fits of the laws whose parameters the record identifies
     uncertainty: ParameterUncertainty
     selection: ModelSelection

@@ -21,13 +21,11 @@ from analysis.record import Record, RecordError
 from analysis.results.joint_fit import JointFit
 from messages.message import message
 
-_LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
-"""Table masses that are tried, as shares of the one given, and the step between neighbours."""
+_LEAST, _MOST, _STEP = 0.2, 5.0, 1.26  # table masses tried, over the one given
 _ALIKE = 0.05  # relative deviation of the ratio of the masses up to which they may be each other's
 _WINDOW_PERIODS = 1.5  # the first slips determine the ratio of the masses best
 _TOLERANCE = 1e-2
-_LOOSE = 0.5
-"""Relative standard deviation with which the table mass is free."""
+_LOOSE = 0.5  # relative standard deviation with which the table mass is free
 _SHARE = 0.01  # a relative difference of the table mass below this gets no warning
 _SIGMAS = 5.0  # a table mass is contradicted by a difference of so many standard uncertainties
 _BETTER = 0.1  # the excess of chi-square must shrink to this share

@@ -32,8 +32,7 @@ _PARAMETERS = {
     "tilt_rad": Parameter.TILT,
     "pullback_m": Parameter.PULLBACK,
 }
-_CONSTANTS = ("period_s", "damping_n1_per_s")
-"""They come from the tail, where there is one, and so have draws of their own."""
+_CONSTANTS = ("period_s", "damping_n1_per_s")  # of the tail: they have draws of their own
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,8 +21,7 @@ class RepeatedPullback:
     """
 
     pullback_m: float
-    released: Motion
-    """Motion after a release, simulated for decay and re-centring at least."""
+    released: Motion  # motion after a release, simulated for decay and re-centring at least
     timetable: Timetable
     plate_offset_m: float = 0.0
 

@@ -33,8 +33,7 @@ from messages.message import Message
 CLOCK_UNCERTAINTY = 2e-5  # relative standard uncertainty of the device's clock, as the runs state it
 _BETWEEN_TESTS = datetime.timedelta(minutes=2)
 _UNTIL_REST_S = 90.0
-_SURELY_SLIPS = 1.05
-"""f_s of the paper is true where the release exceeds f_s g by so much; elsewhere the row would never slip."""
+_SURELY_SLIPS = 1.05  # release over f_s g from which f_s of the paper is true; below it no slip
 
 
 class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,14 +43,11 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     repeats: int = 3
     seed: int = 1
     rate_hz: float = 1000.0
-    duration_s: float = 10.0
-    """Of each run after its release."""
+    duration_s: float = 10.0  # of each run after its release
     noise_m: float = 20e-6
-    friction_scatter: float = 0.0
-    """Standard deviation of f_d from run to run, as a share of it."""
+    friction_scatter: float = 0.0  # standard deviation of f_d from run to run, as a share of it
     friction_per_kg: float = 0.0  # by which share f_d changes for each kg of added mass
-    friction_by_contact: bool = False
-    """f_d depends on nothing but the contact: that of the contact's first row everywhere."""
+    friction_by_contact: bool = False  # f_d of the contact's first row everywhere
     static_friction: Literal["printed", "dynamic"] = "printed"
     """"printed": as in Table 1, or f_d where the row would then never slip; "dynamic": f_d everywhere."""
 
@@ -70,8 +66,7 @@ class SystematicErrors(msgspec.Struct, frozen=True):
     gains: tuple[float, float]  # by which share displacements are read too large
     bends_m: tuple[float, float]  # largest deviations from the calibration line
     lag_s: float
-    clock: float
-    """By which share true time runs faster than the device's."""
+    clock: float  # by which share true time runs faster than the device's
     table_mass_kg: float  # error of the true value against the stated one, as of the next two
     plate_mass_kg: float
     gravity_m_per_s2: float
@@ -215,8 +210,7 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
 
 
 _HELD_S = 1.0
-_PLACES_M = (2e-4, 2e-3)
-"""Standard deviations of where table and plate stand at rest, as the gauges read them."""
+_PLACES_M = (2e-4, 2e-3)  # standard deviations of where table and plate stand at rest as read
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 
 

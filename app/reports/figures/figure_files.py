@@ -30,16 +30,14 @@ from config.schema import Stand
 
 Format = Literal["png", "svg", "pdf"]
 FRICTION_FIGURE = "2"
-NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))
-"""Numbers of the paper's figures that are drawn."""
+NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))  # of the paper's figures that are drawn
 
 
 class FigureFile(msgspec.Struct, frozen=True):
     figure: str
     file: str
     caption: str
-    run: str = ""
-    """Path of its run; "" for a figure of all runs."""
+    run: str = ""  # path of its run; "" for a figure of all runs
 
 
 class FigureFolder(msgspec.Struct, frozen=True):

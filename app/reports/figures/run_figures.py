@@ -30,8 +30,7 @@ from app.reports.figures.style import (
 from config.schema import Stand
 
 Floats = NDArray[np.float64]
-_BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0
-"""Periods shown before the release, and after the last slip."""
+_BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0  # periods shown before the release, and after the last slip
 _WITHOUT_SLIP_PERIODS = 15.0
 _PER_PERIOD = 200
 _USUAL_PERIOD_S = 0.3
@@ -44,8 +43,7 @@ class RunFigureData:
 
     time_s: Floats  # (n,) float64: times of the readings since the release
     table_m: Floats
-    relative_m: Floats | None
-    """(n,) float64 or None: plate against table; None without a second gauge."""
+    relative_m: Floats | None  # (n,) float64 or None: plate against table; None without a second gauge
     motion: MotionSamples | None  # of the fitted law; None without one
     slip_end_s: float | None
     results: dict[str, Quantity]
@@ -155,8 +153,7 @@ class RunFigure:
     number: str
     caption: str
     draw: Draw
-    simulated: bool = True
-    """It shows the fitted motion, and needs one."""
+    simulated: bool = True  # it shows the fitted motion, and needs one
 
     def render(self, run: RunFigureData, title: str = "") -> Figure | None:
         """Draw the figure within `print_style`; None where the run has nothing to show in it."""

@@ -20,8 +20,7 @@ TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
 DASHED: Final = (0, (4, 2))
 FORMATS: Final = ("png", "svg", "pdf")
 FAMILY = "IBM Plex Sans"
-COLUMN_IN = 3.46
-"""Width of a column of a journal, 88 mm."""
+COLUMN_IN = 3.46  # width of a column of a journal, 88 mm
 _STRETCHES = 4000  # more stretches than a page has dots across at 300 dpi
 Floats = NDArray[np.float64]
 _REPRODUCIBLE: Final[dict[str, dict[str, Any]]] = {

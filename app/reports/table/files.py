@@ -32,8 +32,7 @@ from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, writ
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
-_UNLIMITED_WIDTH: Final = 1_000_000
-"""Of a text that is not printed on a terminal."""
+_UNLIMITED_WIDTH: Final = 1_000_000  # of a text that is not printed on a terminal
 
 
 def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:

@@ -117,8 +117,7 @@ def _bounds(row: SeriesRow) -> str:
 
 _GAP: Final = "  "
 _UNBROKEN: Final = "\u00a0%"
-_SAID, _NAMED = 3, 12
-"""Series for which a warning is printed in full, and that are named."""
+_SAID, _NAMED = 3, 12  # series for which a warning is printed in full, and that are named
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
     " law explains a run."

@@ -86,8 +86,7 @@ class Section(msgspec.Struct, frozen=True):
 class Report(msgspec.Struct, frozen=True):
     title: str
     subtitle: str
-    laboratory: str
-    """"" where unknown."""
+    laboratory: str  # "" where unknown
     date: str  # ISO date of the report, the only difference between two reports of the same runs
     software: str
     sections: list[Section]

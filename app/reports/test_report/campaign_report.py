@@ -43,8 +43,7 @@ class CampaignReportInput:
     gathered: CollectedRuns
     prints: Sequence[Fingerprint]
     shown: Sequence[Analysis]
-    folder: str
-    """Common folder of all runs; paths are relative to it."""
+    folder: str  # common folder of all runs; paths are relative to it
 
 
 def campaign_sections(material: CampaignReportInput) -> list[Section]:
