@@ -25,7 +25,7 @@ SOURCES = {
     for path in sorted((ROOT / folder).rglob("*.py"))
 }
 SPEAKING = {
-    path: text for path, text in SOURCES.items() if re.search(r"\b(ResultWarning|result_warning|Symptom)\(", text)
+    path: text for path, text in SOURCES.items() if re.search(r"\b(Caution|ResultWarning|Symptom)\(", text)
 }
 """Modules that warn."""
 KEPT = re.compile(
