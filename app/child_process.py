@@ -34,8 +34,7 @@ READ_BYTES = 1 << 16  # of one read: what a pipe holds on Linux
 _KILLED_S = 5.0
 """Wait for a killed process no longer: one that is blocked by a dead disk does not end even then."""
 _POLL_S = 0.1
-_LINE_BYTES = 1 << 24
-"""Longest line. More than that without a newline is no message."""
+_LINE_BYTES = 1 << 24  # more than that without a newline is no message
 _SESSION_SIGNALS = ("SIGINT", "SIGHUP", "SIGBREAK")
 """They reach all processes of a terminal; the parent decides what they mean."""
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -20,13 +20,11 @@ if TYPE_CHECKING:  # the window, which shows averages, decodes nothing
     from app.acquisition.stream.live_stream import LiveStream
 
 TIMEOUT_S = 5.0
-WINDOW_S = 1.0
-"""Length of an averaging window: 1 s averages whole periods of 50 and 60 Hz hum."""
+WINDOW_S = 1.0  # length of an averaging window: 1 s averages whole periods of 50 and 60 Hz hum
 MAX_WINDOWS = 5
 """A reading waits at most this many windows until the gauge is at rest, then it is taken with a warning."""
 OVERLOAD_FLAGS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
-_STALE_S = 0.1
-"""Samples that were sent before the request may still be under way for so long."""
+_STALE_S = 0.1  # samples that were sent before the request may still be under way for so long
 _VALID_FRACTION = 0.5  # least fraction of valid samples in a window: below it the gauge is hardly in range
 _STEADY = 6.0  # standard errors of the difference of the halves up to which a window counts as steady
 
@@ -36,11 +34,9 @@ class AveragedCounts:
     """Counts of one gauge over a window."""
 
     counts: float
-    noise_counts: float
-    """Standard deviation of a sample."""
+    noise_counts: float  # standard deviation of a sample
     samples: int
-    creep_counts: float
-    """Mean of the second half minus that of the first."""
+    creep_counts: float  # mean of the second half minus that of the first
 
     @property
     def is_steady(self) -> bool:

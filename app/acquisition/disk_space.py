@@ -16,11 +16,9 @@ _RECORD_BYTES = 24.0  # header of a journal record; a read is one record
 _READS_PER_S = 250.0  # upper bound: one read each 4 ms
 _LONGEST_S = 20.0  # longest time from release to end of a run that lasts until rest
 _CLOSING_BYTES = 4 * MARGIN_BYTES
-_CLOSING_S = 3.0
-"""A run is ended while there is space for so many more seconds, and to close it regularly."""
+_CLOSING_S = 3.0  # a run is ended while there is space for so many more seconds, and to close it regularly
 _POLL_PERIOD_S = 0.5
-_WARN_S = 60.0
-"""The operator is warned while there is space for so many more seconds."""
+_WARN_S = 60.0  # the operator is warned while there is space for so many more seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +26,7 @@ class DiskDemand:
     """What a run writes."""
 
     rate_hz: float
-    wire_bytes_per_s: float
-    """What the device sends."""
+    wire_bytes_per_s: float  # what the device sends
 
     @property
     def journal_bytes_per_s(self) -> float:
@@ -82,8 +79,7 @@ class DiskSpaceMonitor:
         self._folder = folder
         self._demand: DiskDemand | None = None
         self._is_warned = False
-        self.free_bytes = free_bytes(folder)
-        """Of the folder that is followed; None if unknown."""
+        self.free_bytes = free_bytes(folder)  # of the folder that is followed; None if unknown
         self._changing = threading.Lock()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)

@@ -52,13 +52,11 @@ class PullbackSituation:
     state: PullbackState
     position: StandPosition = _UNKNOWN_POSITION
     table_m: float = math.nan
-    plate_m: float = math.nan
-    """Reading of gauge 2."""
+    plate_m: float = math.nan  # reading of gauge 2
     plate_range: AllowedPlateRange | None = None
     """Allowed position of the plate before a pull; None where the range of gauge 2 is unknown."""
     simulated: bool = False
-    note: Message | str = ""
-    """What did not go as expected."""
+    note: Message | str = ""  # what did not go as expected
     loss_reason: Message | str = ""  # why the device is lost; empty while it is there
 
     @property

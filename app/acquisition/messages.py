@@ -62,8 +62,7 @@ class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     baud: int | None = None
     parity: str = "N"
     rate_hz: float | None = None
-    device: dict[str, str] = {}
-    """The device's own settings, `--set KEY=VALUE`, checked by its driver."""
+    device: dict[str, str] = {}  # the device's own settings, `--set KEY=VALUE`, checked by its driver
     relative_url: str = ""
     """Port of the device of gauge 2, where each gauge has a device and a port of its own."""
 
@@ -140,8 +139,7 @@ class StandPosition(msgspec.Struct, frozen=True):
     tolerance_m: float = 0.0
     table_zero_m: float | None = None
     relative_zero_m: float | None = None
-    held_m: float | None = None
-    """Where the table was held last."""
+    held_m: float | None = None  # where the table was held last
     side: int = 0  # side to which the table is pulled: 1 or -1 by the sign of gauge 1, 0 while unknown
     plate_m: float | None = None  # reading of gauge 2 before the pull
     plate_wanted_m: float | None = None
@@ -187,8 +185,7 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     damaged: int
     overloaded: int
     rate_hz: float
-    release_s: float | None = None
-    """On the run's time axis."""
+    release_s: float | None = None  # on the run's time axis
     message: Message = EMPTY
     time_base: TimeBase = TimeBase()
     remaining: int = 0
@@ -204,8 +201,7 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     damaged: int
     overloaded: int
     free_disk_bytes: int
-    bytes_per_s: float = 0.0
-    """What a recording writes, journal included; 0 where nothing has come yet."""
+    bytes_per_s: float = 0.0  # what a recording writes, journal included; 0 where nothing has come yet
 
 
 def is_known(quantity: Quantity) -> bool:
@@ -222,8 +218,7 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     damping_n1: Quantity | None = None
     law: str = ""
     slip_end_s: float | None = None
-    narrowing: tuple[str, ...] = ()
-    """What waiting longer would still narrow, by the names of INTERFACE."""
+    narrowing: tuple[str, ...] = ()  # what waiting longer would still narrow, by the names of INTERFACE
     may_stop: bool = False  # waiting longer does not narrow f_d
     is_enough: bool = False  # nor T, nor n1: a run without a set duration ends now
     message: Message = EMPTY  # why there are no more of these, where something went wrong
@@ -265,8 +260,7 @@ class FollowRun(msgspec.Struct, frozen=True, tag=True):
     """A run was released: identify it from row `first_row` of the ring on, again and again."""
 
     ring_path: str
-    first_row: int
-    """Also the run's number in the answers."""
+    first_row: int  # also the run's number in the answers
     metadata: RunMetadata
     time_base: TimeBase
 

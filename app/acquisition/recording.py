@@ -46,7 +46,6 @@ class RecordingContext:
     read_queue: ReadQueue
     history: ReadHistory
     writer: WriterClient
-    """Idle."""
     time_base: Callable[[int, int], TimeBase]
     emit: Callable[[messages.Event], None]
 

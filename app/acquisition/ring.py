@@ -31,12 +31,10 @@ from drivers.samples import SampleBlock
 from messages.i18n import N_
 
 _MAGIC = np.uint64(0x32474E495250494C)  # "LIPRING2"
-_WORDS = 5
-"""Of the header: magic, capacity, rows announced, rows written, bytes of the settings behind them."""
+_WORDS = 5  # of the header: magic, capacity, rows announced, rows written, bytes of the settings behind them
 _PAGE_BYTES = 4096
 _ROW_BYTES = 2 * 8 + 1
-_LAPPED_TRIES = 3
-"""A reader that the writer has overtaken so often returns what is left."""
+_LAPPED_TRIES = 3  # a reader that the writer has overtaken so often returns what is left
 _HELD_S = 60.0  # time that the ring should hold, within `_HELD_ROWS`
 _HELD_ROWS = (1 << 16, 1 << 21)
 
@@ -196,8 +194,7 @@ def _columns_start(settings_end: int) -> int:
 
 _PREFIX = "slipstand-live-"
 _LOCK = "engine.lock"
-_SETTLED_S = 60.0
-"""A younger folder may belong to an engine that has not locked it yet."""
+_SETTLED_S = 60.0  # a younger folder may belong to an engine that has not locked it yet
 
 
 @contextlib.contextmanager

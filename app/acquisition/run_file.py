@@ -85,8 +85,7 @@ class UncommittedRows:
 
 _BATCH_S = 0.05  # rows are passed to the writer in batches: block by block costs several times as much
 _CLOSING_S = 120.0
-_SLOW_BYTES_PER_S = 5e6
-"""And so much longer for what the writer copies and reads again, on a slow disk."""
+_SLOW_BYTES_PER_S = 5e6  # and so much longer for what the writer copies and reads again, on a slow disk
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,8 +53,7 @@ class JournalFile:
         self.move_cause: OSError | None = None
         self._file = file
         self._first = first
-        self.size = len(first)
-        """Bytes of all whole records."""
+        self.size = len(first)  # bytes of all whole records
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None

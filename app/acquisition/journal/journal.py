@@ -39,14 +39,12 @@ class Journal:
 
     _QUEUE_RECORDS = 4096
     _SYNC_S = 0.1
-    _CLOSE_S = 60.0
-    """A disk that has taken none of the remaining records for so long hangs."""
+    _CLOSE_S = 60.0  # a disk that has taken none of the remaining records for so long hangs
 
     def __init__(self, file: JournalFile, identifier: str = "") -> None:
         self.identifier = identifier
         self._file = file
-        self.size = file.size
-        """Bytes that it has, or will have once all is written."""
+        self.size = file.size  # bytes that it has, or will have once all is written
         self.written = file.size
         """Bytes that the system took; a record that begins at a later one is not in the file."""
         self._appending = threading.Lock()

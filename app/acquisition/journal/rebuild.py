@@ -40,8 +40,7 @@ class ReplayedReads:
 
     rows: CalibratedBlock | None
     losses: Losses
-    start: int
-    """Byte of the journal at which the first record begins."""
+    start: int  # byte of the journal at which the first record begins
     is_in_run: bool  # they came after the run file was begun
 
 
@@ -169,8 +168,7 @@ def _source(summary: JournalSummary) -> SampleSource:
 INTERRUPTED_NOTE = "Slipstand was ended while it recorded; this run was rebuilt from its journal"
 DIFFERS_NOTE = "its samples do not number as they did while they came: the version of Slipstand may differ"
 _ROWS_AT_ONCE = 1 << 16
-_KEPT_S = 10.0
-"""Longest part that is kept of a run that had not come to its release."""
+_KEPT_S = 10.0  # longest part that is kept of a run that had not come to its release
 
 
 @dataclass(frozen=True)

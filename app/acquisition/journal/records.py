@@ -23,8 +23,7 @@ class JournalHeader(msgspec.Struct, frozen=True, tag=True):
 
     port: PortSettings
     run: RunSettings
-    metadata: RunMetadata
-    """With the time of arming for the start."""
+    metadata: RunMetadata  # with the time of arming for the start
     identifier: str
     program: str
 
@@ -59,8 +58,7 @@ class Opened(msgspec.Struct, frozen=True, tag=True):
     start_index: int
     start_time: datetime.datetime
     layout: BlockLayout
-    wire_start: int
-    """Byte of the journal from which on its bytes go into the run file."""
+    wire_start: int  # byte of the journal from which on its bytes go into the run file
     reads: int | None = None
     """Decoded by then, None for all before this record; the account of later ones counts for the run."""
 
@@ -130,8 +128,7 @@ class JournalSummary:
     named: Named | None
     ended: Ended | None
     wire_bytes: int
-    is_torn: bool
-    """There is more behind the last whole record."""
+    is_torn: bool  # there is more behind the last whole record
 
     @property
     def rate_hz(self) -> float:

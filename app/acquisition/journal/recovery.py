@@ -62,8 +62,7 @@ class Recovery(msgspec.Struct, frozen=True):
     run: str = ""
     samples: int = 0
     ended: str = ""
-    kept: str = ""
-    """Where the earlier file of the run is now, if it held anything that the new one does not."""
+    kept: str = ""  # where the earlier file of the run is now, if it held anything that the new one does not
     message: Message = EMPTY
 
 

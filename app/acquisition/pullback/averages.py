@@ -25,8 +25,7 @@ class BinAverages:
 
     center: Floats  # (n,) sample index of the middle of each bin
     table_m: Floats
-    relative_m: Floats
-    """(n,) mean displacements (m), NaN where gauge 2 has no reading."""
+    relative_m: Floats  # (n,) mean displacements (m), NaN where gauge 2 has no reading
 
     def __len__(self) -> int:
         return len(self.center)
@@ -197,8 +196,7 @@ def _median(values: Floats) -> float:
 
 
 _ZEROS_KEPT_S = 10.0
-_KNOWN_S = 0.15
-"""The zero is known when the levels of so long a time agree; each is itself a mean over 0.3 s."""
+_KNOWN_S = 0.15  # the zero is known when the levels of so long a time agree; each is itself a mean over 0.3 s
 _BEFORE_S = 1.3  # the zero is taken so long before the pull is noticed: a smooth pull begins unnoticed
 
 

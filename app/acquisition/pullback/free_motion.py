@@ -39,8 +39,7 @@ _REST_S = 1.0  # window over which rest is judged
 _OVERSHOOT = 0.05  # fraction of the pullback by which a released table swings to the other side, at least
 _REST_NOISES = 0.5  # at rest, the motion is less than this part of the noise of a sample, plus `_REST_M`
 _REST_M = 1e-6
-_STUCK_M = 5e-6
-"""Motion of the plate against the table that still counts as sticking."""
+_STUCK_M = 5e-6  # motion of the plate against the table that still counts as sticking
 _SLIP_NOISES = 6.0
 """A slip must exceed so many standard deviations, and `_SLIP_M`, in `_BINS_TO_SLIP` averages in a row."""
 _SLIP_M = 20e-6

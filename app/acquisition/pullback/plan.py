@@ -71,8 +71,7 @@ def allowed_plate_range(range_m: float, expected: Excursion) -> AllowedPlateRang
 
 _USUAL_PULLBACK_M = 0.01
 _TOLERANCE = 0.02
-_TOLERANCE_MIN_M = 0.1e-3
-"""Of the pullback, where the plan gives none: 2 %, and 0.1 mm at least."""
+_TOLERANCE_MIN_M = 0.1e-3  # of the pullback, where the plan gives none: 2 %, and 0.1 mm at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,13 +83,11 @@ class PullbackPlan:
     """Nominal pullback, of either sign (m); about 10 mm are expected where none is known."""
     duration_s: float | None = None  # time after release; None until rest, or `enough_s`
     trigger_timeout_s: float = math.inf
-    enough_s: float = 20.0
-    """Time after release at which waiting longer no longer helps (s)."""
+    enough_s: float = 20.0  # time after release at which waiting longer no longer helps (s)
     tolerance_m: float | None = None
     """How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least."""
     pretrigger_s: float = 0.0
-    first_index: int = 0
-    """Oldest sample that is kept: nothing is armed until it is as old as the pretrigger."""
+    first_index: int = 0  # oldest sample that is kept: nothing is armed until it is as old as the pretrigger
     relative_range_m: float | None = None
     """Gauge 2 reads from minus to plus this (m); None where it is not known."""
     gauge_2_on_base: bool = False
@@ -131,8 +128,7 @@ class Transition:
     state: PullbackState
     index: int
     note: Message = EMPTY
-    is_stored: bool = False
-    """The note is about the run itself, and is stored in its file."""
+    is_stored: bool = False  # the note is about the run itself, and is stored in its file
     end_reason: EndReason | None = None
 
 
@@ -142,8 +138,7 @@ class PullbackMeasurement:
 
     zero_m: float | None = None
     relative_zero_m: float | None = None
-    plate_m: float | None = None
-    """What gauge 2 itself read at the zero."""
+    plate_m: float | None = None  # what gauge 2 itself read at the zero
     held_m: float | None = None
     held_index: int | None = None
     release_index: int | None = None

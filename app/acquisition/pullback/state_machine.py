@@ -56,8 +56,7 @@ _REFERENCE_S = 0.06
 """Length of the reference before a release: the mean has less noise the longer it is, but more creep."""
 _STEADY_S = 0.3  # the table must be held for so long, without drift, to be armed
 _DRIFT_S = 1.0
-_DRIFT_M_PER_S = 50e-6
-"""Fastest drift at which a zero is taken and a hold is armed."""
+_DRIFT_M_PER_S = 50e-6  # fastest drift at which a zero is taken and a hold is armed
 _DRIFT_LEEWAY = 2.0  # an armed hold may drift so much faster than one that is to be armed
 
 # Fractions of the pullback:

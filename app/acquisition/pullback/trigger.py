@@ -32,8 +32,7 @@ class Trigger:
         self._is_untriggered = settings.trigger == "none"
         self._armed_index = armed_index
         self._pretrigger = round(settings.pretrigger_s * plan.rate_hz)
-        self.note = EMPTY
-        """Remark before the run begins."""
+        self.note = EMPTY  # remark before the run begins
         self.end: tuple[int, EndReason] | None = None
         """Sample before which the run ends, and why; None before that is known."""
         if not self._is_untriggered:

@@ -165,8 +165,7 @@ class Connection:
 _OFTEN_S = 0.2  # between two attempts at first: a cable that was loose is back soon
 _SELDOM_S = 1.0
 _OFTEN_UNTIL_S = 30.0
-_UNWATCHED_S = 1.0
-"""A caller that has not looked for so long got no processor time, and nor did the search."""
+_UNWATCHED_S = 1.0  # a caller that has not looked for so long got no processor time, and nor did the search
 
 
 class Reconnection:

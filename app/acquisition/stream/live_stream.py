@@ -41,8 +41,7 @@ class DecodedRead:
     """One read of the port, or several consecutive ones, with the samples that they completed."""
 
     data: bytes
-    arrival_ns: int
-    """Host's monotonic time after the read."""
+    arrival_ns: int  # host's monotonic time after the read
     rows: tuple[CalibratedBlock, ...]  # in order, without holes
     losses: Losses
 

@@ -15,12 +15,10 @@ RATE_TEMPLATE = N_(
 )
 
 _WRONG = 0.01
-_WRONG_ERRORS = 5.0
-"""A rate that is off by more, and by so many standard uncertainties, is reported."""
+_WRONG_ERRORS = 5.0  # a rate that is off by more, and by so many standard uncertainties, is reported
 
 _RECENT_S = 1.0
-_WINDOW_S = 4.0
-"""Window of the latest rate: a longer one is more certain, and reports a wrong rate later."""
+_WINDOW_S = 4.0  # window of the latest rate: a longer one is more certain, and reports a wrong rate later
 _HOLE_S = 1.0
 _HOLE_SAMPLES = 5.0
 """While nothing was read for so long, the host or the device stood still: the window around it is dropped."""
@@ -123,8 +121,7 @@ def rate_note(scale: float, nominal_hz: float) -> Message:
 STALLED_S = 3.0  # a device that sends nothing intelligible for so long has stalled; a slow one has longer
 
 _STALLED_SAMPLES = 5.0
-_KEPT_BYTES = 4096
-"""Part of unintelligible data that is kept for the message."""
+_KEPT_BYTES = 4096  # part of unintelligible data that is kept for the message
 _UNWATCHED_S = 1.0
 _UNREAD_S = 2.0
 """A thread that has not checked, or not read, for so long got no processor time; one read of a polled device

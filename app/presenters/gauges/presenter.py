@@ -31,8 +31,7 @@ else:
 HEALTH_S: Final = 5.0
 """Length of the samples that health is measured from: resolves hum to 0.2 Hz and drift to minutes."""
 HEALTH_EVERY_S: Final = 1.0
-_LEAST_S: Final = 1.1
-"""Least length: `measure_health` needs more than a second."""
+_LEAST_S: Final = 1.1  # least length: `measure_health` needs more than a second
 _LIVE_EVERY_S: Final = 0.1
 _NOT_CONNECTED: Final = N_(
     "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"

@@ -37,8 +37,7 @@ class GaugeCard:
     name: str
     validity: Chip
     values: tuple[LabelledValue, ...]
-    check: Chip = EMPTY_CHIP
-    """Outcome of the last check against a known displacement."""
+    check: Chip = EMPTY_CHIP  # outcome of the last check against a known displacement
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +49,7 @@ class GaugesState:
     checks_fault: Chip = EMPTY_CHIP
     tab: GaugesTab = GaugesTab.HEALTH
     device: str = ""
-    health: "tuple[GaugeHealthState, ...]" = ()
-    """Empty while nothing is known."""
+    health: "tuple[GaugeHealthState, ...]" = ()  # empty while nothing is known
     health_note: str = ""
 
 
@@ -70,8 +68,7 @@ class PortCard:
     """A serial port of this computer."""
 
     url: str
-    identity: str = ""
-    """USB chip or board, and USB numbers."""
+    identity: str = ""  # USB chip or board, and USB numbers
     status: Chip = EMPTY_CHIP
     """The device that was recognised, or why none was; empty before the port is probed."""
     description: tuple[str, ...] = ()  # how the device was verified, problems and remedies
@@ -85,8 +82,7 @@ class PortsState:
     ports: tuple[PortCard, ...] = ()
     progress: str = ""
     message: Chip = EMPTY_CHIP
-    query_silent: bool = False
-    """Whether the probe sends identification requests to silent devices."""
+    query_silent: bool = False  # whether the probe sends identification requests to silent devices
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +115,7 @@ class CalibrationData:
     points: tuple[CalibrationPoint, ...]
     degree: int
     resolution_m: float
-    uncertainty_m: float | None
-    """Of the dial gauge; None where it is not stated."""
+    uncertainty_m: float | None  # of the dial gauge; None where it is not stated
     file_name: str
 
 
@@ -130,8 +125,7 @@ class CalibrationFit:
 
     dial_mm: Floats  # (n,) float64: dial reading, and dial reading minus curve, in the order of the points
     residual_um: Floats
-    upward: NDArray[np.bool_]
-    """(n,) bool: whether the dial was rising."""
+    upward: NDArray[np.bool_]  # (n,) bool: whether the dial was rising
     values: tuple[LabelledValue, ...]
     warnings: tuple[str, ...]
 
@@ -142,16 +136,13 @@ class CalibrationState:
 
     form: CalibrationForm = CalibrationForm()
     live_value: str = ""
-    live_note: str = NO_DEVICE
-    """Noise of the counts, or why there are none."""
+    live_note: str = NO_DEVICE  # noise of the counts, or why there are none
     points: tuple[CalibrationPoint, ...] = ()
-    reading_status: str = ""
-    """Progress of the reading being averaged; empty while none is."""
+    reading_status: str = ""  # progress of the reading being averaged; empty while none is
     fit: CalibrationFit | None = None
     message: Chip = EMPTY_CHIP
     can_save: bool = False
-    offers_reconnect: bool = False
-    """Whether the device is still read with the previous calibration."""
+    offers_reconnect: bool = False  # whether the device is still read with the previous calibration
 
 
 class CheckKind(StrEnum):
@@ -189,11 +180,9 @@ class CheckState:
     """State of the tab Check: a gauge compared with a known step, in two readings."""
 
     form: CheckForm = CheckForm()
-    is_started: bool = False
-    """Whether a check is under way, which locks the form."""
+    is_started: bool = False  # whether a check is under way, which locks the form
     instruction: str = ""
-    reading_status: str = ""
-    """Progress of the reading being averaged; empty while none is."""
+    reading_status: str = ""  # progress of the reading being averaged; empty while none is
     outcome: Chip = EMPTY_CHIP
     values: tuple[LabelledValue, ...] = ()
     """Known and measured step, tolerance, and the budget of the tolerance."""
