@@ -19,8 +19,8 @@ STATE = state_type("broken", "last_sequence last_time")
 RULES = record_type("place", "period_s unit_s clock_step_s time_wrap sequence_wrap max_gap overload_count")
 """What does not change during a stream: the unit of the time column, 0 without one; the step of the device's
 clock; where time and sequence wrap, in their units, 0 where they do not; the gap in samples."""
-LINE = record_type("start end good discarded", "time sequence table relative")
-"""A line: where it is, whether it is good, bytes of this call discarded before it, and its values."""
+LINE = record_type("start end good", "time sequence table relative")
+"""A line: where it is, whether it is good, and its values."""
 
 _NEW_START = -1
 _CORRUPT = -2

@@ -11,10 +11,10 @@ from enum import IntEnum
 
 import numpy as np
 
-from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s
+from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s, record_type
 from drivers.clock import rate_from_steps
 from drivers.compiled import compiled, inlined
-from drivers.line_counting import BY_TIME, LINE, STATE, count_lines, make_rules
+from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder
 
 READ, WRITE, EVENT = 1, 2, 3
@@ -133,6 +133,8 @@ EVENT_BYTES = 28
 VALUES_OFFSET = 11  # place of its first value
 
 
+LINE = record_type("start end good discarded", "time sequence table relative")
+"""An event, or as many bytes of garbage; with the bytes of this call that were discarded before it."""
 _LENGTH_BYTE = EVENT_BYTES - 2
 _ADDRESS = int(Register.LOAD_CELLS)
 _PAYLOAD = S16 | HAS_TIMESTAMP
