@@ -90,7 +90,6 @@ class PlannedTest:
 
     @property
     def law(self) -> FrictionLaw:
-        """Simplest friction law that holds the parameters."""
         static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
         return compared_law(static_friction=static, tilt=self.parameters.tilt_rad != 0.0)
 
@@ -100,7 +99,6 @@ class PlannedTest:
         return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
 
     def motion(self) -> Motion:
-        """Expected motion until the plate rests, however long it is recorded."""
         return self.parameters.simulate(max(self.duration_s, _SETTLED_S))
 
 
@@ -114,7 +112,6 @@ class RangeUse:
 
     @property
     def share(self) -> float | None:
-        """Largest absolute reading over the range; None where the range is not stated."""
         return None if self.range_m is None else max(abs(self.lowest_m), abs(self.highest_m)) / self.range_m
 
     def fits(self, shift_m: float = 0.0) -> bool:
@@ -261,7 +258,6 @@ def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
 
 
 def _rest_s(test: PlannedTest) -> float | None:
-    """Time after the release at which the swing of the joint motion is as small as the noise."""
     motion = test.motion()
     _, n1 = _joint(test.parameters)
     if n1 == 0.0:

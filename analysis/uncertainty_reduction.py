@@ -67,7 +67,6 @@ class UncertaintyParts:
         return (self.noise / math.sqrt(0.25 * self.total**2 - self.stated**2)) ** 2
 
     def with_readings(self, factor: float) -> float:
-        """Total with `factor` times as many readings of the same white noise."""
         return math.hypot(self.noise / math.sqrt(factor), self.stated)
 
 

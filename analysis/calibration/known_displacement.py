@@ -76,12 +76,10 @@ class DisplacementCheck:
 
     @property
     def tolerance_m(self) -> float:
-        """Largest deviation that passes (m)."""
         return COVERAGE * self.standard_uncertainty_m
 
     @property
     def passed(self) -> bool:
-        """The stated uncertainties explain the deviation."""
         return abs(self.deviation_m) <= self.tolerance_m
 
 

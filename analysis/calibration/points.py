@@ -69,7 +69,6 @@ class CalibrationPoints:
         return readings
 
     def branches(self) -> list[IntArray]:
-        """Indices of the readings of each way up or down, in order."""
         keys = np.stack((self.round_number, self.direction), axis=1)
         places = [np.flatnonzero((keys == key).all(axis=1)) for key in np.unique(keys, axis=0)]
         return sorted(places, key=lambda place: int(place[0]))

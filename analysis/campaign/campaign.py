@@ -68,8 +68,7 @@ def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
 
 def _combined(group: Sequence[tuple[RunResult, Message]]) -> Message:
     """Message of the first run of a group, with the names of all runs."""
-    runs = {run.name: run for run, _ in group}
-    names, first = run_names(list(runs.values())), group[0][1]
+    names, first = run_names(list({run.name: run for run, _ in group}.values())), group[0][1]
     template = N_("{runs}: {warning}")
     if any(other != first for _, other in group):
         template = N_("{runs}: {warning} (of the first; of the others with other figures)")

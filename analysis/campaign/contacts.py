@@ -117,7 +117,6 @@ def _of_contact(contact: str, series: Sequence[Series], rows: Sequence[SeriesRow
 
 
 def _ratios(rows: Sequence[SeriesRow], name: str) -> Iterator[float]:
-    """A bound of f_s over f_d, of each row that has both."""
     for quantities in (row.quantities for row in rows):
         if name in quantities and _DYNAMIC in quantities and quantities[_DYNAMIC].quantity.value > 0.0:
             yield quantities[name].quantity.value / quantities[_DYNAMIC].quantity.value

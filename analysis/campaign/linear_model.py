@@ -69,14 +69,9 @@ def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | 
 
 
 def f_test(fitted: LinearFit, combinations: Floats, patterns: Floats) -> FTest:
-    """Test that `combinations @ coefficients` are all zero.
+    """Test that `combinations` (k, p), of rank k, times the coefficients are all zero.
 
-    Parameters
-    ----------
-    combinations : (k, p) float64
-        Of rank k.
-    patterns : (m, k) float64
-        Values of the combinations for an effect of size 1, in m ways; the least power counts.
+    `patterns` (m, k) are their values for an effect of size 1, in m ways; the least power counts.
     """
     count, degrees = len(combinations), fitted.degrees_of_freedom
     inverse = np.linalg.inv(combinations @ fitted.covariance @ combinations.T)
@@ -157,7 +152,6 @@ class DesignMatrix:
         return tuple(sorted({pullback for _, pullback in self.cells}))
 
     def form(self, place: int, share: float) -> Floats:
-        """Weights (p,) of one coefficient."""
         weights = np.zeros(self.matrix.shape[1])
         weights[place] = share
         return weights

@@ -29,7 +29,6 @@ class RepeatedValues:
         return len(self.values) - len(np.unique(self.series))
 
     def select(self, chosen: NDArray[np.bool_]) -> Self:
-        """Return the chosen values, with series numbered anew."""
         _, series = np.unique(self.series[chosen], return_inverse=True)
         return type(self)(self.values[chosen], self.variances[chosen], self.scales[chosen], series)
 
@@ -167,7 +166,6 @@ def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:
 
 
 def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
-    """Values that are outliers if all series scatter alike."""
     far = np.zeros(len(repeats.values), dtype=bool)
     while True:
         places = np.flatnonzero(~far)

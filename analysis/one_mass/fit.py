@@ -38,7 +38,6 @@ class Parameters(NamedTuple):
 
     @property
     def half_cycle_decrement(self) -> float:
-        """Damping over half a period, n T / 2."""
         return self.damping_n_per_s * math.pi / self.omega_rad_per_s
 
     def swings_like(self, other: "Parameters", end_s: float) -> bool:

@@ -42,24 +42,11 @@ def identify_one_mass(
     (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times,
     gaps, an initial hold, an offset, either sign and coarse steps are taken as they are.
 
-    Parameters
-    ----------
-    record : Record
-        Only time, gauge 1 and what is known of both are used; see `single_channel`.
-    quantity : "displacement", "velocity" or "acceleration"
-        What gauge 1 reads.
-    unit : str
-        Unit of the displacement, whatever `quantity` is: "m", "rad", "V"; x_k is given in it.
-    mass : Quantity, optional
-        Moving mass (kg); with it come stiffness and damping coefficient.
+    `quantity` is what gauge 1 reads, `unit` that of the displacement and x_k in any case: "m", "rad", "V".
+    With the moving `mass` (kg) come stiffness and damping coefficient. See `single_channel`.
 
-    Raises
-    ------
-    RecordError
-        A record that holds no free decay: noise, a driven or growing swing, a step, under two periods, or
-        so much else that no single decay explains it.
-    AnalysisError
-        Unknown `quantity`, or a mass that is not positive.
+    Raises RecordError for a record without a free decay (noise, a driven or growing swing, a step, under two
+    periods, several modes), AnalysisError for an unknown `quantity` or a mass that is not positive.
     """
     if quantity not in _ORDERS:
         raise AnalysisError(

@@ -183,7 +183,6 @@ class Profile:
         return cls(fixed, fit.law, parameter, fit.parameters, follow, deviation, white)
 
     def interval(self) -> ProfileInterval | None:
-        """Distribution by the profile; None where a parabola will do."""
         if all(
             abs(self._rise(side, follow=True) / CHI_SQUARE_RISE_95 - 1.0) < _QUADRATIC for side in (-1.0, 1.0)
         ):

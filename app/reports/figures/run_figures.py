@@ -156,7 +156,6 @@ class RunFigure:
     simulated: bool = True  # it shows the fitted motion, and needs one
 
     def render(self, run: RunFigureData, title: str = "") -> Figure | None:
-        """Draw the figure within `print_style`; None where the run has nothing to show in it."""
         if self.simulated and run.motion is None:
             return None
         figure, axes = new_figure()
@@ -245,7 +244,6 @@ def _motion(run: RunFigureData) -> MotionSamples:
 
 
 def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) -> None:
-    """Draw readings: broad and pale under the simulation, a plain line without one."""
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
     curve = decimate_for_print(run.time_s, MILLIMETRE.scale * reading_m)
     axes.plot(*curve, color=colour, linewidth=width, alpha=alpha, label="experiment")

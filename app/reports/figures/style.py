@@ -50,7 +50,6 @@ def new_figure(height_in: float = 2.5) -> tuple[Figure, Axes]:
 
 
 def place_legend_above(axes: Axes, **options: Any) -> None:
-    """Add a legend above the axes, where it covers no curve."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, **options)
 
 

@@ -45,7 +45,6 @@ class TableContent:
         return cls(runs.campaign(), runs.warnings, failures, published)
 
     def all_warnings(self) -> list[ResultWarning]:
-        """Warnings of the runs, of the campaign, and of its rows."""
         of_rows = [caution for row in self.campaign.rows for caution in row.warnings]
         return [*self.warnings, *self.campaign.warnings, *of_rows]
 

@@ -53,8 +53,8 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
 
 
 def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
-    software = f"Slipstand {__version__}"
-    return Report(head.title, subtitle, head.laboratory, head.date.isoformat(), software, sections)
+    date, software = head.date.isoformat(), f"Slipstand {__version__}"
+    return Report(head.title, subtitle, head.laboratory, date, software, sections)
 
 
 def _folder(names: Sequence[str]) -> str:

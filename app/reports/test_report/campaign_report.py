@@ -37,8 +37,6 @@ _ALWAYS_SHOWN: Final = ("Runs that do not count", "Runs without a result")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CampaignReportInput:
-    """Content of the report of a campaign."""
-
     content: TableContent
     gathered: CollectedRuns
     prints: Sequence[Fingerprint]
@@ -132,7 +130,6 @@ def _budget(material: CampaignReportInput) -> Iterator[blocks.Block]:
 
 
 def _by_source(pooled: PooledQuantity) -> dict[str, float]:
-    """Shared uncertainties by source, combined over calibrations and stands."""
     shares: dict[str, float] = {}
     for error, deviation in pooled.common.items():
         source = str(error.source)
