@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from app.presenters.base import Progress, TaskFailure, batch_progress, run_count_text
 from app.presenters.runs.state import ANALYSING, BatchOutcome, RunAnalysed
 from app.presenters.worker import LazyModule, Worker
-from messages.i18n import gettext, ngettext
+from messages.i18n import gettext, ngettext, translate
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
@@ -79,7 +79,7 @@ class AnalysisQueue:
     def _on_failed(self, batch: _Batch, failure: TaskFailure) -> None:
         if batch in self._pending:  # not after `cancel`
             name = f"{Path(batch.paths[0]).name}: " if len(batch.paths) == 1 else ""
-            self._faults.append(f"{name}{failure.message}")
+            self._faults.append(f"{name}{translate(failure.message)}")
             self._on_done(batch)
 
     def _end(self, *, is_cancelled: bool = False) -> None:

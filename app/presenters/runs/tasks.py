@@ -13,7 +13,7 @@ from analysis.record import AnalysisError
 from app.presenters.base import Progress, ReportProgress, batch_progress
 from app.presenters.conditions import parse_conditions
 from app.presenters.number_text import format_fixed
-from app.presenters.runs.import_form import COLUMN_FIELDS, FIELDS, GAIN, Form, parse_pairs
+from app.presenters.runs.import_form import FIELDS, GAIN, Form, parse_pairs
 from app.presenters.runs.state import ANALYSING, BatchOutcome, ImportPreview, Overlay, RunAnalysed, Trace
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
@@ -30,6 +30,7 @@ from app.runs.validator import shared_validator
 from config.files import load_stand
 from config.schema import ConfigError, SeriesError
 from messages.i18n import N_, gettext, ngettext, translate
+from messages.message import MessageError
 
 MAX_OVERLAID_RUNS = 8  # more curves over one another cannot be told apart by eye
 _DRAWN_SPANS = 1500  # extremes are kept for so many intervals of time: at least one a pixel of the preview
@@ -64,7 +65,8 @@ def change_runs(
         try:
             moved = change(path, *arguments)
         except (RunError, AnalysisError, ConfigError, ValueError) as error:
-            faults.append(f"{path.name}: {error}")
+            reason = error.message if isinstance(error, MessageError) else str(error)
+            faults.append(f"{path.name}: {translate(reason)}")
         else:
             done.append(str(moved if isinstance(moved, Path) else path))
     return BatchOutcome(tuple(done), tuple(faults))
@@ -90,9 +92,10 @@ def export_files(
             Progress(gettext("Exporting {name}", name=name), done / len(paths))
         ),
     )
+    failed = [outcome for outcome in outcomes if outcome.error]
     return BatchOutcome(
         tuple(file for outcome in outcomes for file in outcome.files),
-        tuple(f"{Path(outcome.run).name}: {outcome.error}" for outcome in outcomes if outcome.error),
+        tuple(f"{Path(outcome.run).name}: {translate(outcome.error)}" for outcome in failed),
     )
 
 
@@ -122,7 +125,7 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
         try:
             overviews.append(open_decimated(path, _DRAWN_SPANS, **options))
         except RunError as error:
-            faults.append(str(error))
+            faults.append(translate(error.message))
     if len(paths) > MAX_OVERLAID_RUNS:
         template = N_("The first {shown} of {all} selected runs are drawn")
         faults.append(gettext(template, shown=MAX_OVERLAID_RUNS, all=len(paths)))
@@ -210,10 +213,11 @@ def csv_import(form: Form) -> importing.CsvImport:
             "offset": number["offset"] or 0.0,
             "unit_name": form["unit_name"].strip() or None,
         }
-    columns = {name: form[name] or None for name in COLUMN_FIELDS}
     lines = _lines(form)
     layout = {
-        **columns,
+        "time": form["time"],
+        "table": form["table"],
+        "second": form["second"] or None,
         "delimiter": form["delimiter"] or None,
         "decimal": form["decimal"] or ".",
         "skip": lines["skip"],

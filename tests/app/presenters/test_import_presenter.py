@@ -329,6 +329,7 @@ def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
     ("changes", "said"),
     [
         ({"table": "nothing"}, "has no column 'nothing'"),
+        ({"time": ""}, "has no column ''"),
         ({"series": "9X"}, "series '9X' is not one of this stand"),
     ],
 )
