@@ -35,13 +35,7 @@ from app.acquisition.stream.live_stream import (
     concatenate,
     open_stream,
 )
-from app.child_process import (
-    CommandReader,
-    EventSender,
-    LineDecoder,
-    ignore_session_signals,
-    reserve_stdout,
-)
+from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
@@ -117,8 +111,7 @@ class Engine:
         self._history = ReadHistory(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
         self._live = LiveIdentifier(
-            str(ring.path),
-            lambda first: stream.time_base(first, self._history.next_index, recent=True),
+            str(ring.path), lambda first: stream.time_base(first, self._history.next_index, recent=True)
         )
         self._recording: Recording | None = None
         self._sequence = RunSequence()

@@ -28,10 +28,7 @@ _TEXTS = {
 _SIMULATED_TEXTS = {
     PullbackState.IDLE: (N_("Arm at any time"), N_("The simulated stand pulls and lets go by itself.")),
     PullbackState.RECENTRE: (N_("Wait for the plate"), N_("The stand puts it back by itself.")),
-    PullbackState.ZERO: (
-        N_("Wait for the pull"),
-        N_("The zero is being taken; the stand pulls by itself."),
-    ),
+    PullbackState.ZERO: (N_("Wait for the pull"), N_("The zero is being taken; the stand pulls by itself.")),
     PullbackState.HELD: (N_("Wait for the release"), N_("The stand lets go by itself.")),
     PullbackState.ARMED: (N_("Wait for the release"), N_("The stand lets go by itself.")),
     PullbackState.RELEASED: (N_("The plate slides"), N_("Recording.")),

@@ -298,11 +298,7 @@ def _wanted_start(summary: JournalSummary, end_index: int) -> int:
 
 
 def _ending(
-    summary: JournalSummary,
-    opened: Opened,
-    next_index: int,
-    statistics: SampleStatistics,
-    replay: Replay,
+    summary: JournalSummary, opened: Opened, next_index: int, statistics: SampleStatistics, replay: Replay
 ) -> EndMetadata:
     untimed = TimeBase.from_estimates(None, None)
     mark = summary.checkpoint or Mark(next_index, opened.start_index, Known(), untimed)

@@ -139,15 +139,8 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
             self._show_error(error)
             return
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
-        self._worker.submit(
-            tasks.save_calibration,
-            form,
-            data,
-            today,
-            valid_until,
-            done=self._on_saved,
-            failed=partial(self._show_error, can_save=True),
-        )
+        done, failed = self._on_saved, partial(self._show_error, can_save=True)
+        self._worker.submit(tasks.save_calibration, form, data, today, valid_until, done=done, failed=failed)
 
     def set_connected(self, is_connected: bool) -> None:
         """Live samples come from now on, or no longer."""
@@ -199,13 +192,8 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         except FormError as error:
             self._show_error(error, can_save=False)
             return
-        points = data.points
-        self._worker.submit(
-            tasks.fit_calibration,
-            data,
-            done=partial(self._on_fitted, points),
-            failed=partial(self._on_fit_failed, points),
-        )
+        done, failed = partial(self._on_fitted, data.points), partial(self._on_fit_failed, data.points)
+        self._worker.submit(tasks.fit_calibration, data, done=done, failed=failed)
 
     def _on_fitted(self, points: tuple[CalibrationPoint, ...], fit: CalibrationFit) -> None:
         if points == self.state.points:

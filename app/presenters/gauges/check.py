@@ -84,15 +84,9 @@ class CheckPresenter(ReadingPresenter[CheckState]):
             self._update(reading_status="", instruction=_step_instruction(self.state.form))
             return
         self._update(reading_status="", instruction="")
-        self._worker.submit(
-            tasks.check_gauge,
-            self.state.form,
-            self._rest,
-            average,
-            self._device,
-            done=self._on_checked,
-            failed=self._on_failed,
-        )
+        done, failed, form = self._on_checked, self._on_failed, self.state.form
+        task = tasks.check_gauge
+        self._worker.submit(task, form, self._rest, average, self._device, done=done, failed=failed)
 
     def _on_checked(self, checked: CheckOutcome) -> None:
         name = gettext("Gauge {number}", number=self.state.form.gauge + 1)

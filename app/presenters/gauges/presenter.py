@@ -140,14 +140,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         rows = self._recent.since(now_s - HEALTH_S)
         if rows is not None and self._recent.length_s >= _LEAST_S:
             self._is_measuring, self._measured_s = True, now_s
-            self._worker.submit(
-                tasks.measure_gauges,
-                rows,
-                self._rate_hz,
-                gauges,
-                done=partial(self._on_measured, gauges),
-                failed=partial(self._on_measure_failed, gauges),
-            )
+            done, failed = partial(self._on_measured, gauges), partial(self._on_measure_failed, gauges)
+            self._worker.submit(tasks.measure_gauges, rows, self._rate_hz, gauges, done=done, failed=failed)
 
     def _on_measured(self, gauges: Gauges, health: "tuple[GaugeHealthState, ...]") -> None:
         self._is_measuring = False
