@@ -77,12 +77,10 @@ class RecentSamples:
 
     @property
     def end_s(self) -> float:
-        """Time of the newest row; NaN without any."""
         return float(self._parts[-1].time_s[-1]) if self._parts else math.nan
 
     @property
     def length_s(self) -> float:
-        """Time from the oldest row to the newest; 0 without any."""
         return self.end_s - float(self._parts[0].time_s[0]) if self._parts else 0.0
 
     def append(self, rows: RingRows) -> None:
@@ -96,7 +94,6 @@ class RecentSamples:
         self._parts.clear()
 
     def since(self, start_s: float) -> RingRows | None:
-        """Rows from a time on, concatenated; None without any."""
         parts = [rows for rows in self._parts if rows.time_s[-1] >= start_s]
         if not parts:
             return None

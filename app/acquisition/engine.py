@@ -72,7 +72,6 @@ class PollSchedule:
         self._due_s = 0.0
 
     def pause_s(self, latency: Latency) -> float:
-        """How long bytes may collect in the port before each read (s)."""
         if latency is Latency.IMMEDIATE:
             return _AWAITING_PAUSE_S
         return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
@@ -177,7 +176,6 @@ class Engine:
                 self._recording.add(reads)
 
     def _follow_stream(self) -> None:
-        """Report what has become of the connection, and end a run that would wait too long for it."""
         for event in self._stream.take_events():
             if not isinstance(event, StreamNotice):
                 self._events.send(event)

@@ -163,7 +163,6 @@ class Recording:
             self.show_note(note)
 
     def show_note(self, note: Message) -> None:
-        """Show the operator a note that is not stored."""
         self._send_state(self._state, self._history.next_index, note)
 
     def poll(self) -> messages.RunEnded | None:

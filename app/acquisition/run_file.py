@@ -253,7 +253,6 @@ def start_time(read: DecodedRead, start_index: int, rate_hz: float) -> datetime.
 
 
 def _fault_of(step: Callable[[], None]) -> Exception | None:
-    """Run a step and return its error, whatever it is."""
     try:
         step()
     except Exception as error:

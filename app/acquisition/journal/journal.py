@@ -61,7 +61,6 @@ class Journal:
 
     @property
     def move_message(self) -> Message:
-        """Why and where the journal has moved; empty if it has not."""
         error = self._file.move_cause
         if error is None:
             return EMPTY
@@ -136,7 +135,6 @@ class Journal:
         return record
 
     def _write_for(self, duration_s: float) -> bool:
-        """Write for `duration_s` and sync; False at the end."""
         record = self._next()
         deadline = time.monotonic() + duration_s
         while record is not None:

@@ -217,7 +217,6 @@ class FreeMotion:
         return [Transition(PullbackState.CLOSING, round(index) + 1, end_reason=EndReason.REST)]
 
     def _release_before(self, last: float) -> int:
-        """Sample at which the table left its hold, from readings until `last`."""
         first = last - _RELEASE_FIT_S * self._plan.rate_hz
         falling = self._readings.table.between(first, last).copy()
         falling[:, 1] = self._measurement.side * (self._from.table_m - falling[:, 1])

@@ -157,7 +157,6 @@ class LiveStream:
 
     @property
     def note(self) -> str:
-        """Remark that belongs into every run of the device; "" for most."""
         return str(self._source.run_note)
 
     @property
@@ -215,7 +214,6 @@ class LiveStream:
         return decoded
 
     def set_read_pause(self, pause_s: float) -> None:
-        """Let bytes collect in the port for so long before each read (s)."""
         self._source.batch_delay_s = pause_s
 
     def close(self) -> None:

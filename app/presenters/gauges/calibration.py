@@ -214,7 +214,6 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         self._on_kept()
 
     def _data(self) -> CalibrationData:
-        """What the form asks to fit. Raises FormError."""
         form, uncertainty_m = self.state.form, None
         if form.uncertainty_mm.strip():
             uncertainty_mm = _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0)

@@ -86,6 +86,5 @@ class PortsPresenter(Presenter[PortsState]):
 
 
 def _with_known_devices(listed: Sequence[PortCard], before: Sequence[PortCard]) -> tuple[PortCard, ...]:
-    """Listed ports, each with the result of its last probe."""
     known = {(card.url, card.identity): card for card in before}
     return tuple(known.get((card.url, card.identity), card) for card in listed)

@@ -168,7 +168,6 @@ def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tu
 
 
 def _validity(gauge: Gauge, today: datetime.date) -> Chip:
-    """Whether a calibration is valid on a day."""
     until = gauge.valid_until
     if until is None:
         return Chip(
@@ -192,7 +191,6 @@ def _validity(gauge: Gauge, today: datetime.date) -> Chip:
 
 
 def _last_check_chip(check: GaugeCheck | None) -> Chip:
-    """Outcome of the last check of the calibration in use."""
     if check is None:
         return Chip(
             gettext("Not checked yet"),

@@ -101,8 +101,6 @@ class CalibratePanel(QWidget):
 
 
 class _ReadingColumn(QWidget):
-    """Live counts, the dial reading to type, and the table of points."""
-
     def __init__(self, presenter: CalibrationPresenter, choose: Callable[[int], None]) -> None:
         super().__init__()
         self.setFixedWidth(_COLUMN_WIDTH)

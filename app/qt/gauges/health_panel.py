@@ -61,8 +61,6 @@ class HealthPanel(QStackedWidget):
 
 
 class _Verdict(QWidget):
-    """Name, verdict, and what is wrong with its remedy."""
-
     def __init__(self, channel: int) -> None:
         super().__init__()
         self._name = label(role=TextRole.HEADING)
