@@ -24,9 +24,8 @@ SOURCES = {
     for folder in ("analysis", "app/runs")
     for path in sorted((ROOT / folder).rglob("*.py"))
 }
-SPEAKING = {
-    path: text for path, text in SOURCES.items() if re.search(r"\b(Caution|ResultWarning|Symptom)\(", text)
-}
+WARNING = re.compile(r"\b(ResultWarning|result_warning|Symptom)\(")
+SPEAKING = {path: text for path, text in SOURCES.items() if WARNING.search(text)}
 """Modules that warn."""
 KEPT = re.compile(
     r"\bf_[sd]\b|\bu_s\b|\bx_k\b|\bBIC\b|\bT\b|\bn1\b|[a-z]+\+tilt|coulomb|static|\b[mk]?m\b|µm|rms|mrad"
