@@ -390,14 +390,9 @@ def build_problem_from_channels(
     deviation = np.zeros(len(mean))
     deviation[[*_UNKNOWN, *range(SHARED_PARAMETER_COUNT, len(mean))]] = np.inf
     masses = record.masses
-    mean[Parameter.TABLE_MASS], deviation[Parameter.TABLE_MASS] = (
-        masses.table_mass_kg,
-        masses.table_mass_uncertainty_kg,
-    )
-    mean[Parameter.PLATE_MASS], deviation[Parameter.PLATE_MASS] = (
-        masses.plate_mass_kg,
-        masses.plate_mass_uncertainty_kg,
-    )
+    both = [Parameter.TABLE_MASS, Parameter.PLATE_MASS]
+    mean[both] = masses.table_mass_kg, masses.plate_mass_kg
+    deviation[both] = masses.table_mass_uncertainty_kg, masses.plate_mass_uncertainty_kg
     mean[Parameter.GRAVITY] = masses.gravity_m_per_s2
     deviation[Parameter.TABLE_GAIN] = gain_uncertainty(record.table_gauge, range_m(table.value_m))
     if relative is not None:

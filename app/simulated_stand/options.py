@@ -10,8 +10,7 @@ from drivers.errors import DriverError
 from drivers.registry import find_driver
 from drivers.simulated.faults import parse_disturbance
 
-PULLBACK_MAX_M = 0.1
-"""No stand is pulled back farther; larger numbers are millimetres by mistake."""
+PULLBACK_MAX_M = 0.1  # no stand is pulled back farther; larger numbers are millimetres by mistake
 
 
 class SimulatedStandError(DriverError):
@@ -72,36 +71,29 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     stand_file: str | None = None
     gauges_file: str | None = None
     """Calibration that turns its displacements into counts; the settings in use if None."""
-    device: dict[str, str] = {}
-    """The device's own settings, `--set KEY=VALUE`, as its driver knows them."""
+    device: dict[str, str] = {}  # the device's own settings, `--set KEY=VALUE`, as its driver knows them
 
     friction: float | None = None
     static_friction: float | None = None
     tilt_rad: float = 0.0
     pullback_m: float | None = None
     """Negative pulls to the other side."""
-    noise_m: float = 20e-6
-    """Standard deviation of both gauges' white noise."""
+    noise_m: float = 20e-6  # standard deviation of both gauges' white noise
     table_drift_m_per_s: float = 0.0
     relative_drift_m_per_s: float = 0.0
     """Drifts begin anew with each pullback test."""
-    nonlinearity_m: float = 0.0
-    """Largest deviation of both gauges from their calibration line."""
+    nonlinearity_m: float = 0.0  # largest deviation of both gauges from their calibration line
     table_clip_m: float | None = None
     relative_clip_m: float | None = None
     """Readings beyond are clipped, and flagged where the protocol can."""
-    clock_ppm: float = 0.0
-    """How much the device's clock is fast."""
+    clock_ppm: float = 0.0  # how much the device's clock is fast
     rate_error: float = 0.0
     """Fraction by which the device samples faster than it reports; the times that it sends are right."""
-    first_sequence: int = 0
-    """What the device's counter of samples reads at sample 0; it wraps at 2**32."""
+    first_sequence: int = 0  # what the device's counter of samples reads at sample 0; it wraps at 2**32
     gauge: Literal["table", "relative"] | None = None
     """The only gauge of the device, where it has but one: a `modbus` device, or `csv` lines of one value."""
-    lag_s: float = 0.0
-    """How much older its readings are than the time at which they are taken."""
-    first_time_s: float = 0.0
-    """What the device's clock reads at sample 0; its microseconds wrap at 2**32."""
+    lag_s: float = 0.0  # how much older its readings are than the time at which they are taken
+    first_time_s: float = 0.0  # what the device's clock reads at sample 0; its microseconds wrap at 2**32
 
     tcp_port: int | None = None
     """Where to listen on this computer, 0 being any free port; None: on a pseudo-terminal, if there are."""
@@ -114,10 +106,8 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """How long the operator takes to still the table and put the plate back."""
     every_s: float | None = None
     """From the beginning of a test to the next; at once after its last part if None."""
-    count: int | None = None
-    """Tests before the stand rests for good; None goes on for ever."""
-    recentre_every: int = 1
-    """The plate is put back after each so many tests; 0 leaves it where it slid to."""
+    count: int | None = None  # tests before the stand rests for good; None goes on for ever
+    recentre_every: int = 1  # the plate is put back after each so many tests; 0 leaves it where it slid to
     plate_offset_m: float = 0.0
 
     start_at_unix_s: float | None = None

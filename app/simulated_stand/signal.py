@@ -84,8 +84,7 @@ class StandSignal:
         self._status = np.concatenate([self._status, status])
 
 
-ADC_MAX_COUNT = 2**23 - 1
-"""Largest count of a 24-bit converter."""
+ADC_MAX_COUNT = 2**23 - 1  # largest count of a 24-bit converter
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,10 +41,8 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
 
     A session begins with a stream that is started afresh; where that is the only one, sample
     `release_s * wire.true_rate_hz` is the release."""
-    plate_offset_m: list[float]
-    """Where the plate stood on the table before each of these releases (m)."""
-    residual_displacement_m: float
-    """How far each release moves it on (m)."""
+    plate_offset_m: list[float]  # where the plate stood on the table before each of these releases (m)
+    residual_displacement_m: float  # how far each release moves it on (m)
     streams: int
     wire: TransmissionLog
     """The running stream, or the last one."""
