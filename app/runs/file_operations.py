@@ -8,17 +8,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.runs import schema
+from app.runs import errors, schema
 from app.runs.columns import sample_paths, stored_rows
 from app.runs.disk import atomic_write, make_folder, storage_error, sync_folder
-from app.runs.errors import (
-    RunError,
-    RunExistsError,
-    UnsuitableRunError,
-    WriteError,
-    being_recorded,
-    no_such_run,
-)
 from app.runs.listing import check_folder_exists, find_run_files
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
@@ -42,7 +34,7 @@ def copy_run_into(path: Path, folder: Path) -> Path:
     path = path.absolute()
     check_openable(path)
     if path.parent == folder.absolute():
-        raise RunExistsError("{path} lies in this folder already. Nothing was copied", path=path)
+        raise errors.RunExistsError("{path} lies in this folder already. Nothing was copied", path=path)
     with Validator.start() as validator:
         validator.validate(path)
     make_folder(folder)
@@ -60,17 +52,17 @@ def move_to_trash(path: Path) -> Path:
     """Move a run to the trash of its folder. Returns the new path. Raises RunError."""
     path = path.absolute()
     if path.parent.name == TRASH:
-        raise UnsuitableRunError(
+        raise errors.UnsuitableRunError(
             "{path} is in the trash already. Nothing is ever deleted by Slipstand", path=path
         )
     _check_movable(path)
     if path.is_symlink():
-        raise UnsuitableRunError(
+        raise errors.UnsuitableRunError(
             "{path} is a link to {target}. Give that file", path=path, target=path.resolve()
         )
     if path.suffix != schema.SUFFIX:
         template = N_("{path} is not named like a run. Give a file that ends in {suffix}")
-        raise UnsuitableRunError(template, path=path, suffix=schema.SUFFIX)
+        raise errors.UnsuitableRunError(template, path=path, suffix=schema.SUFFIX)
     make_folder(path.parent / TRASH)
     return _move(path, path.parent / TRASH)
 
@@ -79,7 +71,7 @@ def restore_from_trash(path: Path) -> Path:
     """Move a run from the trash back to its folder. Returns the new path. Raises RunError."""
     path = path.absolute()
     if path.parent.name != TRASH:
-        raise UnsuitableRunError(
+        raise errors.UnsuitableRunError(
             "{path} is not in a trash folder. Give a run in a folder named {trash}", path=path, trash=TRASH
         )
     _check_movable(path)
@@ -97,7 +89,7 @@ def find_run_by_uuid(folder: Path, identifier: str) -> Path | None:
     """The run file of this UUID in a folder; files that are being recorded or not readable are skipped."""
     with Validator() as validator:
         for path in find_run_files(folder):
-            with contextlib.suppress(RunError):
+            with contextlib.suppress(errors.RunError):
                 check_openable(path)
                 if validator.validate(path).identifier == identifier:
                     return path
@@ -129,7 +121,7 @@ def inspect_run(path: Path) -> ExistingRun | None:
         with Validator() as validator:
             validator.validate(path)
         return read_file(path, inspect)
-    except RunError:
+    except errors.RunError:
         return None
 
 
@@ -172,23 +164,25 @@ def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | N
                 sync_folder(target.parent)
             replace_run(rebuilt, target)
     except LockHeldError:
-        raise WriteError("{path} is being changed by another program. Try again", path=target) from None
+        raise errors.WriteError(
+            "{path} is being changed by another program. Try again", path=target
+        ) from None
     except OSError as error:
         raise storage_error(target, error) from None
     return aside
 
 
-def _names_taken(folder: Path, path: Path) -> RunExistsError:
-    return RunExistsError(
+def _names_taken(folder: Path, path: Path) -> errors.RunExistsError:
+    return errors.RunExistsError(
         "{folder}: all names like {name} are taken. Move some runs elsewhere", folder=folder, name=path.name
     )
 
 
 def _check_movable(path: Path) -> None:
     if not path.is_file():
-        raise no_such_run(path)
+        raise errors.no_such_run(path)
     if is_being_recorded(path):
-        raise being_recorded(path)
+        raise errors.being_recorded(path)
 
 
 def _move(path: Path, folder: Path) -> Path:

@@ -8,17 +8,8 @@ from typing import Any
 import h5py
 import msgspec
 
-from app.runs import schema
+from app.runs import fields, schema
 from app.runs.errors import DamagedRunError, MetadataError, one_line
-from app.runs.fields import (
-    make_group,
-    read_fields,
-    read_text,
-    to_python,
-    write_fields,
-    write_number,
-    write_text,
-)
 from app.runs.metadata import EndMetadata, RunMetadata, is_field_name
 from app.version import __version__
 from config.schema import GaugeCheck
@@ -44,16 +35,16 @@ class Change(msgspec.Struct, frozen=True):
 
 def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "") -> None:
     """Fill the groups of a new run file; without an `identifier` it gets a new one. Raises MetadataError."""
-    write_fields(file, schema.RUN_FIELDS, metadata)
-    write_text(file, schema.IDENTIFIER, identifier or str(uuid.uuid4()))
-    write_text(file, schema.PROGRAM, "slipstand")
+    fields.write_fields(file, schema.RUN_FIELDS, metadata)
+    fields.write_text(file, schema.IDENTIFIER, identifier or str(uuid.uuid4()))
+    fields.write_text(file, schema.PROGRAM, "slipstand")
     file[schema.PROGRAM].attrs["version"] = __version__
-    write_text(file, schema.CONTACT, metadata.contact)
+    fields.write_text(file, schema.CONTACT, metadata.contact)
     if metadata.note:
         file[schema.NOTE].attrs["NX_class"] = "NXnote"
-        write_text(file, f"{schema.NOTE}/author", metadata.operator)
-        write_text(file, f"{schema.NOTE}/date", metadata.start_time.isoformat())
-        write_text(file, f"{schema.NOTE}/type", "text/plain")
+        fields.write_text(file, f"{schema.NOTE}/author", metadata.operator)
+        fields.write_text(file, f"{schema.NOTE}/date", metadata.start_time.isoformat())
+        fields.write_text(file, f"{schema.NOTE}/type", "text/plain")
     _write_open_groups(file, metadata)
     _write_gauges(file, metadata)
 
@@ -69,33 +60,35 @@ def read_metadata(file: h5py.File) -> RunMetadata:
 
 def read_recorded_metadata(file: h5py.File) -> RunMetadata:
     """Read the metadata as recorded, without edits. Raises DamagedRunError, KeyError, ValueError."""
-    raw = read_fields(file, schema.RUN_FIELDS)
+    raw = fields.read_fields(file, schema.RUN_FIELDS)
     signal = file[f"{schema.MOTION}/{file[schema.MOTION].attrs['signal']}"]
     raw |= {"quantity": signal.attrs["quantity"], "unit": str(signal.attrs["units"]), "gauge_checks": []}
     others = file.get(schema.OTHER_CONDITIONS, {})
-    raw["conditions"]["other"] = {name: read_text(others, name) for name in others}
+    raw["conditions"]["other"] = {name: fields.read_text(others, name) for name in others}
     if schema.TRUTH in file:
         truth = file[schema.TRUTH].attrs
-        raw["truth"] = {name: to_python(truth[name]) for name in truth if name != "NX_class"}
+        raw["truth"] = {name: fields.to_python(truth[name]) for name in truth if name != "NX_class"}
     raw["gauges"] |= {name: {"gain_m_per_count": 1.0, "zero_count": 0.0} for name in _GAUGE_NAMES}
     for name, path in zip(_GAUGE_NAMES, schema.GAUGES, strict=True):
         if path in file:
-            raw["gauges"][name] = read_fields(file[path], schema.GAUGE_FIELDS)
+            raw["gauges"][name] = fields.read_fields(file[path], schema.GAUGE_FIELDS)
         if (check := f"{path}/{schema.LAST_CHECK}") in file:
-            raw["gauge_checks"].append({"gauge": name, **read_fields(file[check], schema.CHECK_FIELDS)})
+            raw["gauge_checks"].append(
+                {"gauge": name, **fields.read_fields(file[check], schema.CHECK_FIELDS)}
+            )
     return msgspec.convert(raw, RunMetadata)
 
 
 def read_end_metadata(file: h5py.File) -> EndMetadata | None:
     """Read what was known when the run ended; None for a run that was never closed."""
-    if not read_text(file, schema.ENDED):
+    if not fields.read_text(file, schema.ENDED):
         return None
-    return msgspec.convert(read_fields(file, schema.END_FIELDS), EndMetadata)
+    return msgspec.convert(fields.read_fields(file, schema.END_FIELDS), EndMetadata)
 
 
 def read_identifier(file: h5py.File) -> str:
     """UUID that the run was given when it was recorded."""
-    return read_text(file, schema.IDENTIFIER)
+    return fields.read_text(file, schema.IDENTIFIER)
 
 
 def apply_change(metadata: RunMetadata, change: Change) -> RunMetadata:
@@ -111,12 +104,12 @@ def apply_change(metadata: RunMetadata, change: Change) -> RunMetadata:
 def append_change(file: h5py.File, change: Change) -> None:
     """Add one edit to the history. Earlier ones stay."""
     history = file[schema.HISTORY]
-    note = make_group(history, f"change_{len(history) + 1:03d}", "NXnote")
-    write_text(note, "author", change.author)
-    write_text(note, "date", change.date.isoformat())
-    write_text(note, "type", "application/json")
-    write_text(note, "description", msgspec.json.encode(change.fields).decode())
-    write_number(note, "undoes", change.undoes)
+    note = fields.make_group(history, f"change_{len(history) + 1:03d}", "NXnote")
+    fields.write_text(note, "author", change.author)
+    fields.write_text(note, "date", change.date.isoformat())
+    fields.write_text(note, "type", "application/json")
+    fields.write_text(note, "description", msgspec.json.encode(change.fields).decode())
+    fields.write_number(note, "undoes", change.undoes)
 
 
 def read_changes(file: h5py.File) -> list[Change]:
@@ -124,9 +117,9 @@ def read_changes(file: h5py.File) -> list[Change]:
     history = file[schema.HISTORY]
     return [
         Change(
-            datetime.datetime.fromisoformat(read_text(note, "date")),
-            read_text(note, "author"),
-            msgspec.json.decode(read_text(note, "description", "{}"), type=dict[str, Any]),
+            datetime.datetime.fromisoformat(fields.read_text(note, "date")),
+            fields.read_text(note, "author"),
+            msgspec.json.decode(fields.read_text(note, "description", "{}"), type=dict[str, Any]),
             None if "undoes" not in note else int(note["undoes"][()]),
         )
         for note in (history[name] for name in sorted(history, key=lambda name: (len(name), name)))
@@ -135,15 +128,15 @@ def read_changes(file: h5py.File) -> list[Change]:
 
 def _write_open_groups(file: h5py.File, metadata: RunMetadata) -> None:
     if metadata.conditions.other:
-        others = make_group(file, schema.OTHER_CONDITIONS, "NXcollection")
+        others = fields.make_group(file, schema.OTHER_CONDITIONS, "NXcollection")
         for name, text in metadata.conditions.other.items():
-            write_text(others, name, text)
-    geometry = make_group(file[schema.STAND], "geometry", "NXcollection")
+            fields.write_text(others, name, text)
+    geometry = fields.make_group(file[schema.STAND], "geometry", "NXcollection")
     for name, value in metadata.stand.geometry.items():
         if is_field_name(name):
-            write_number(geometry, name, value, "m" if name.endswith("_m") else "")
+            fields.write_number(geometry, name, value, "m" if name.endswith("_m") else "")
     if metadata.truth:
-        make_group(file, schema.TRUTH, "NXcollection").attrs.update(metadata.truth)
+        fields.make_group(file, schema.TRUTH, "NXcollection").attrs.update(metadata.truth)
 
 
 def _write_gauges(file: h5py.File, metadata: RunMetadata) -> None:
@@ -151,9 +144,9 @@ def _write_gauges(file: h5py.File, metadata: RunMetadata) -> None:
     for name, path in zip(_GAUGE_NAMES, schema.GAUGES, strict=True):
         if path not in file:
             continue
-        make_group(file[path], "calibration", "NXcollection")
-        write_fields(file[path], schema.GAUGE_FIELDS, getattr(metadata.gauges, name), metadata.unit)
+        fields.make_group(file[path], "calibration", "NXcollection")
+        fields.write_fields(file[path], schema.GAUGE_FIELDS, getattr(metadata.gauges, name), metadata.unit)
         if check := checks.get(name):
-            group = make_group(file[path], schema.LAST_CHECK, "NXcollection")
-            write_fields(group, schema.CHECK_FIELDS, check)
-            write_number(group, schema.DEVIATION, check.deviation_m, "m")
+            group = fields.make_group(file[path], schema.LAST_CHECK, "NXcollection")
+            fields.write_fields(group, schema.CHECK_FIELDS, check)
+            fields.write_number(group, schema.DEVIATION, check.deviation_m, "m")

@@ -12,20 +12,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs import schema
+from app.runs import metadata_io, schema
 from app.runs.blocks import count_flags
 from app.runs.columns import count_paths, read_column, signal_paths, stored_rows
 from app.runs.errors import NotARunError, RunError, being_recorded, damaged, no_such_run, unreadable
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import EndMetadata, Events, RunMetadata
-from app.runs.metadata_io import (
-    Change,
-    read_changes,
-    read_end_metadata,
-    read_identifier,
-    read_metadata,
-    read_recorded_metadata,
-)
+from app.runs.metadata_io import Change
 from app.runs.raw_bytes import RawBytes, read_raw_bytes
 from app.runs.saved_analyses import SavedAnalysis, read_analyses
 from app.runs.validator import Validator
@@ -113,7 +106,9 @@ def compute_fingerprint(path: Path) -> Fingerprint:
             size = opened.tell()
     except OSError as error:
         raise unreadable(path, error) from None
-    identifier, columns = read_file(path, lambda file: (read_identifier(file), _stored_checksums(file)))
+    identifier, columns = read_file(
+        path, lambda file: (metadata_io.read_identifier(file), _stored_checksums(file))
+    )
     return Fingerprint(path.name, size, sha256, identifier, columns)
 
 
@@ -188,15 +183,15 @@ def reading_columns(
 
 def _read(file: h5py.File) -> Run:
     rows = slice(stored_rows(file))
-    metadata = read_metadata(file)
-    changes = tuple(read_changes(file))
+    metadata = metadata_io.read_metadata(file)
+    changes = tuple(metadata_io.read_changes(file))
     readings = reading_columns(file, metadata, changes)(rows)
-    end = read_end_metadata(file)
+    end = metadata_io.read_end_metadata(file)
     if end is not None and _is_recalibrated(file, changes):
-        end = _recalibrate_end(end, read_recorded_metadata(file).gauges, metadata.gauges)
+        end = _recalibrate_end(end, metadata_io.read_recorded_metadata(file).gauges, metadata.gauges)
     return Run(
         path=Path(file.filename),
-        identifier=read_identifier(file),
+        identifier=metadata_io.read_identifier(file),
         metadata=metadata,
         end=end,
         time_s=read_column(file[schema.TIME], rows),

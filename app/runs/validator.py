@@ -17,27 +17,10 @@ from typing import Literal, Self
 import h5py
 import msgspec
 
-from app.child_process import (
-    ChildProcess,
-    CommandReader,
-    EventSender,
-    LineDecoder,
-    encode_line,
-    ignore_session_signals,
-    json_decoder,
-    reserve_stdout,
-    spawn,
-)
+from app import child_process
+from app.child_process import ChildProcess, CommandReader, EventSender
 from app.log import start_log
-from app.runs.errors import (
-    BeingRecordedError,
-    DamagedRunError,
-    NotARunError,
-    RunError,
-    ValidationTimeoutError,
-    being_recorded,
-    damaged,
-)
+from app.runs import errors
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
 from messages.i18n import N_
@@ -52,10 +35,10 @@ _CPU_S = 2.0
 _IDLE_S = 60.0
 
 Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
-_ERRORS: dict[Fault, type[RunError]] = {
-    "not-a-run": NotARunError,
-    "being-recorded": BeingRecordedError,
-    "damaged": DamagedRunError,
+_ERRORS: dict[Fault, type[errors.RunError]] = {
+    "not-a-run": errors.NotARunError,
+    "being-recorded": errors.BeingRecordedError,
+    "damaged": errors.DamagedRunError,
 }
 
 
@@ -72,7 +55,7 @@ class ValidationReply(msgspec.Struct, frozen=True, tag=True):
 
 
 ValidatorEvent = ValidatorReady | ValidationReply
-decode_validator_event: Callable[[bytes], ValidatorEvent] = json_decoder(ValidatorEvent)
+decode_validator_event: Callable[[bytes], ValidatorEvent] = child_process.json_decoder(ValidatorEvent)
 
 
 class Validator:
@@ -112,9 +95,15 @@ class Validator:
     def _started(self) -> "ChildProcess[str, ValidatorEvent]":
         if self._child is None:
             replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
-            process = spawn("app.runs.validator", discard_stderr=True)  # a crash becomes a fault of the file
+            process = child_process.spawn(
+                "app.runs.validator", discard_stderr=True
+            )  # a crash becomes a fault of the file
             self._child = ChildProcess(
-                process, encode_line, decode_validator_event, replies.put, lambda _: replies.put(None)
+                process,
+                child_process.encode_line,
+                decode_validator_event,
+                replies.put,
+                lambda _: replies.put(None),
             )
             self._replies, self._is_ready = replies, False
         return self._child
@@ -124,7 +113,9 @@ class Validator:
             with contextlib.suppress(queue.Empty):
                 self._is_ready = isinstance(self._replies.get(timeout=_START_S), ValidatorReady)
         if not self._is_ready:
-            raise RunError("the process that examines run files does not start. Run `slipstand doctor`")
+            raise errors.RunError(
+                "the process that examines run files does not start. Run `slipstand doctor`"
+            )
         child.send(str(path))
         try:
             reply = self._replies.get(timeout=_REPLY_S)
@@ -134,13 +125,13 @@ class Validator:
                 "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
                 " too busy. Try again later"
             )
-            raise ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
+            raise errors.ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
         if not isinstance(reply, ValidationReply):
             self.stop()
             template = N_(
                 "{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
             )
-            raise DamagedRunError(template, path=path)
+            raise errors.DamagedRunError(template, path=path)
         return reply
 
     def __enter__(self) -> Self:
@@ -166,18 +157,19 @@ def check_validator() -> None:
         try:
             with Validator() as validator:
                 validator.validate(path)
-        except NotARunError:
+        except errors.NotARunError:
             return
-    raise RunError("a file that is no run was taken for one")
+    raise errors.RunError("a file that is no run was taken for one")
 
 
 def main() -> None:
     """Validate paths until stdin ends: one a line as JSON, with one reply a line on stdout."""
     start_log("validator")
-    ignore_session_signals()
+    child_process.ignore_session_signals()
     _limit_memory()
-    events: EventSender[ValidatorEvent] = EventSender(reserve_stdout())
-    paths: CommandReader[str] = CommandReader(0, LineDecoder(json_decoder(str)).feed)
+    events: EventSender[ValidatorEvent] = EventSender(child_process.reserve_stdout())
+    decoder = child_process.LineDecoder(child_process.json_decoder(str))
+    paths: CommandReader[str] = CommandReader(0, decoder.feed)
     events.send(ValidatorReady())
     while not paths.is_closed:
         if (path := paths.take(_IDLE_S)) is not None:
@@ -220,13 +212,13 @@ def _validate(path: str) -> ValidationReply:
         with h5py.File(path, "r", locking="best-effort") as file:
             validate_file(file)
             return ValidationReply(summary=_checked(summarize_file(file)))
-    except RunError as error:
-        fault: Fault = "not-a-run" if isinstance(error, NotARunError) else "damaged"
+    except errors.RunError as error:
+        fault: Fault = "not-a-run" if isinstance(error, errors.NotARunError) else "damaged"
         return ValidationReply(fault=fault, message=error.message)
     except BlockingIOError:
-        return ValidationReply(fault="being-recorded", message=being_recorded(path).message)
+        return ValidationReply(fault="being-recorded", message=errors.being_recorded(path).message)
     except Exception as error:
-        return ValidationReply(fault="damaged", message=damaged(path, error).message)
+        return ValidationReply(fault="damaged", message=errors.damaged(path, error).message)
 
 
 if __name__ == "__main__":

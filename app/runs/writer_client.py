@@ -14,15 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.child_process import ChildProcess, json_decoder, spawn
+from app.runs import errors
 from app.runs.blocks import BlockLayout, RunBlock, StoredRun
-from app.runs.errors import (
-    DiskFullError,
-    MetadataError,
-    RunError,
-    RunExistsError,
-    WriteError,
-    WriterBehindError,
-)
 from app.runs.journal import JournalSpan
 from app.runs.metadata import EndMetadata, RunMetadata
 from messages.i18n import N_
@@ -33,11 +26,11 @@ _ROWS = struct.Struct("<I")
 _OPEN, _APPEND, _CLOSE = b"OAC"
 FRAME_BYTES_MAX = 1 << 28
 
-ERRORS: dict[str, type[RunError]] = {
-    "disk-full": DiskFullError,
-    "write-error": WriteError,
-    "exists": RunExistsError,
-    "metadata": MetadataError,
+ERRORS: dict[str, type[errors.RunError]] = {
+    "disk-full": errors.DiskFullError,
+    "write-error": errors.WriteError,
+    "exists": errors.RunExistsError,
+    "metadata": errors.MetadataError,
 }
 
 
@@ -130,7 +123,7 @@ class FrameDecoder:
         raise ValueError(f"frame of unknown kind {kind}")
 
 
-def failure(error: RunError, samples: int = 0) -> Failed:
+def failure(error: errors.RunError, samples: int = 0) -> Failed:
     """Reply for an error of the writer; `samples` rows are in the file."""
     reasons = [reason for reason, kind in ERRORS.items() if isinstance(error, kind)]
     return Failed(reasons[0] if reasons else "write-error", error.message, samples)
@@ -176,7 +169,7 @@ class WriterClient:
         self._opening: deque[Future[Path]] = deque()
         self._closing: deque[Future[StoredRun]] = deque()
         self._guard = threading.Lock()
-        self._failure: RunError | None = None
+        self._failure: errors.RunError | None = None
         self._child: ChildProcess[WriterCommand, Reply] = ChildProcess(
             process, FrameEncoder(), decode_reply, self._on_reply, self._on_exit, _QUEUE_COMMANDS
         )
@@ -191,7 +184,7 @@ class WriterClient:
         return self._child.pid
 
     @property
-    def failure(self) -> RunError | None:
+    def failure(self) -> errors.RunError | None:
         """What ended the writer, None while it works."""
         return self._failure
 
@@ -204,7 +197,7 @@ class WriterClient:
             raise self._failure
         if not self._child.send(block):
             template = N_("the disk is too slow: {blocks} blocks wait to be written. Record to a faster disk")
-            raise WriterBehindError(template, blocks=_QUEUE_COMMANDS)
+            raise errors.WriterBehindError(template, blocks=_QUEUE_COMMANDS)
 
     def close(self, ending: EndMetadata) -> "Future[StoredRun]":
         return self._ask(ending, self._closing)
@@ -232,17 +225,19 @@ class WriterClient:
             waiting.append(answer)
         if not self._child.send(command, _WAIT_S):
             self._fail(
-                WriteError("the run writer took nothing for {timeout:g} s. Check the disk", timeout=_WAIT_S)
+                errors.WriteError(
+                    "the run writer took nothing for {timeout:g} s. Check the disk", timeout=_WAIT_S
+                )
             )
         return answer
 
     def _on_exit(self, code: int) -> None:
         if code or self._opening or self._closing:
-            self._fail(WriteError("the run writer ended by itself (code {code})", code=code))
+            self._fail(errors.WriteError("the run writer ended by itself (code {code})", code=code))
 
     def _on_reply(self, reply: Reply) -> None:
         if isinstance(reply, Failed):
-            error = ERRORS.get(reply.reason, WriteError)(reply.message)
+            error = ERRORS.get(reply.reason, errors.WriteError)(reply.message)
             error.stored_samples = reply.samples
             self._fail(error)
         elif isinstance(reply, Opened):
@@ -256,7 +251,7 @@ class WriterClient:
         if answer:  # None where it was given up before
             answer.set_result(result)
 
-    def _fail(self, error: RunError) -> None:
+    def _fail(self, error: errors.RunError) -> None:
         with self._guard:
             self._failure = self._failure or error
             waiting: list[Future[Any]] = [*self._opening, *self._closing]

@@ -14,15 +14,8 @@ import numpy as np
 from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import format_value
 from app.runs.errors import UnsuitableRunError
-from app.runs.exchange import uff58
-from app.runs.exchange.content import (
-    COEFFICIENT_COLUMNS,
-    ExportedRun,
-    SampleColumn,
-    coefficient_rows,
-    import_optional,
-    run_metadata_document,
-)
+from app.runs.exchange import content, uff58
+from app.runs.exchange.content import COEFFICIENT_COLUMNS, ExportedRun, SampleColumn
 
 # --- CSV ---------------------------------------------------------------------------------
 
@@ -49,7 +42,9 @@ def write_csv_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     with path.open("x", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COEFFICIENT_COLUMNS)
-        writer.writerows([csv_cell(value) for value in row.values()] for row in coefficient_rows(runs))
+        writer.writerows(
+            [csv_cell(value) for value in row.values()] for row in content.coefficient_rows(runs)
+        )
 
 
 def csv_cell(value: Any) -> str:
@@ -74,7 +69,7 @@ def _write_json_run(exported: ExportedRun, path: Path) -> None:
     samples = {
         column.name: {"unit": column.unit, "values": column.values.tolist()} for column in exported.samples
     }
-    facts = run_metadata_document(exported.run)
+    facts = content.run_metadata_document(exported.run)
     _write_json(
         path,
         {"schema": "slipstand-run/1", "name": exported.name}
@@ -84,7 +79,7 @@ def _write_json_run(exported: ExportedRun, path: Path) -> None:
 
 
 def _write_json_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    rows = list(coefficient_rows(runs))
+    rows = list(content.coefficient_rows(runs))
     _write_json(path, {"schema": "slipstand-coefficients/1", "coefficients": rows})
 
 
@@ -97,8 +92,8 @@ def _write_json(path: Path, document: dict[str, Any]) -> None:
 
 def _write_parquet_run(exported: ExportedRun, path: Path) -> None:
     """Absent readings are null; the facts are JSON under `slipstand` in the metadata of the table."""
-    pa = import_optional("pyarrow", "Parquet")
-    facts = run_metadata_document(exported.run) | {"analysis": exported.analysis}
+    pa = content.import_optional("pyarrow", "Parquet")
+    facts = content.run_metadata_document(exported.run) | {"analysis": exported.analysis}
     fields = [
         pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), metadata={"units": column.unit})
         for column in exported.samples
@@ -109,15 +104,15 @@ def _write_parquet_run(exported: ExportedRun, path: Path) -> None:
 
 
 def _write_parquet_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    pa = import_optional("pyarrow", "Parquet")
+    pa = content.import_optional("pyarrow", "Parquet")
     numbers = ("value", "standard_uncertainty", "interval_95_low", "interval_95_high")
     kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string()) | dict.fromkeys(numbers, pa.float64())
     schema = pa.schema(list((kinds | {"adequate": pa.bool_()}).items()))
-    _write_parquet(pa.Table.from_pylist(list(coefficient_rows(runs)), schema=schema), path)
+    _write_parquet(pa.Table.from_pylist(list(content.coefficient_rows(runs)), schema=schema), path)
 
 
 def _write_parquet(table: Any, path: Path) -> None:
-    import_optional("pyarrow.parquet", "Parquet").write_table(table, path)
+    content.import_optional("pyarrow.parquet", "Parquet").write_table(table, path)
 
 
 # --- MATLAB ------------------------------------------------------------------------------
@@ -130,7 +125,7 @@ def _write_mat_run(exported: ExportedRun, path: Path) -> None:
     named = {_mat_name(column.name): column for column in exported.samples}
     variables: dict[str, Any] = {name: column.values for name, column in named.items()}
     variables["units"] = {name: column.unit for name, column in named.items()}
-    variables["run"] = _mat_value(run_metadata_document(exported.run) | {"name": exported.name})
+    variables["run"] = _mat_value(content.run_metadata_document(exported.run) | {"name": exported.name})
     if exported.analysis is not None:
         variables["coefficients"] = _mat_value(exported.analysis["results"])
         variables["analysis"] = _mat_value({k: v for k, v in exported.analysis.items() if k != "results"})
@@ -139,7 +134,7 @@ def _write_mat_run(exported: ExportedRun, path: Path) -> None:
 
 def _write_mat_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     """The struct array `coefficients`, one element a quantity of a run."""
-    _write_mat({"coefficients": [_mat_value(row) for row in coefficient_rows(runs)]}, path)
+    _write_mat({"coefficients": [_mat_value(row) for row in content.coefficient_rows(runs)]}, path)
 
 
 def _write_mat(variables: dict[str, Any], path: Path) -> None:
@@ -186,23 +181,23 @@ def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
         )
     samples = zip(*(column.values.tolist() for column in exported.samples), strict=True)
     sheets: dict[str, Sheet] = {
-        "Coefficients": (COEFFICIENT_COLUMNS, (row.values() for row in coefficient_rows([exported]))),
+        "Coefficients": (COEFFICIENT_COLUMNS, (row.values() for row in content.coefficient_rows([exported]))),
         "Samples": ([column.name for column in exported.samples], samples),
-        "Run": (("fact", "value"), _flat_facts("", run_metadata_document(exported.run))),
+        "Run": (("fact", "value"), _flat_facts("", content.run_metadata_document(exported.run))),
     }
     write_sheets(sheets, path)
 
 
 def _write_xlsx_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    rows = (row.values() for row in coefficient_rows(runs))
+    rows = (row.values() for row in content.coefficient_rows(runs))
     write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path)
 
 
 def write_sheets(sheets: Mapping[str, Sheet], path: Path) -> None:
     """Write a workbook; texts are texts, no cell becomes a formula. Raises ExtraMissingError."""
-    openpyxl = import_optional("openpyxl", "Excel")
-    cell_type = import_optional("openpyxl.cell", "Excel").WriteOnlyCell
-    letter = import_optional("openpyxl.utils", "Excel").get_column_letter
+    openpyxl = content.import_optional("openpyxl", "Excel")
+    cell_type = content.import_optional("openpyxl.cell", "Excel").WriteOnlyCell
+    letter = content.import_optional("openpyxl.utils", "Excel").get_column_letter
     book = openpyxl.Workbook(write_only=True)
     for name, (header, rows) in sheets.items():
         sheet = book.create_sheet(name)

@@ -15,16 +15,9 @@ from numpy.typing import NDArray
 
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
+from app.runs.exchange import csv_reading
 from app.runs.exchange.columns import ForeignColumns
-from app.runs.exchange.csv_reading import (
-    CsvOptions,
-    CsvText,
-    is_data,
-    is_number,
-    lines_from,
-    split_line,
-    survey_csv,
-)
+from app.runs.exchange.csv_reading import CsvOptions, CsvText
 from app.runs.exchange.foreign_files import is_csv, list_columns, read_foreign
 from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_metadata
 from app.runs.writer import write_run
@@ -291,7 +284,7 @@ def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
     for header in (True, False) if given.header is None else (given.header,):
         for decimal in _DECIMALS if given.decimal is None else (given.decimal,):
             try:
-                source = survey_csv(
+                source = csv_reading.survey_csv(
                     path, CsvOptions("", "", None, given.delimiter, decimal, given.skip, header)
                 )
                 found.append((_numeric_share(source), source))
@@ -318,13 +311,18 @@ def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
 
 def _numeric_share(source: CsvText) -> float:
     """How many of the first cells are numbers, 0 to 1."""
-    cells = [is_number(cell, source.decimal) for row in _first_rows(source) for cell in row]
+    cells = [csv_reading.is_number(cell, source.decimal) for row in _first_rows(source) for cell in row]
     return sum(cells) / max(len(cells), 1)
 
 
 def _first_rows(source: CsvText) -> tuple[tuple[str, ...], ...]:
-    lines = (line.text for line in lines_from(source.text, source.data.number, source.data.offset))
-    return tuple(tuple(split_line(text, source.delimiter)) for text in islice(filter(is_data, lines), _LINES))
+    lines = (
+        line.text for line in csv_reading.lines_from(source.text, source.data.number, source.data.offset)
+    )
+    return tuple(
+        tuple(csv_reading.split_line(text, source.delimiter))
+        for text in islice(filter(csv_reading.is_data, lines), _LINES)
+    )
 
 
 def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], given: ParseOptions) -> FilePreview:
