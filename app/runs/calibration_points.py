@@ -3,7 +3,7 @@
 import csv
 import datetime
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,7 @@ class CalibrationDetails:
 
 def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetails) -> Gauge:
     """The gauge with its new calibration; delay and what it measures stay as they were."""
+    kept = {name for name in ("serial_number", "range_m") if getattr(about, name) is None}
     return before.replace(
         gain_m_per_count=found.gain_m_per_count.value,
         zero_count=found.zero_count.value,
@@ -50,13 +51,7 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetail
         nonlinearity_m=found.characteristics.nonlinearity_m,
         hysteresis_m=found.characteristics.hysteresis_m,
         repeatability_m=found.characteristics.repeatability_m,
-        date=about.date,
-        valid_until=about.valid_until,
-        reference=about.reference,
-        certificate=about.certificate,
-        calibrated_by=about.calibrated_by,
-        serial_number=before.serial_number if about.serial_number is None else about.serial_number,
-        range_m=before.range_m if about.range_m is None else about.range_m,
+        **{name: value for name, value in asdict(about).items() if name not in kept},
     )
 
 

@@ -1,6 +1,7 @@
 """Move and copy run files without overwriting or deleting any: copies, trash, recovered runs."""
 
 import contextlib
+import itertools
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -221,8 +222,6 @@ def _begins_with(ours: h5py.Dataset | None, theirs: h5py.Dataset, rows: int) -> 
 
 
 def _aside_name(path: Path) -> Path:
-    for number in range(1, _NAMES_MAX):
-        aside = path.with_name(f"{path.name}{ASIDE}{'' if number == 1 else number}")
-        if not aside.exists():
-            return aside
-    raise _names_taken(path.parent, path)
+    numbers = itertools.chain([""], map(str, itertools.count(2)))
+    names = (path.with_name(f"{path.name}{ASIDE}{number}") for number in numbers)
+    return next(name for name in names if not name.exists())

@@ -95,22 +95,17 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
     @classmethod
     def parse(cls, facts: dict[str, str]) -> "Conditions":
         """Sort `name: text` pairs into typed conditions; others go to `other`. Raises MetadataError."""
+        kinds = {"temperature_c": float, "humidity_percent": float, "run_in_number": int}
         known: dict[str, Any] = {}
         for name, text in facts.items():
             if name in cls.__struct_fields__ and name != "other":
-                known[name] = _typed(name, text)
+                try:
+                    known[name] = kinds.get(name, str)(text)
+                except ValueError:
+                    reason = message("{text!r} is not a number. Give digits, or leave it out", text=text)
+                    raise ConditionError("condition {name} = {reason}", name=name, reason=reason) from None
         other = {name: text for name, text in facts.items() if name not in known}
         return cls(**known, other=other)
-
-
-def _typed(name: str, text: str) -> str | float | int:
-    try:
-        if name in ("temperature_c", "humidity_percent"):
-            return float(text)
-        return int(text) if name == "run_in_number" else text
-    except ValueError:
-        reason = message("{text!r} is not a number. Give digits, or leave it out", text=text)
-        raise ConditionError("condition {name} = {reason}", name=name, reason=reason) from None
 
 
 class RunMetadata(_FrozenStruct, frozen=True):

@@ -5,8 +5,8 @@ from typing import Any
 import msgspec
 
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.plan import PlannedTest, RangeUse, plan, smallest_pullback_m
-from analysis.uncertainty_reduction import ReductionOption, reduction_options, uncertainty_parts
+from analysis.plan import PlannedTest, plan, smallest_pullback_m
+from analysis.uncertainty_reduction import reduction_options, uncertainty_parts
 from app.runs.analysis_input import gauge_uncertainty
 from app.runs.analysis_json import budget_documents, warning_documents
 from config.schema import Gauges, Stand
@@ -51,25 +51,23 @@ def plan_document(test: PlannedTest) -> Document:
         "table_acceleration_max_m_per_s2": motion.table_acceleration_max_m_per_s2,
         "plate_acceleration_max_m_per_s2": motion.plate_acceleration_max_m_per_s2,
         "msk64_degree": found.msk64_degree,
-        "gauges": {"table": _use(found.table_use), "relative": _use(found.relative_use)},
+        "gauges": {
+            name: {**msgspec.to_builtins(use), "share": use.share, "fits": use.fits()}
+            for name, use in (("table", found.table_use), ("relative", found.relative_use))
+        },
         "tests_without_recentring": found.tests_without_recentring,
         "results": {name: msgspec.to_builtins(value) for name, value in found.results.items()},
         "noise_part": parts.noise if parts else None,
         "stated_part": parts.stated if parts else None,
         "budget": budget_documents(found.budget),
-        "halved_by": [_way(way) for way in reduction_options(test)],
+        "halved_by": [
+            {
+                "means": way.measure.value,
+                "value": way.value,
+                "standard_uncertainty": way.standard_uncertainty,
+                "message": str(way.message),
+            }
+            for way in reduction_options(test)
+        ],
         "warnings": warning_documents(found.warnings),
-    }
-
-
-def _use(use: RangeUse) -> Document:
-    return {**msgspec.to_builtins(use), "share": use.share, "fits": use.fits()}
-
-
-def _way(way: ReductionOption) -> Document:
-    return {
-        "means": way.measure.value,
-        "value": way.value,
-        "standard_uncertainty": way.standard_uncertainty,
-        "message": str(way.message),
     }

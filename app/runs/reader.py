@@ -19,7 +19,6 @@ from app.runs.errors import NotARunError, RunError, being_recorded, damaged, no_
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.metadata_io import Change
-from app.runs.raw_bytes import RawBytes, read_raw_bytes
 from app.runs.saved_analyses import SavedAnalysis, read_analyses
 from app.runs.validator import Validator
 from config.schema import Gauges
@@ -90,12 +89,12 @@ def open_run(path: Path | str, *, validator: Validator | None = None, trusted: b
 
 def load_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
     """Readings as received, (n, channels); None where there are none. Raises RunError."""
-    return read_file(run.path, lambda file: _counts(file, len(run)))
 
+    def read(file: h5py.File) -> NDArray[np.int32] | NDArray[np.float64] | None:
+        columns = [read_column(file[path], slice(len(run))) for path in count_paths(file)]
+        return np.column_stack(columns) if columns else None
 
-def load_raw_bytes(run: Run) -> RawBytes:
-    """Raw bytes as received. Raises RunError."""
-    return read_file(run.path, read_raw_bytes)
+    return read_file(run.path, read)
 
 
 def compute_fingerprint(path: Path) -> Fingerprint:
@@ -106,10 +105,13 @@ def compute_fingerprint(path: Path) -> Fingerprint:
             size = opened.tell()
     except OSError as error:
         raise unreadable(path, error) from None
-    identifier, columns = read_file(
-        path, lambda file: (metadata_io.read_identifier(file), _stored_checksums(file))
-    )
-    return Fingerprint(path.name, size, sha256, identifier, columns)
+
+    def read(file: h5py.File) -> Fingerprint:
+        stored = file.get(schema.CHECKSUMS, {}).items()
+        columns = {name: f"{int(np.uint32(value[()])):08x}" for name, value in stored}
+        return Fingerprint(path.name, size, sha256, metadata_io.read_identifier(file), columns)
+
+    return read_file(path, read)
 
 
 def validate_and_read(
@@ -222,13 +224,3 @@ def _recalibrate_end(end: EndMetadata, recorded: Gauges, edited: Gauges) -> EndM
         relative_zero_m=convert(end.relative_zero_m, "relative"),
         held_m=convert(end.held_m, "table"),
     )
-
-
-def _counts(file: h5py.File, rows: int) -> NDArray[np.int32] | NDArray[np.float64] | None:
-    columns = [read_column(file[path], slice(rows)) for path in count_paths(file)]
-    return np.column_stack(columns) if columns else None
-
-
-def _stored_checksums(file: h5py.File) -> dict[str, str]:
-    stored = file.get(schema.CHECKSUMS, {})
-    return {name: f"{int(np.uint32(value[()])):08x}" for name, value in stored.items()}

@@ -50,6 +50,12 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     """Why it does not count in a campaign; empty where it does."""
 
 
+_OF_METADATA = (
+    "title", "series", "start_time", "operator", "note", "plate_mass_kg", "pullback_m", "source",
+    "conditions", "excluded",
+)  # fmt: skip
+
+
 def summarize_file(file: h5py.File) -> RunSummary:
     """Summary of an open run. Raises DamagedRunError."""
     metadata = read_metadata(file)
@@ -58,18 +64,10 @@ def summarize_file(file: h5py.File) -> RunSummary:
     friction = analyses[-1].document["results"].get("friction_dynamic", {}) if analyses else {}
     return RunSummary(
         path=file.filename,
-        title=metadata.title,
-        series=metadata.series,
-        start_time=metadata.start_time,
+        **{name: getattr(metadata, name) for name in _OF_METADATA},
         samples=rows,
         duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
         ended=read_text(file, schema.ENDED),
-        operator=metadata.operator,
-        note=metadata.note,
-        conditions=metadata.conditions,
-        plate_mass_kg=metadata.plate_mass_kg,
-        pullback_m=metadata.pullback_m,
-        source=metadata.source,
         analyses=len(analyses),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
@@ -77,5 +75,4 @@ def summarize_file(file: h5py.File) -> RunSummary:
         adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
         identifier=read_identifier(file),
         edits=len(file[schema.HISTORY]),
-        excluded=metadata.excluded,
     )

@@ -8,12 +8,14 @@ import datetime
 import os
 import time
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
 import h5py
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from app.child_process import CommandReader, EventSender, ignore_session_signals, reserve_stdout
 from app.log import start_log
@@ -23,10 +25,9 @@ from app.runs.columns import checksum
 from app.runs.creation import column_paths, create_file
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 from app.runs.fields import fill_fields
-from app.runs.journal import JournalSpan, UnreadableJournalError
+from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJournalError, read_journal
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
-from app.runs.raw_bytes import copy_raw_bytes
 from app.runs.writer_client import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
 from drivers.samples import Losses
 from messages.i18n import N_
@@ -221,7 +222,7 @@ class RunWriter:
             return False
         try:
             self._reserve(self._journal.size())
-            self._raw_bytes_checksum = copy_raw_bytes(self._file, self._journal)
+            self._raw_bytes_checksum = _append_raw_bytes(self._file, self._journal)
         except (DiskFullError, UnreadableJournalError):
             return False
         return True
@@ -240,6 +241,55 @@ class RunWriter:
                         " `slipstand recover`: the journal of the run holds all that came"
                     )
                     raise WriteError(template, path=self.path, dataset=dataset.name)
+
+
+_BATCH_BYTES = 1 << 20
+"""Bytes copied at once: one compressed write of HDF5 a megabyte, whatever the length of a run."""
+
+
+def _append_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
+    """Append a journal's raw bytes to an open file. Returns their CRC-32. Raises UnreadableJournalError."""
+    checksum = 0
+    try:
+        for records in _batches(journal):
+            data = b"".join(record.data for record in records)
+            checksum = zlib.crc32(data, checksum)
+            first = len(file[schema.WIRE_DATA.path])
+            lengths = np.array([len(record.data) for record in records], np.uint64)
+            _append(file[schema.WIRE_DATA.path], np.frombuffer(data, np.uint8))
+            _append(
+                file[schema.WIRE_ARRIVAL.path], np.array([record.arrival_ns for record in records], np.int64)
+            )
+            _append(file[schema.WIRE_END.path], np.uint64(first) + np.cumsum(lengths))
+    except UnreadableJournalError:
+        for column in schema.WIRE_COLUMNS:
+            file[column.path].resize((0,))
+        raise
+    return checksum
+
+
+def _batches(journal: JournalSpan) -> Iterator[list[JournalRecord]]:
+    """Received bytes, about a batch at a time. Raises UnreadableJournalError."""
+    batch: list[JournalRecord] = []
+    size = 0
+    try:
+        for record in read_journal(Path(journal.path), journal.start):
+            if record.kind is RecordKind.WIRE:
+                batch.append(record)
+                size += len(record.data)
+            if size >= _BATCH_BYTES:
+                yield batch
+                batch, size = [], 0
+    except (OSError, ValueError) as error:
+        raise UnreadableJournalError(str(error)) from None
+    if batch:
+        yield batch
+
+
+def _append(dataset: h5py.Dataset, values: NDArray[np.generic]) -> None:
+    first = len(dataset)
+    dataset.resize((first + len(values),))
+    dataset[first:] = values
 
 
 _QUEUE_COMMANDS = 64

@@ -18,7 +18,7 @@ from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
 from app.runs.saved_analyses import Document
 from app.runs.validator import Validator, shared_validator
-from config.schema import ConfigError, Gauges
+from config.schema import ConfigError
 from messages.message import EMPTY, Message
 
 _MASSES = ("table_mass_kg", "plate_mass_kg")
@@ -73,24 +73,6 @@ def collect_run(
         return CollectedRun(task.path, error_message(error), details)
 
 
-def calibration_identity(gauges: Gauges) -> str:
-    """What two runs have in common whose readings share the errors of one calibration."""
-    pair = (gauges.table, gauges.relative)
-    return _hash([getattr(gauge, name) for gauge in pair for name in _OF_CALIBRATION])
-
-
-def stand_identity(metadata: RunMetadata) -> str:
-    """What two runs have in common that share the errors of masses, gravity and clock."""
-    stand, device = metadata.stand, metadata.device
-    return _hash([stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number])
-
-
-def result_quantities(document: Document) -> dict[str, Quantity]:
-    """Results of an analysis; what was not finite is NaN."""
-    results = document["results"].items()
-    return {name: read_quantity(value) for name, value in results if isinstance(value, dict)}
-
-
 def _read(file: h5py.File) -> tuple[RunDetails, Document | None]:
     metadata = read_metadata(file)
     saved, stale = latest_valid_in_file(
@@ -109,13 +91,19 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
     mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
     mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
     plate_mass_line = BudgetLine(BudgetSource.PLATE_MASS, "plate_mass_kg", mass_u_kg)
+    found = document["results"].items()
+    results = {name: read_quantity(value) for name, value in found if isinstance(value, dict)}
+    stand, device = metadata.stand, metadata.device
+    calibrations = (metadata.gauges.table, metadata.gauges.relative)
     return RunResult(
         name=str(path),
         series=series_key(metadata),
-        results={"plate_mass_kg": mass} | result_quantities(document),
+        results={"plate_mass_kg": mass} | results,
         budget=(*map(read_budget_line, document["budget"]), plate_mass_line),
-        calibration_id=calibration_identity(metadata.gauges),
-        stand_id=stand_identity(metadata),
+        calibration_id=_hash([getattr(gauge, name) for gauge in calibrations for name in _OF_CALIBRATION]),
+        stand_id=_hash(
+            [stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number]
+        ),
         adequate=(document["model"] or {}).get("adequate"),
         msk64_degree=document["results"].get("msk64_degree", ""),
         warnings=tuple(map(read_warning, document["warnings"])),

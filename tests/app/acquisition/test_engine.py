@@ -18,6 +18,7 @@ from engine_kit import (
     stand,
     until,
 )
+from raw_bytes_kit import load_raw_bytes
 
 from app.acquisition.disk_space import ROW_BYTES
 from app.acquisition.errors import EngineFailedError
@@ -32,7 +33,7 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
-from app.runs.reader import load_raw_bytes, open_run
+from app.runs.reader import open_run
 from drivers.samples import SampleStatus
 from messages.message import message
 

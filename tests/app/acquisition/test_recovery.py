@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raw_bytes_kit import load_raw_bytes
 from recovery_kit import (
     COUNTS,
     IDENTIFIER,
@@ -26,7 +27,7 @@ from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
 from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal, unfinished_journals
 from app.runs.lock import recording_lock
-from app.runs.reader import load_counts, load_raw_bytes, open_run
+from app.runs.reader import load_counts, open_run
 from drivers.samples import SampleStatus
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from raw_bytes_kit import load_raw_bytes
 
-from app.runs.reader import load_counts, load_raw_bytes, open_run
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file

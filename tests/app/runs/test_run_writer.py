@@ -3,6 +3,7 @@ import sys
 
 import numpy as np
 import pytest
+from raw_bytes_kit import load_raw_bytes
 from runs_kit import ENDING, block
 
 from app.runs import disk
@@ -10,7 +11,7 @@ from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
 from app.runs.journal import MAGIC, JournalSpan, RecordKind, encode_record
 from app.runs.lock import is_being_recorded
-from app.runs.reader import load_raw_bytes, open_run
+from app.runs.reader import open_run
 from app.runs.writer import create_run, create_run_in
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from raw_bytes_kit import load_raw_bytes
 from runs_kit import ENDING, block
 
 from app.runs import writer_client
@@ -16,7 +17,7 @@ from app.runs.blocks import BlockLayout
 from app.runs.errors import DiskFullError, MetadataError, WriteError, WriterBehindError
 from app.runs.journal import MAGIC, JournalSpan, encode_record
 from app.runs.lock import is_being_recorded
-from app.runs.reader import load_raw_bytes, open_run
+from app.runs.reader import open_run
 from app.runs.writer_client import OpenRun, WriterClient
 
 WAIT_S = 60.0
