@@ -36,7 +36,6 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
     table_mass_kg: float | None = None
     plate_mass_kg: float | None = None
     monte_carlo: int | None = None
-    """Check the budget by drawing, with so many full refits."""
     classical: bool = True
     """Work out the paper's own figures too, which takes half a second."""
 

@@ -90,13 +90,11 @@ class CalibratedBlock:
     first_index: int
     """Of the first row, counted from the first sample of the stream."""
     counts: Counts
-    """(n, 2) int32 or float64: as received."""
     readings: Floats
     """(n, 2) float64: displacements that the gauges show, each as it is mounted (m); NaN where absent."""
     relative_m: Floats
     """(n,) float64: plate against table (m), also where gauge 2 is mounted on the base."""
     status: NDArray[np.uint8]
-    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
 
     def __len__(self) -> int:
         return len(self.status)
@@ -107,7 +105,6 @@ class CalibratedBlock:
 
     @property
     def table_m(self) -> Floats:
-        """Table against base (m), (n,)."""
         return self.readings[:, 0]
 
     def between(self, first_index: int, end_index: int) -> "CalibratedBlock":

@@ -35,7 +35,6 @@ class CalibrationDetails:
     serial_number: str | None = None
     """None keeps that of the gauge as it was."""
     range_m: float | None = None
-    """None keeps it."""
 
 
 def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetails) -> Gauge:

@@ -27,7 +27,6 @@ class DecimatedRun:
 
     path: Path
     unit: str
-    """Of the readings."""
     release_s: float | None
     """As the newest saved analysis found it, else as it was when recorded."""
     time_s: Floats

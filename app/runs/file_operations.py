@@ -27,7 +27,6 @@ ASIDE = ".before-recovery"
 
 _NAMES_MAX = 10_000
 _ROWS_AT_ONCE = 1 << 20
-"""8 MiB of float64 are compared at once."""
 
 
 def copy_run_into(path: Path, folder: Path) -> Path:
@@ -201,7 +200,6 @@ def _move(path: Path, folder: Path) -> Path:
 
 
 def _claim_name(path: Path) -> Path:
-    """Create an empty file under `run.h5`, `run-2.h5` or the next name that is free."""
     for number in range(1, _NAMES_MAX):
         target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
         try:

@@ -19,7 +19,6 @@ MAGIC = b"SLIPSTAND-JRNL1\n"
 _HEADER = struct.Struct("<BxxxIq")
 """Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""
 _FRONT = struct.Struct("<BxxxIqI")
-"""The same with the checksum."""
 _LENGTH_MAX = 1 << 26
 
 

@@ -73,9 +73,7 @@ class RunFilter(msgspec.Struct, frozen=True):
 
     series: str | None = None
     since: datetime.date | None = None
-    """Begun on this day or later."""
     until: datetime.date | None = None
-    """Begun on this day or earlier."""
     operator: str | None = None
     text: str | None = None
     """Occurs in file name, title, note, operator, series or source, whatever the case."""

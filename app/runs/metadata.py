@@ -134,15 +134,12 @@ class RunMetadata(_FrozenStruct, frozen=True):
     host: str = ""
     quantity: Quantity = "displacement"
     unit: str = "m"
-    """Unit of the calibrated readings."""
     source: str = ""
     """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
     truth: dict[str, float | int | str] = {}
-    """Parameters of a simulated run, by name with unit."""
     gauge_checks: tuple[GaugeCheck, ...] = ()
     """The last check of each gauge's calibration before the run, one a gauge at most."""
     excluded: str = ""
-    """Why the run does not count in a campaign; empty for one that does."""
 
     def __post_init__(self) -> None:
         start = self.start_time.isoformat()
@@ -237,7 +234,6 @@ class EndMetadata(_FrozenStruct, frozen=True):
     """Of this run, not of the whole stream."""
     time_base: TimeBase = TimeBase()
     dwell_s: float | None = None
-    """Hold at pullback before release."""
     zero_m: float | None = None
     """Displacement of the table at rest before the pull."""
     relative_zero_m: float | None = None
@@ -245,4 +241,3 @@ class EndMetadata(_FrozenStruct, frozen=True):
     held_m: float | None = None
     """Displacement of the table in the hold, in the same base as `zero_m`."""
     message: str = ""
-    """What went wrong in a sentence, where something did."""

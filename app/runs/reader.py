@@ -48,9 +48,7 @@ class Run:
     status: NDArray[np.uint8]
     """(n,) uint8: `drivers.samples.SampleStatus` flags."""
     analyses: tuple[SavedAnalysis, ...]
-    """Oldest first."""
     changes: tuple[Change, ...]
-    """Edits, oldest first."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -73,7 +71,6 @@ class Fingerprint(msgspec.Struct, frozen=True):
     sha256: str
     """Of the whole file. It changes with every analysis or edit that is added to the run."""
     identifier: str = ""
-    """UUID given when it was recorded; never changes."""
     columns: dict[str, str] = {}
     """CRC-32 of each column of samples, hexadecimal, as stored when the run was closed; never changes."""
 

@@ -70,7 +70,6 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
 
 
 def _measured(file: h5py.File) -> dict[str, int]:
-    """Checksums of everything that never changes."""
     wire = [column.path for column in schema.WIRE_COLUMNS]
     return {path: checksum(file[path]) for path in (*sample_paths(file), *wire)}
 

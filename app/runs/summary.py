@@ -28,7 +28,6 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     samples: int = 0
     duration_s: float = 0.0
     ended: str = ""
-    """Empty for a run that was never closed."""
     operator: str = ""
     note: str = ""
     plate_mass_kg: float | None = None

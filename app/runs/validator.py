@@ -86,7 +86,6 @@ class Validator:
         return self._child.pid if self._child else None
 
     def stop(self) -> None:
-        """End the process, which has nothing to lose."""
         if self._child:
             self._child.kill()
             self._child.stop(_STOP_S)

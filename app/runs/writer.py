@@ -149,7 +149,6 @@ class RunWriter:
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
-        """Flush rows older than 100 ms. Raises WriteError."""
         if self._pending and time.monotonic() - self._flushed_at >= _FLUSH_S:
             self.flush()
 

@@ -42,7 +42,6 @@ class OpenRun(msgspec.Struct, frozen=True):
     layout: BlockLayout = BlockLayout()
     journal: JournalSpan | None = None
     identifier: str = ""
-    """UUID of the run, a new one if empty."""
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
@@ -63,7 +62,6 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     reason: str
     message: Message
     samples: int = 0
-    """Rows that the file holds."""
 
 
 WriterCommand = OpenRun | RunBlock | EndMetadata

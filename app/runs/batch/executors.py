@@ -71,7 +71,6 @@ class ExecutorOptions(msgspec.Struct, frozen=True):
     jobs: int | None = None
     """Largest number of processes; None uses all processors, and this process alone for few runs."""
     dask: str = ""
-    """Address of a Dask scheduler; "" for this computer."""
 
 
 @dataclass(frozen=True, slots=True)

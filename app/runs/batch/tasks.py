@@ -29,23 +29,19 @@ class AnalysisTask(msgspec.Struct, frozen=True):
     save: bool = False
     """Keep the result in the run, unless one of the same request is kept there that still stands."""
     force: bool = False
-    """Analyse and save in any case."""
 
 
 class AnalysisOutcome(msgspec.Struct, frozen=True):
     """What became of one run."""
 
     run: str
-    """Absolute path."""
     document: Document | None = None
     """As `analyze --json` says it; None where the run could not be analysed."""
     error: Message = Message("")
     up_to_date: bool = False
     """The document is the one that was kept in the run."""
     unit: str = "m"
-    """Of the readings."""
     ended: str = ""
-    """Why the recording ended; "" for a run that was never closed."""
 
 
 def analyze_one(

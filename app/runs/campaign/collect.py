@@ -63,7 +63,6 @@ class CollectedRuns:
     """In the order given, those of a folder by name; `name` is the absolute path."""
     failures: tuple[FailedRun, ...]
     warnings: tuple[ResultWarning, ...]
-    """What must be known of the runs together."""
     details: dict[str, RunDetails]
     excluded: tuple[Excluded, ...] = ()
     """Runs without a result that are excluded in any case, with reasons."""
@@ -127,7 +126,6 @@ class RunCollection:
         self._shared: dict[bytes, Any] = {}
 
     def update(self, collected: CollectedRun) -> None:
-        """Take the result of a run in place of its earlier one."""
         result, details = collected.result, collected.details
         if result is not None and details is not None:
             budget = tuple(
@@ -158,7 +156,6 @@ class RunCollection:
             self._collected[path] = msgspec.structs.replace(collected, details=details)
 
     def keep_only(self, paths: Iterable[str]) -> None:
-        """Forget other runs, and take these in this order."""
         self._collected = {path: self._collected[path] for path in paths}
 
     def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
@@ -338,6 +335,5 @@ def _left_out(folders: Sequence[Path]) -> Iterator[ResultWarning]:
 
 
 def _listed(names: Sequence[str], most: int = _NAMED) -> str:
-    """`a.h5, b.h5, c.h5 and 4 more`."""
     shown = ", ".join(Path(name).name for name in names[:most])
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -39,7 +39,6 @@ class RunDetails(msgspec.Struct, frozen=True):
 
     metadata: RunMetadata
     identifier: str
-    """UUID given when it was recorded: the same under every name."""
     analysis: int | None = None
     """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
     stale: bool = False

@@ -20,7 +20,6 @@ class ForeignColumns:
     values: NDArray[np.float64]
     """(n, 2 or 3) float64: time, table and perhaps the second gauge, as written; NaN where absent."""
     names: list[str]
-    """The columns, as named in messages."""
     row_label: Callable[[int], Message]
     """Names a row of `values` as the file counts it: `line 4`."""
 

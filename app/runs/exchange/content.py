@@ -27,7 +27,6 @@ class SampleColumn:
     """Samples of one kind."""
 
     name: str
-    """With the unit: `table_displacement_m`."""
     values: NDArray[Any]
     """(n,) float64, int32 or uint8; NaN where a reading is absent."""
     unit: str

@@ -56,7 +56,6 @@ class CsvText:
 
     path: Path
     text: str
-    """The whole file, its lines ended by single newlines."""
     data: Line
     delimiter: str
     decimal: Literal[".", ","]
@@ -200,7 +199,6 @@ def _score(delimiter: str, layout: CsvOptions, lines: list[Line]) -> int:
 def _header(
     path: Path, layout: CsvOptions, delimiter: str, comment: str, lines: list[Line]
 ) -> tuple[list[str], Line]:
-    """Column names, and the first line of data."""
     cells = split_line(lines[0].text, delimiter)
     if not layout.header:
         return [], lines[0]
@@ -262,7 +260,6 @@ def _load(body: str, delimiter: str, positions: list[int]) -> NDArray[np.float64
 
 
 def _with_nan(body: str, delimiter: str) -> str:
-    """Text with `nan` in its empty cells."""
     for _ in range(2):  # the first round leaves every other one of several in a row
         body = body.replace(delimiter * 2, f"{delimiter}nan{delimiter}")
     return f"{body}\n".replace(f"{delimiter}\n", f"{delimiter}nan\n").replace(

@@ -161,7 +161,6 @@ def _mat_name(key: str) -> str:
 # --- Excel -------------------------------------------------------------------------------
 
 Sheet = tuple[Sequence[str], Iterable[Iterable[Any]]]
-"""Header and rows."""
 
 _SHEET_ROWS = 1_048_576
 _CELL_CHARACTERS = 32_767
@@ -309,4 +308,3 @@ FORMATS = {
         ".tex", lambda exported, path: _write_latex([exported], path), _write_latex, holds_samples=False
     ),
 }
-"""By the names of the command line."""

@@ -73,7 +73,6 @@ class ExportOutcome(msgspec.Struct, frozen=True):
     files: list[str] = []
     error: Message = EMPTY
     note: Message = EMPTY
-    """What was left out, and why."""
 
 
 def _load(path: Path, request: ExportRequest, validator: Validator) -> tuple[ExportedRun, Message]:

@@ -87,7 +87,6 @@ def _faults_named(path: Path) -> Iterator[None]:
 
 
 def _check_layout(path: Path, layout: CsvOptions) -> None:
-    """Refuse what only texts have."""
     if layout.delimiter is not None or layout.decimal != ".":
         raise ImportFileError(
             "{name} is no text: leave out {delimiter_option} and {decimal_option}",

@@ -251,11 +251,9 @@ class FilePreview:
     columns: tuple[str, ...]
     """As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice."""
     titles: tuple[str, ...]
-    """The same for people."""
     rows: tuple[tuple[str, ...], ...]
     """Cells of the first lines of a text; none of other files."""
     options: ParseOptions
-    """How the lines are read, as detected or given."""
     time: str = ""
     """Which columns they are likely to be; `second` is empty where there is none."""
     table: str = ""
@@ -263,7 +261,6 @@ class FilePreview:
     measures: str = "relative"
     """What `second` is likely to be: `relative` or `plate`."""
     time_unit: str = ""
-    """As the names of the columns say; empty where they do not."""
     unit: str = ""
 
 
@@ -310,7 +307,6 @@ def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
 
 
 def _numeric_share(source: CsvText) -> float:
-    """How many of the first cells are numbers, 0 to 1."""
     cells = [csv_reading.is_number(cell, source.decimal) for row in _first_rows(source) for cell in row]
     return sum(cells) / max(len(cells), 1)
 
