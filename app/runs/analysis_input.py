@@ -62,6 +62,13 @@ def build_record(
 ) -> Record:
     """Readings (n,) with what the metadata of their run know of stand and gauges."""
     clock_scale, clock_scale_uncertainty = combine_clock_scale(time_base)
+    relative = gauge_uncertainty(metadata.gauges.relative)
+    skew_u_s = time_base.skew_standard_uncertainty_s or 0.0
+    relative = dataclasses.replace(
+        relative,
+        delay_s=relative.delay_s - (time_base.skew_s or 0.0),  # read later than its row says
+        delay_s_uncertainty=math.hypot(relative.delay_s_uncertainty, skew_u_s),
+    )
     return Record(
         time_s=time_s,
         table_displacement_m=table_displacement_m,
@@ -71,7 +78,7 @@ def build_record(
         clock_scale=clock_scale,
         clock_scale_uncertainty=clock_scale_uncertainty,
         table_gauge=gauge_uncertainty(metadata.gauges.table),
-        relative_gauge=_read_later(gauge_uncertainty(metadata.gauges.relative), time_base),
+        relative_gauge=relative,
         gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",
     )
 
@@ -105,15 +112,4 @@ def _masses(metadata: RunMetadata) -> StandMasses:
         plate_mass_uncertainty_kg=stand.plate_mass_standard_uncertainty_kg,
         gravity_m_per_s2=stand.gravity_m_per_s2,
         gravity_uncertainty_m_per_s2=stand.gravity_standard_uncertainty_m_per_s2,
-    )
-
-
-def _read_later(gauge: GaugeUncertainty, time_base: TimeBase) -> GaugeUncertainty:
-    """A gauge that was read later than its row says: the opposite of a delay."""
-    return dataclasses.replace(
-        gauge,
-        delay_s=gauge.delay_s - (time_base.skew_s or 0.0),
-        delay_s_uncertainty=math.hypot(
-            gauge.delay_s_uncertainty, time_base.skew_standard_uncertainty_s or 0.0
-        ),
     )

@@ -51,7 +51,9 @@ def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
 
 def _overview(file: h5py.File, spans: int, before_release_s: float) -> DecimatedRun:
     metadata, time_s = read_metadata(file), file[TIME]
-    rows, release_s, first = stored_rows(file), _release_s(file), 0
+    rows, release_s, first = stored_rows(file), read_number(file, RELEASE), 0
+    for analysis in read_analyses(file)[-1:]:
+        release_s = analysis.document["events"].get("release_s") or release_s
     if release_s is not None:
         first = bisect.bisect_left(time_s, release_s - before_release_s, hi=rows)
     per_span = max(1, (rows - first) // spans)
@@ -59,13 +61,6 @@ def _overview(file: h5py.File, spans: int, before_release_s: float) -> Decimated
     pieces = [_condensed((time_s[part], *readings(part)), per_span) for part in _parts(first, rows, per_span)]
     columns = [np.concatenate(column) for column in zip(*pieces, strict=True)]
     return DecimatedRun(Path(file.filename), metadata.unit, release_s, columns[0], tuple(columns[1:]))
-
-
-def _release_s(file: h5py.File) -> float | None:
-    release_s = read_number(file, RELEASE)
-    for analysis in read_analyses(file)[-1:]:
-        release_s = analysis.document["events"].get("release_s") or release_s
-    return release_s
 
 
 def _parts(first: int, rows: int, per_span: int) -> Iterator[slice]:

@@ -18,7 +18,7 @@ from config.schema import Stand
 
 def edit_run(path: Path, author: str, **fields: Any) -> metadata_io.Change:
     """Give fields of `RunMetadata` new values; the old ones stay in the file. Raises RunError."""
-    change = metadata_io.Change(_now(), author, msgspec.to_builtins(fields))
+    change = metadata_io.Change(datetime.datetime.now().astimezone(), author, msgspec.to_builtins(fields))
     return _append(path, lambda _file: change)
 
 
@@ -45,7 +45,9 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = metadata_io.EDI
         )
         since = {name for i in _undoable(changes) if i > number for name in changes[i].fields}
         old = {name: getattr(before, name) for name in changes[number].fields if name not in since}
-        return metadata_io.Change(_now(), author, msgspec.to_builtins(old), undoes=number)
+        return metadata_io.Change(
+            datetime.datetime.now().astimezone(), author, msgspec.to_builtins(old), undoes=number
+        )
 
     return _append(path, back)
 
@@ -73,7 +75,3 @@ def _append(path: Path, make: Callable[[h5py.File], metadata_io.Change]) -> meta
 
     rewrite(path, add)
     return made[0]
-
-
-def _now() -> datetime.datetime:
-    return datetime.datetime.now().astimezone()

@@ -159,9 +159,6 @@ class RunMetadata(_FrozenStruct, frozen=True):
         if not _is_line(self.excluded):
             template = N_("excluded = {excluded!r} is not a line of text of up to {text_max} characters")
             raise MetadataError(template, excluded=self.excluded[:40], text_max=_TEXT_MAX)
-        if self.quantity not in QUANTITY_UNITS:
-            template = N_("quantity {quantity!r} is not known. Use {quantity_units}")
-            raise MetadataError(template, quantity=self.quantity, quantity_units=", ".join(QUANTITY_UNITS))
         for name in self.truth:
             if not is_field_name(name):
                 raise MetadataError(

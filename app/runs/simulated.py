@@ -18,6 +18,7 @@ from drivers.samples import DeviceIdentity, Losses
 if TYPE_CHECKING:
     from analysis.motion.two_mass import Motion, TwoMassParameters
 
+Floats = NDArray[np.float64]
 PLATEAU_S = 1.0
 _EXACT = Gauge(
     gain_m_per_count=1.0,
@@ -58,30 +59,25 @@ def write_simulated_run(
         | {"friction_static": parameters.static_or_dynamic},
     )
     metadata = metadata.replace(stand=metadata.stand.replace(gravity_m_per_s2=parameters.gravity_m_per_s2))
-    return store_motion(path, metadata, table, relative, release_s=held / rate_hz, replace=replace)
+    readings = np.column_stack([table, relative])
+    return store_motion(path, metadata, readings, release_s=held / rate_hz, rate_hz=rate_hz, replace=replace)
 
 
 def store_motion(
     path: Path,
     metadata: RunMetadata,
-    table_displacement_m: NDArray[np.float64],
-    relative_displacement_m: NDArray[np.float64],
+    readings: Floats,
     *,
-    release_s: float | None = None,
+    release_s: float,
+    rate_hz: float,
     replace: bool = False,
 ) -> StoredRun:
-    """Store even samples (n,) at `metadata.rate_hz` as a run without counts. Raises RunError."""
-    if metadata.rate_hz is None:
-        raise ValueError("rate_hz is None: even samples need a rate. Give one")
-    n = len(table_displacement_m)
-    block = RunBlock(
-        time_s=np.arange(n) / metadata.rate_hz,
-        readings=np.column_stack([table_displacement_m, relative_displacement_m]),
-        status=np.zeros(n, np.uint8),
-    )
+    """Store even samples (n, 2) as a run without counts. Raises RunError."""
+    n = len(readings)
+    block = RunBlock(time_s=np.arange(n) / rate_hz, readings=readings, status=np.zeros(n, np.uint8))
     ending = EndMetadata(
         ended="simulated",
-        end_time=metadata.start_time + datetime.timedelta(seconds=n / metadata.rate_hz),
+        end_time=metadata.start_time + datetime.timedelta(seconds=n / rate_hz),
         events=Events(pulled_back_s=0.0, release_s=release_s),
         losses=Losses(samples=n),
     )

@@ -3,6 +3,8 @@
 import datetime
 from pathlib import Path
 
+import numpy as np
+
 from analysis.synthetic import Truth, simulate_readings
 from app.runs.metadata import create_metadata
 from app.runs.simulated import store_motion
@@ -38,5 +40,6 @@ def write_run(path: Path, series: str = "1FFM0", *, facts: dict | None = None, *
         source="simulated",
         **facts or {},
     )
-    store_motion(path, metadata, table, relative, release_s=truth.hold_s)
+    readings = np.column_stack([table, relative])
+    store_motion(path, metadata, readings, release_s=truth.hold_s, rate_hz=truth.rate_hz)
     return path
