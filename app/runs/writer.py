@@ -28,7 +28,7 @@ from app.runs.fields import fill_fields
 from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJournalError, read_journal
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
-from app.runs.writer_client import Closed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand, failure
+from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
 from drivers.samples import Losses
 from messages.i18n import N_
 
@@ -330,7 +330,9 @@ class WriterServer:
             self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(error))
         except RunError as second:
             error = second
-        self._replies.send(failure(error, writer.flushed_samples if writer else 0))
+        reasons = (reason for reason, kind in ERRORS.items() if isinstance(error, kind))
+        samples = writer.flushed_samples if writer else 0
+        self._replies.send(Failed(next(reasons, "write-error"), error.message, samples))
         self._replies.close()
         os._exit(1)
 

@@ -121,12 +121,6 @@ class FrameDecoder:
         raise ValueError(f"frame of unknown kind {kind}")
 
 
-def failure(error: errors.RunError, samples: int = 0) -> Failed:
-    """Reply for an error of the writer; `samples` rows are in the file."""
-    reasons = [reason for reason, kind in ERRORS.items() if isinstance(error, kind)]
-    return Failed(reasons[0] if reasons else "write-error", error.message, samples)
-
-
 def _frame(kind: int, payload: bytes) -> bytes:
     return _FRAME.pack(kind, len(payload)) + payload
 

@@ -39,15 +39,10 @@ def _end_with_owner(lifeline: PipeEnd, grace_s: float) -> None:
     with contextlib.suppress(EOFError, OSError):
         lifeline.recv()
     sys.stderr = io.StringIO()  # that it was cut off is no news
-    _interrupt_main_thread()  # so that files are cleared away
-    time.sleep(grace_s)
-    os._exit(1)
-
-
-def _interrupt_main_thread() -> None:
-    """Have `_leave` called there; where the system can, even while it waits for something."""
     thread = threading.main_thread().ident
-    if thread is not None and hasattr(signal, "pthread_kill"):
+    if thread is not None and hasattr(signal, "pthread_kill"):  # wakes it, whatever it waits for
         signal.pthread_kill(thread, signal.SIGTERM)
     else:
         interrupt_main(signal.SIGTERM)
+    time.sleep(grace_s)  # so that files are cleared away
+    os._exit(1)
