@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-CLOCK_TOLERANCE = 1e-3
-"""Relative standard uncertainty of a device's rate before anybody has timed it."""
+CLOCK_TOLERANCE = 1e-3  # relative standard uncertainty of a device's rate before anybody has timed it
 
 
 def to_record(run: "Run", *, metres_only: bool = True) -> Record:

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from app.runs.metadata import EndMetadata, RunMetadata
     from config.schema import Gauge, GaugeCheck, Gauges
 
-_OFF = 3.0
-"""The plain log decrement is called biased so many standard uncertainties off the fitted one."""
+_OFF = 3.0  # the plain log decrement is called biased so many standard uncertainties off the fitted one
 _ZERO_MOVED = 0.01
 """Of the pullback: what friction in the stand or drift moves the zero by that is worth a word."""
 _ZERO_MOVED_M = 50e-6

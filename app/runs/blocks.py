@@ -36,8 +36,7 @@ class RunBlock:
     """(n,) float64: since the first stored sample, on the device's or nominal clock."""
     readings: NDArray[np.float64]
     """(n, channels) float64: calibrated readings, displacements (m) as a rule; NaN where absent."""
-    status: NDArray[np.uint8]
-    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
+    status: NDArray[np.uint8]  # (n,) uint8: `drivers.samples.SampleStatus` flags
     counts: NDArray[np.int32] | NDArray[np.float64] | None = None
     """(n, channels) int32 or float64, or None: as received, of the type that the layout says."""
 
@@ -87,13 +86,11 @@ def count_flags(status: NDArray[np.uint8]) -> Losses:
 class CalibratedBlock:
     """Consecutive calibrated samples."""
 
-    first_index: int
-    """Of the first row, counted from the first sample of the stream."""
+    first_index: int  # of the first row, counted from the first sample of the stream
     counts: Counts
     readings: Floats
     """(n, 2) float64: displacements that the gauges show, each as it is mounted (m); NaN where absent."""
-    relative_m: Floats
-    """(n,) float64: plate against table (m), also where gauge 2 is mounted on the base."""
+    relative_m: Floats  # (n,) float64: plate against table (m), also where gauge 2 is mounted on the base
     status: NDArray[np.uint8]
 
     def __len__(self) -> int:

@@ -27,21 +27,18 @@ from app.runs.metadata_io import write_metadata
 from app.runs.schema import Column
 from app.version import __version__
 
-UNFINISHED_SUFFIX = ".making"
-"""Ends the temporary name of a run file. A killed process may leave one."""
+UNFINISHED_SUFFIX = ".making"  # ends the temporary name of a run file. A killed process may leave one.
 
 _CHECK_ROWS = 1000
 _PAGE_BYTES = 4096
 """An interrupted write ends at a page boundary, so no chunk index may lie across one."""
-_INDEX_BYTES = 2096
-"""Size of one node of a chunk index in HDF5."""
+_INDEX_BYTES = 2096  # size of one node of a chunk index in HDF5
 _METADATA_BYTES = 1 << 17
 """Room claimed at once for chunk indices. An index that grows then lies within the size that the superblock
 states: a kill in the flush that grows it would otherwise hide the earlier chunks too."""
 _CHUNKS_CACHED_BYTES = 1 << 19
 """Of each column. Only the last chunk is written again; HDF5 would keep 8 MB of each column."""
-_METADATA_CACHED_BYTES = 1 << 16
-"""Of the whole file. HDF5 would keep every index node as the file grows."""
+_METADATA_CACHED_BYTES = 1 << 16  # of the whole file. HDF5 would keep every index node as the file grows.
 
 
 def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "") -> h5py.File:

@@ -29,8 +29,7 @@ class DecimatedRun:
     unit: str
     release_s: float | None
     """As the newest saved analysis found it, else as it was when recorded."""
-    time_s: Floats
-    """(m,) float64: of each span of rows, twice; of each row where the run is short."""
+    time_s: Floats  # (m,) float64: of each span of rows, twice; of each row where the run is short
     readings: tuple[Floats, ...]
     """Lowest and highest reading of each span, of the table gauge and of the other if there is one."""
 

@@ -10,8 +10,7 @@ from messages.message import Message, MessageError, message
 class RunError(MessageError):
     """Root of the run file errors."""
 
-    stored_samples: int = 0
-    """Rows that the file holds although its writer failed."""
+    stored_samples: int = 0  # rows that the file holds although its writer failed
 
 
 class RunNotFoundError(RunError):

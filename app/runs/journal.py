@@ -25,10 +25,8 @@ _LENGTH_MAX = 1 << 26
 class RecordKind(IntEnum):
     """What a record holds."""
 
-    WIRE = 0
-    """Bytes as they came."""
-    NOTE = 1
-    """A JSON document about the run, such as its metadata."""
+    WIRE = 0  # bytes as they came
+    NOTE = 1  # A JSON document about the run, such as its metadata
 
 
 _KINDS = {int(kind): kind for kind in RecordKind}

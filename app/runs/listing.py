@@ -24,8 +24,7 @@ from app.version import __version__
 Progress = Callable[[int, int], None]
 Stamp = tuple[int, int]
 """Size of a file, and time of its last change (ns): while they last, so does its summary."""
-Index = dict[str, tuple[Stamp, RunSummary]]
-"""Stamp and summary of each file, by path."""
+Index = dict[str, tuple[Stamp, RunSummary]]  # stamp and summary of each file, by path
 
 _SAVE_S = 5.0
 """So often a listing is remembered while it goes on: an interrupted first one keeps most of its work."""

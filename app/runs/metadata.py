@@ -114,8 +114,7 @@ class RunMetadata(_FrozenStruct, frozen=True):
     title: str
     start_time: datetime.datetime
     """Of the first stored sample, with zone."""
-    stand: Stand
-    """As configured; the masses of this run stand beside it."""
+    stand: Stand  # as configured; the masses of this run stand beside it
     gauges: Gauges
     table_mass_kg: float
     plate_mass_kg: float
@@ -223,8 +222,7 @@ class Events(_FrozenStruct, frozen=True):
 class EndMetadata(_FrozenStruct, frozen=True):
     """What is known when a run ends."""
 
-    ended: str
-    """Why, as in `record --json`: rest, enough, duration, stopped, device-lost, ..."""
+    ended: str  # why, as in `record --json`: rest, enough, duration, stopped, device-lost, ...
     end_time: datetime.datetime
     events: Events = Events()
     losses: Losses = msgspec.field(default_factory=Losses)
@@ -233,8 +231,6 @@ class EndMetadata(_FrozenStruct, frozen=True):
     dwell_s: float | None = None
     zero_m: float | None = None
     """Displacement of the table at rest before the pull."""
-    relative_zero_m: float | None = None
-    """Displacement of the plate against the table then."""
-    held_m: float | None = None
-    """Displacement of the table in the hold, in the same base as `zero_m`."""
+    relative_zero_m: float | None = None  # displacement of the plate against the table then
+    held_m: float | None = None  # displacement of the table in the hold, in the same base as `zero_m`
     message: str = ""

@@ -11,8 +11,7 @@ import config
 from config.files import is_checkout, load_settings
 from config.schema import Settings
 
-RECORDINGS = "SLIPSTAND_RECORDINGS"
-"""Variable that says where runs are kept, before all settings."""
+RECORDINGS = "SLIPSTAND_RECORDINGS"  # variable that says where runs are kept, before all settings
 
 
 def journal_fallback_folders() -> list[Path]:

@@ -35,18 +35,14 @@ class Run:
     path: Path
     identifier: str
     """UUID given when it was recorded."""
-    metadata: RunMetadata
-    """With the latest value of every edited field."""
-    end: EndMetadata | None
-    """None for a run that was never closed: its writer died."""
+    metadata: RunMetadata  # with the latest value of every edited field
+    end: EndMetadata | None  # None for a run that was never closed: its writer died
     time_s: NDArray[np.float64]
     """(n,) float64: since the first stored sample, on the device's or nominal clock."""
-    table_reading: NDArray[np.float64]
-    """(n,) float64: gauge 1, in `metadata.unit`; NaN where absent."""
+    table_reading: NDArray[np.float64]  # (n,) float64: gauge 1, in `metadata.unit`; NaN where absent
     relative_reading: NDArray[np.float64] | None
     """(n,) float64 or None: gauge 2, against table or base as its calibration says; None without one."""
-    status: NDArray[np.uint8]
-    """(n,) uint8: `drivers.samples.SampleStatus` flags."""
+    status: NDArray[np.uint8]  # (n,) uint8: `drivers.samples.SampleStatus` flags
     analyses: tuple[SavedAnalysis, ...]
     changes: tuple[Change, ...]
 

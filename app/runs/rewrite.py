@@ -16,10 +16,8 @@ from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_s
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 from app.runs.validation import validate_file
 
-_ROOM_BYTES = 1 << 22
-"""Beyond the size of the file: a long analysis with its tables needs less than 1 MB."""
-_REPLACE_S = 5.0
-"""Windows refuses to replace a file while it is read; a whole run is read in less."""
+_ROOM_BYTES = 1 << 22  # beyond the size of the file: a long analysis with its tables needs less than 1 MB
+_REPLACE_S = 5.0  # Windows refuses to replace a file while it is read; a whole run is read in less
 
 
 def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:

@@ -32,8 +32,7 @@ EVENTS: Final = "entry/events"
 TRUTH: Final = "entry/truth"
 ANALYSIS_PREFIX: Final = "analysis_"
 
-CHUNK: Final = 8192
-"""Rows a chunk: 64 KiB of float64, with which an hour at 2 kHz is read fastest."""
+CHUNK: Final = 8192  # rows a chunk: 64 KiB of float64, with which an hour at 2 kHz is read fastest
 
 GROUPS: Final = {
     ENTRY: "NXentry",
@@ -80,14 +79,10 @@ class Field:
     kind: Kind = Kind.NUMBER
     unit: str = ""
     """Attribute `units`; `{unit}` stands for the unit of the readings."""
-    default: Any = None
-    """Value of a field that the file does not hold or that is NaN."""
-    required: bool = False
-    """A file without the field is damaged."""
-    reserved_bytes: int = 0
-    """Room that the template makes for a text which is known at the end only."""
-    since: str = FIRST_VERSION
-    """Version of the program that wrote the field first."""
+    default: Any = None  # value of a field that the file does not hold or that is NaN
+    required: bool = False  # a file without the field is damaged
+    reserved_bytes: int = 0  # room that the template makes for a text which is known at the end only
+    since: str = FIRST_VERSION  # version of the program that wrote the field first
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +95,7 @@ class Column:
     attributes: dict[str, str]
     fill: float = 0.0
     """Value of rows that are not written."""
-    chunk: int = 0
-    """Rows a chunk; 0 is `CHUNK`."""
+    chunk: int = 0  # rows a chunk; 0 is `CHUNK`
     compressed: bool = False
     """For datasets written when the run is closed: a `kill -9` can make a growing one unreadable."""
 

@@ -39,10 +39,8 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     friction_dynamic_uncertainty: float | None = None
     stale: bool = False
     """Masses, calibration or pullback have been changed since the newest saved analysis."""
-    adequate: bool | None = None
-    """Whether its model fits; None where it has none."""
-    identifier: str = ""
-    """UUID given when it was recorded: the same under every name."""
+    adequate: bool | None = None  # whether its model fits; None where it has none
+    identifier: str = ""  # UUID given when it was recorded: the same under every name
     edits: int = 0
     conditions: Conditions = Conditions()
     excluded: str = ""

@@ -16,12 +16,9 @@ from app.runs.errors import DamagedRunError, NotARunError
 from messages.i18n import N_
 from messages.message import MessageError
 
-_OBJECTS_MAX = 50_000
-"""A run has 200 objects and 60 more with each saved analysis."""
-_DEPTH_MAX = 10
-"""A run has groups of depth 6."""
-_SMALL_BYTES = 1 << 20
-"""Datasets up to this size need no proof that the file fills them."""
+_OBJECTS_MAX = 50_000  # a run has 200 objects and 60 more with each saved analysis
+_DEPTH_MAX = 10  # a run has groups of depth 6
+_SMALL_BYTES = 1 << 20  # datasets up to this size need no proof that the file fills them
 _TEXT_BYTES_MAX = 1 << 26
 _TEXTS_MAX = 1000
 _GZIP_RATIO_MAX = 1100

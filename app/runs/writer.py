@@ -32,8 +32,7 @@ from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened,
 from drivers.samples import Losses
 from messages.i18n import N_
 
-_FLUSH_S = 0.1
-"""Longest loss of samples in the file by a crash; each flush costs two writes of metadata."""
+_FLUSH_S = 0.1  # longest loss of samples in the file by a crash; each flush costs two writes of metadata
 _NAMES_MAX = 10_000
 
 

@@ -31,12 +31,9 @@ _log = logging.getLogger(__name__)
 
 _SERIAL_RUNS = 8
 """Up to this many runs are done before worker processes would have started (docs/benchmarks.md)."""
-_CLUSTER_TIMEOUT_S = 5.0
-"""A scheduler in the same network answers in less than 1 s."""
-_QUEUED_PER_WORKER = 8
-"""Items handed over for each worker: one slow run must not leave the others idle."""
-_POLL_S = 0.2
-"""Windows delivers Ctrl-C between two waits only."""
+_CLUSTER_TIMEOUT_S = 5.0  # a scheduler in the same network answers in less than 1 s
+_QUEUED_PER_WORKER = 8  # items handed over for each worker: one slow run must not leave the others idle
+_POLL_S = 0.2  # Windows delivers Ctrl-C between two waits only
 
 
 class Executor:

@@ -16,8 +16,7 @@ if sys.platform == "win32":
 else:
     PipeEnd: TypeAlias = connection.Connection
 
-_GRACE_S = 2.0
-"""To clear away half-written copies, on a busy computer too."""
+_GRACE_S = 2.0  # to clear away half-written copies, on a busy computer too
 
 
 def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:

@@ -59,8 +59,7 @@ class FailedRun(msgspec.Struct, frozen=True):
 class CollectedRuns:
     """Runs with their results."""
 
-    runs: tuple[RunResult, ...]
-    """In the order given, those of a folder by name; `name` is the absolute path."""
+    runs: tuple[RunResult, ...]  # in the order given, those of a folder by name; `name` is the absolute path
     failures: tuple[FailedRun, ...]
     warnings: tuple[ResultWarning, ...]
     details: dict[str, RunDetails]
@@ -188,8 +187,7 @@ def _with_reasons(
         yield replace(result, excluded=reason) if reason else result
 
 
-_NAMED = 3
-"""So many runs are named, the others counted."""
+_NAMED = 3  # so many runs are named, the others counted
 
 
 def campaign_warnings(

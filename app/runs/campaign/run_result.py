@@ -41,8 +41,7 @@ class RunDetails(msgspec.Struct, frozen=True):
     identifier: str
     analysis: int | None = None
     """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
-    stale: bool = False
-    """A newer analysis is kept in the run that does not stand any more."""
+    stale: bool = False  # a newer analysis is kept in the run that does not stand any more
 
 
 class CollectedRun(msgspec.Struct, frozen=True):

@@ -29,8 +29,7 @@ class SampleColumn:
     name: str
     values: NDArray[Any]
     """(n,) float64, int32 or uint8; NaN where a reading is absent."""
-    unit: str
-    """"1" for flags, "count" for readings as received."""
+    unit: str  # "1" for flags, "count" for readings as received
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,18 +18,15 @@ from app.runs.exchange.csv_reading import CsvOptions, read_columns
 from messages.i18n import N_
 from messages.message import Message, message, option
 
-_LARGEST_BYTES = 4 << 30
-"""A file that unpacks to more than this is refused before it is unpacked."""
+_LARGEST_BYTES = 4 << 30  # a file that unpacks to more than this is refused before it is unpacked
 
 
 @dataclass(frozen=True, slots=True)
 class _Table:
     """A file that is open."""
 
-    names: list[str]
-    """Of all columns; "" where a column has none."""
-    column: Callable[[int], NDArray[np.float64]]
-    """Reads a column by its number. Raises ImportFileError."""
+    names: list[str]  # of all columns; "" where a column has none
+    column: Callable[[int], NDArray[np.float64]]  # reads a column by its number. Raises ImportFileError.
     row_label: Callable[[int], Message] = lambda row: message("row {row}", row=row)
 
 

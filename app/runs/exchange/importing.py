@@ -48,14 +48,12 @@ class CsvImport(msgspec.Struct, frozen=True):
     offset: float = 0.0
     unit_name: str | None = None
     """Unit after the gain, where it is not metres (per s, per s^2): rad, V, ..."""
-    gain_uncertainty: float | None = None
-    """Relative standard uncertainty; None is "not stated"."""
+    gain_uncertainty: float | None = None  # relative standard uncertainty; None is "not stated"
     quantity: Quantity = "displacement"
     from_s: float | None = None
     until_s: float | None = None
     """Kept stretch, on the file's own time axis in seconds, ends included."""
-    segment: int | None = None
-    """Which of the stretches between times that go back, counted from 0."""
+    segment: int | None = None  # which of the stretches between times that go back, counted from 0
 
 
 def import_csv(
