@@ -333,11 +333,6 @@ class FakeWorker:
         self.cancelled = 0
         self.closed = False
 
-    @property
-    def submitted(self) -> list[tuple[Any, Any]]:
-        """Function and only argument of each call."""
-        return [(call.function, call.arguments[0]) for call in self.calls]
-
     def submit(self, function: Callable[..., Any], *arguments: Any, **callbacks: Any) -> None:
         self.calls.append(Call(function, arguments, **callbacks))
 

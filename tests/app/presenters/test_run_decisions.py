@@ -63,7 +63,7 @@ class Desk:
         self.record.dispatch(StateChanged(state, at_s))
 
     def tasks(self) -> list[RecordTask]:
-        asked = [argument for _, argument in self.worker.submitted]
+        asked = [call.arguments[0] for call in self.worker.calls]
         self.worker.calls.clear()
         return asked
 

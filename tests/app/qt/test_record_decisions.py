@@ -85,7 +85,7 @@ class Stage:
         self.presenter.tick()
 
     def tasks(self) -> list[RecordTask]:
-        asked = [argument for _, argument in self.files.submitted]
+        asked = [call.arguments[0] for call in self.files.calls]
         self.files.calls.clear()
         return asked
 
