@@ -197,7 +197,6 @@ def _free_name(stem: str) -> Path:
 
 
 def _replace(path: Path, text: str) -> None:
-    """Write a file beside `path` and move it there, so that a failure leaves the old one."""
     beside = path.with_suffix(".toml.new")
     _write(beside, text, "w")
     beside.replace(path)

@@ -9,11 +9,10 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a loop that Python calls: cached on disk, without the interpreter lock.
+    """Compile a loop that Python calls: cached on disk, without the interpreter lock, division as in numpy.
 
     Reference counting inside compiled code is off (`_nrt`), because counting at each call of a small helper
     halves the speed of a decoder. So such a function must not make arrays; it fills those that it is given.
-    Division follows numpy and raises no exception.
     """
     return _compile(function, inline=False)
 

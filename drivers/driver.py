@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from drivers.errors import SettingsError
 from messages.i18n import N_
@@ -49,14 +49,12 @@ class DeviceDriver:
         return self.format_bauds.get(settings.get("format", ""), self.default_baud)
 
     def make_source(self, settings: Mapping[str, str], rate_hz: float | None) -> "SampleSource":
-        source: SampleSource = self._source().make_source(dict(settings), rate_hz)
-        return source
+        return cast("SampleSource", self._source().make_source(dict(settings), rate_hz))
 
     def make_simulated(self, settings: Mapping[str, str]) -> "SimulatedProtocol":
         self._source()
         simulated = import_module(f"{self.package}.simulated")
-        protocol: SimulatedProtocol = simulated.make_protocol(dict(settings))
-        return protocol
+        return cast("SimulatedProtocol", simulated.make_protocol(dict(settings)))
 
     def recognise(self, data: bytes, duration_s: float | None) -> "Recognition | None":
         """What `data` are, received within `duration_s`; None where they are not of this device."""
@@ -76,8 +74,8 @@ class DeviceDriver:
     def single_gauge_settings(self, gauge: str, settings: Mapping[str, str]) -> tuple[dict[str, str], int]:
         """Settings of a device with only this gauge, and the column of its readings. Raises SettingsError."""
         if self.has_single_gauge_settings:
-            own: tuple[dict[str, str], int] = self._source().single_gauge_settings(gauge, dict(settings))
-            return own
+            found = self._source().single_gauge_settings(gauge, dict(settings))
+            return cast(tuple[dict[str, str], int], found)
         if self.channels > 1:
             template = N_("protocol {protocol} has both gauges on one port: leave the port of gauge 2 out")
             raise SettingsError(template, protocol=self.name)

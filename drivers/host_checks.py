@@ -62,7 +62,6 @@ def modem_manager_runs(processes: Path = PROCESSES) -> bool:
 
 
 def _modem_manager_hint(port: PortInfo, processes: Path, udev_data: Path) -> PortHint | None:
-    """Hint where ModemManager may write to `port`: it takes ACM ports and adapters for modems."""
     if port.vendor_id is None or not modem_manager_runs(processes) or _is_ignored(port.device, udev_data):
         return None
     template = N_("ModemManager runs and talks to {port} for some seconds after it is plugged in")

@@ -129,7 +129,6 @@ def _confirmed_step(stream: Record, rule: Record, line: Record, step: int, after
 
 @inlined
 def _fill_packet(stream: Record, rule: Record, line: Record, step: int, packet: Record) -> None:
-    """Write the packet of a good line and update the state."""
     new_start = step == _NEW_START
     gap = int(stream.restart_rows) if new_start else step - 1
     packet.damaged = min(gap, stream.broken)

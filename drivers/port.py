@@ -271,7 +271,6 @@ def _read_terminal(descriptor: int) -> bytes:
 
 
 def _read_available(descriptor: int) -> bytes:
-    """What a terminal holds; an empty one returns nothing or raises, depending on the system."""
     try:
         return os.read(descriptor, _MAX_READ_BYTES)
     except BlockingIOError:

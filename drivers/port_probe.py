@@ -125,9 +125,8 @@ def listen(
 
     `link` is set to the first; a device that is silent there is silent at all. Raises DeviceLostError.
     """
-    candidates = COMMON_LINE_SETTINGS
     best = ListenResult(None, None)
-    for number, settings in enumerate(candidates if link.has_baud else candidates[:1]):
+    for number, settings in enumerate(COMMON_LINE_SETTINGS[: None if link.has_baud else 1]):
         template = N_("listening at {line_settings}") if link.has_baud else N_("listening")
         on_progress(message(template, line_settings=settings))
         try:

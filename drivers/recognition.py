@@ -154,6 +154,5 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> Message:
 
 
 def _second_line(received: bytes) -> str:
-    """The second line, because the first is often cut."""
-    lines = received.splitlines()
+    lines = received.splitlines()  # the first is often cut
     return lines[min(1, len(lines) - 1)][:_SHOWN_OF_LINE].decode("ascii", "replace")

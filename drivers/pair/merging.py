@@ -96,7 +96,6 @@ class Merger:
         self._waiting[gauge] = held
 
     def is_overdue(self, now_ns: int) -> bool:
-        """Whether a row has waited long enough at the arrival `now_ns`."""
         waiting = self._waiting[self._base]
         return bool(len(waiting)) and bool(waiting.host_ns[0] < now_ns - self._patience_ns)
 

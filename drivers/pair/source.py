@@ -62,7 +62,6 @@ class PairSource(SampleSource):
         return joined(list({str(note): note for note in notes if note}.values()), "; ")
 
     def take_warnings(self) -> list[Message]:
-        """Warnings of both devices, and losses and returns of one of them."""
         own = [warning for channel in self.channel_sources for warning in channel.source.take_warnings()]
         return own + super().take_warnings()
 

@@ -121,7 +121,6 @@ class SimulatedDevice:
         return self._stream.send_due(now_ns, self._has_reader) if self._stream else self._NO_STREAM_S
 
     def _time_s(self, now_ns: int) -> float:
-        """The stand's own time; before the first session, time since the first step."""
         if self._session_ns is None:
             self._session_ns = now_ns
         return (now_ns - self._session_ns) * 1e-9

@@ -66,7 +66,6 @@ class FrameDamager:
         """Whether the last line was sent without its end."""
 
     def damage(self, frame: bytes) -> tuple[bytes, FrameFault | None]:
-        """Bytes of a frame on the wire, and what happened to it."""
         is_merged, self.is_line_open = self.is_line_open, False
         rates = self._rates
         draw = self._random.random()

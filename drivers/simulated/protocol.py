@@ -65,7 +65,6 @@ class SimulatedProtocol(ABC):
         return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - most have one
-        """Samples in each frame at this rate."""
         return 1
 
     @abstractmethod

@@ -253,7 +253,6 @@ def open_pseudo_terminal() -> Transport:
 
 
 def _open_device_end(link: Path) -> int:
-    """Open a terminal, link `link` to its reader's end, and return the device's end."""
     if sys.platform == "win32":  # checked before; for the type checker
         raise PortUnavailableError("there are no pseudo-terminals on Windows: use TCP")
     import tty

@@ -142,7 +142,6 @@ def _checksum(lines: list[str], separator: str) -> Column | None:
 
 
 def _counter(fields: list[str], rate_hz: float | None, may_be_time: bool) -> Column | None:
-    """Time or sequence in a column; None for others."""
     values = np.array([float(field) for field in fields])
     steps = np.diff(values)
     onward = steps[steps >= 0]
@@ -201,7 +200,6 @@ def find_openscale_format(data: bytes) -> LineFormat | None:
 
 
 def _shape(fields: list[str]) -> tuple[str, ...] | None:
-    """Form of a line, field by field; None if these are not the fields of an OpenScale."""
     units = [at for at, field in enumerate(fields) if field in OPENSCALE_UNITS]
     numbers = [field for field in fields if field and field not in OPENSCALE_UNITS]
     are_numbers = all(field.removeprefix("-").replace(".", "", 1).isdigit() for field in numbers)

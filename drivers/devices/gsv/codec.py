@@ -242,5 +242,4 @@ def _is_whole(buffer: UInt8s, at: int, pattern: Record) -> bool:
 
 @inlined
 def _is_finite(buffer: UInt8s, at: int) -> bool:
-    """Whether a big-endian 32-bit float is finite: its exponent is not all ones."""
-    return not (buffer[at] & 0x7F == 0x7F and buffer[at + 1] & 0x80)
+    return not (buffer[at] & 0x7F == 0x7F and buffer[at + 1] & 0x80)  # big-endian, its exponent all ones

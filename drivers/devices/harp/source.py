@@ -90,7 +90,6 @@ class HarpSource(SampleSource):
         return None if reply is None or reply.kind & codec.ERROR else reply.number
 
     def _write(self, link: Link, register: Register, wanted: Callable[[int], int]) -> None:
-        """Write the wanted value, made of the present one; a register that cannot be read is left alone."""
         present = self._read(link, register)
         if present is None or wanted(present) == present:
             return

@@ -70,9 +70,8 @@ class Request:
     @property
     def description(self) -> Message:
         last = self.register + self.count - 1
-        template = N_("function {function:02d} for registers {register} to {last}")
-        if last == self.register:
-            template = N_("function {function:02d} for register {register}")
+        several = N_("function {function:02d} for registers {register} to {last}")
+        template = several if self.count > 1 else N_("function {function:02d} for register {register}")
         return message(template, function=self.function, register=self.register, last=last)
 
     @property
@@ -81,9 +80,8 @@ class Request:
 
     def is_complete(self, received: bytes) -> bool:
         """Whether as many bytes came as the response, or an exception, has; they may still be wrong."""
-        if len(received) >= EXCEPTION_BYTES and received[1] == self.function | _REFUSED:
-            return True
-        return len(received) >= self.response_bytes
+        is_exception = len(received) >= EXCEPTION_BYTES and received[1] == self.function | _REFUSED
+        return is_exception or len(received) >= self.response_bytes
 
     def parse_response(self, received: bytes) -> "Response":
         if len(received) < EXCEPTION_BYTES:

@@ -121,7 +121,6 @@ def _channel(gauge: str, given: dict[str, tuple[Any, str]], where: str) -> Chann
 
 
 def _parse(key: str, value: Any, place: str) -> Any:
-    """Value as its field takes it, from TOML or from the text of `--set`: `0x10`, `2,3`."""
     parsed = value
     if isinstance(value, str) and key.endswith("_bits"):
         parsed = [part for part in value.split(",") if part]

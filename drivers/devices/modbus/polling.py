@@ -115,7 +115,6 @@ class PollSchedule:
         return 0 <= late_ns <= self.tolerance_ns
 
     def mark_used(self, measured_ns: int) -> None:
-        """Go on to the cell after the due one and after that of the measurement."""
         self._cell = max(self._cell, measured_ns // self._period_ns) + 1
 
 
