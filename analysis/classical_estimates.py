@@ -34,8 +34,7 @@ class ClassicalEstimates:
     period_s: float | None  # from the turning points of the stick tail
     log_decrement: float | None
     log_decrement_uncertainty: float | None
-    cycles: int
-    """Full cycles of the tail."""
+    cycles: int  # full cycles of the tail
     residual_displacement_m: Floats  # u_s simulated at each of `SCANNED`, the other parameters as fitted
     friction_candidates: tuple[float, ...]
     """Every f_d of the scanned range whose simulated u_s is the measured one; empty where that is unknown."""

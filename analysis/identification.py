@@ -33,8 +33,7 @@ class Events:
     """Times in the base of `Record.time_s`; None where the record does not hold the event."""
 
     release_s: float | None = None
-    slip_end_s: float | None = None
-    """End of the last slip."""
+    slip_end_s: float | None = None  # end of the last slip
     rest_s: float | None = None  # the swing is as small as the noise from here on
     release_uncertainty_s: float | None = None
     """Standard uncertainties from the readings; None where they are not known."""
@@ -78,8 +77,7 @@ class Identification:
     model: ModelSelection | None = None  # None where no law of motion was fitted
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
-    warnings: list[ResultWarning] = field(default_factory=list)
-    """"warnings" in the JSON."""
+    warnings: list[ResultWarning] = field(default_factory=list)  # "warnings" in the JSON
     parameters: dict[str, float] = field(default_factory=dict)
     """Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
     damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used."""

@@ -31,14 +31,12 @@ from analysis.results.joint_fit import (
 from analysis.uncertainty import ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
-_READINGS = 1200
-"""Readings a channel for refining; the chosen law then sees all."""
+_READINGS = 1200  # readings a channel for refining; the chosen law then sees all
 _LOST = 1.3  # mean square of the residual over that of the noise from which on the motion was lost
 _AGAIN = 1.1
 """A search that found no law that fits is not repeated before the record is longer by this factor."""
 _STEPS = 3
-_ANEW_S = 0.5
-"""Interval of full analyses once slip has ended; between them the chosen law is refined."""
+_ANEW_S = 0.5  # interval of full analyses once slip has ended; between them the chosen law is refined
 _SAME_START = 0.1  # tails that begin so close, in periods, are one
 _TAIL_PERIODS = 10.0
 """So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
@@ -54,8 +52,7 @@ class LiveState:
     release_s: float | None = None
     """In the record's time; the slip end as fitted, None while the plate still slips."""
     slip_end_s: float | None = None
-    law: str | None = None
-    """Likeliest law so far."""
+    law: str | None = None  # likeliest law so far
     friction_dynamic: Quantity | None = None
     period_s: Quantity | None = None
     damping_n1_per_s: Quantity | None = None

@@ -28,8 +28,7 @@ class GaugeUncertainty:
     """Known lateness of this channel (s, positive: its samples are older than their time stamp) and its
     standard uncertainty (s)."""
     delay_s_uncertainty: float = 0.0
-    range_m: float | None = None
-    """Readings beyond +-range_m are clipped (m)."""
+    range_m: float | None = None  # readings beyond +-range_m are clipped (m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +55,12 @@ class Record:
     """(n,) float64 or None: gauge 2, plate against table (m); NaN where absent; None without a second
     gauge."""
     masses: StandMasses
-    pullback_m: float | None = None
-    """Nominal pullback of the series (m), where one is known."""
+    pullback_m: float | None = None  # nominal pullback of the series (m), where one is known
     table_overload: NDArray[np.bool_] | None = None
     """(n,) bool or None: true where the device flagged the channel as overloaded: such samples are not
     fitted."""
     relative_overload: NDArray[np.bool_] | None = None
-    clock_scale: float = 1.0
-    """True seconds for one second of `time_s`, and its standard uncertainty."""
+    clock_scale: float = 1.0  # true seconds for one second of `time_s`
     clock_scale_uncertainty: float = 0.0
     table_gauge: GaugeUncertainty = GaugeUncertainty()
     relative_gauge: GaugeUncertainty = GaugeUncertainty()

@@ -32,8 +32,7 @@ class Refit:
     parameters: dict[str, float]  # by the names of `Identification.parameters`
     chi_square: float  # of the readings
     rms_m: float
-    curves: Callable[[Floats], Curves]
-    """Fitted readings at given record times (n,)."""
+    curves: Callable[[Floats], Curves]  # fitted readings at given record times (n,)
     steps: int  # evaluations that it took
 
 

@@ -232,8 +232,7 @@ class FrictionLaw:
     name: str  # as in `analyze --model` and in saved analyses
     description: str  # for help and reports
     solver: MotionSolver
-    extra: tuple[Parameter, ...] = ()
-    """Which of FRICTION_STATIC and TILT it leaves free."""
+    extra: tuple[Parameter, ...] = ()  # which of FRICTION_STATIC and TILT it leaves free
     own: tuple[OwnParameter, ...] = ()
     """Parameters that no other law has; `analysis.laws.catalogue` gives them their places."""
     start_points: StartPoints = _no_start_points

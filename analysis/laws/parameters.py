@@ -35,8 +35,7 @@ class OwnParameter:
 
     name: str  # key in results and in saved parameters, with its unit
     unit: str
-    default: float
-    """Value in the vector of a law that does not use it."""
+    default: float  # value in the vector of a law that does not use it
     lower: float  # lower bound of a fit; `upper` is the other
     upper: float
 

@@ -56,11 +56,9 @@ class OneMassMotion:
     displacement_m: Floats
     velocity_m_per_s: Floats
     acceleration_m_per_s2: Floats
-    turning_s: Floats
-    """(k,) float64: turning points from the given one to the last asked time or the stop."""
+    turning_s: Floats  # (k,) float64: turning points from the given one to the last asked time or the stop
     turning_m: Floats
-    stop_s: float | None
-    """Time of the stop (s); None when the mass still moves at the last asked time."""
+    stop_s: float | None  # time of the stop (s); None when the mass still moves at the last asked time
 
 
 def simulate(decay: OneMassDecay, time_s: Floats) -> OneMassMotion:

@@ -30,8 +30,7 @@ from analysis.motion.events import (
 )
 
 BLOCK = 256
-_ANCHORED = 32
-"""Rotations between two exact evaluations: their rounding errors add up."""
+_ANCHORED = 32  # rotations between two exact evaluations: their rounding errors add up
 _SMALL_ANGLE, _SMALL_DECAY = 0.5, 0.02  # up to these a rotation and a decay have series of a few terms
 _C4, _C6, _C8, _C10, _C12, _C14 = ((-1.0) ** (k // 2) / math.factorial(k) for k in range(4, 16, 2))
 _S3, _S5, _S7, _S9, _S11, _S13, _S15 = ((-1.0) ** (k // 2) / math.factorial(k) for k in range(3, 17, 2))

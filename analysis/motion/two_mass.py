@@ -34,11 +34,9 @@ class MotionSamples:
     relative_displacement_m: NDArray[np.float64]  # u2 - u1 since release
     table_velocity_m_per_s: NDArray[np.float64]
     plate_velocity_m_per_s: NDArray[np.float64]
-    table_acceleration_m_per_s2: NDArray[np.float64]
-    """Where a phase begins, its own first value."""
+    table_acceleration_m_per_s2: NDArray[np.float64]  # where a phase begins, its own first value
     plate_acceleration_m_per_s2: NDArray[np.float64]
-    phase: NDArray[np.int8]
-    """0 where the masses move together, else the sign of u2' - u1'."""
+    phase: NDArray[np.int8]  # 0 where the masses move together, else the sign of u2' - u1'
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int8]]:
         """Arrays by name, in the order in which they are written to files."""
@@ -63,16 +61,14 @@ class Motion(ABC):
     """One simulated test from release to `duration_s`."""
 
     duration_s: float
-    phase_starts_s: NDArray[np.float64]
-    """(m,) float64: first 0.0, the release."""
+    phase_starts_s: NDArray[np.float64]  # (m,) float64: first 0.0, the release
     phase_signs: NDArray[np.int8]  # (m,) int8: 0 where the masses move together, else the sign of u2' - u1'
     slip_end_s: float
     """When the last slip ended: 0.0 when nothing slips, `duration_s` when it still slips then."""
     residual_displacement_m: float  # u2 - u1 at the end
     table_velocity_max_m_per_s: float
     plate_velocity_max_m_per_s: float
-    table_acceleration_max_m_per_s2: float
-    """Largest absolute values."""
+    table_acceleration_max_m_per_s2: float  # all four are largest absolute values
     plate_acceleration_max_m_per_s2: float
 
     def sample(self, times_s: ArrayLike) -> MotionSamples:

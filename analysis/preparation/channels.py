@@ -210,12 +210,10 @@ _WIDE = 4.0
 _JUMP = 0.6  # a motion that starts or stops goes a third of its next step at most in the first
 _NOISELESS_M = 2e-8  # scatter of readings that are computed, not measured
 _FROZEN_RUN = 8
-_FROZEN_MAX = 0.2
-"""A gauge that stands still for longer than this share of the record is at rest."""
+_FROZEN_MAX = 0.2  # a gauge that stands still for longer than this share of the record is at rest
 _CLIPPED_RUN = 4
 _READINGS_MIN = 16
-_GAP = 3.5
-"""Readings this many median intervals apart are no neighbours."""
+_GAP = 3.5  # readings this many median intervals apart are no neighbours
 _EVEN = 35.0 / 18.0  # 1 + sum of squared weights of the cubic at even times
 _KINK_M_PER_S2 = 4.0
 """A jump of acceleration, of 20 m/s2 at most, moves a reading off the cubic by a tenth of it times an
@@ -362,8 +360,7 @@ def _off_cubic(x: Floats, weights: Floats) -> Floats:
 
 NOISE_FLOOR_M = 1e-9  # noise below this is not believed: the readings are computed, not measured
 _POOLED_READINGS_MIN = 30
-_DITHER = 0.4
-"""Noise above this share of the converter's step makes rounding errors independent."""
+_DITHER = 0.4  # noise above this share of the converter's step makes rounding errors independent
 
 
 def detrended_noise(channel: Channel, block_s: float) -> float:
@@ -472,14 +469,12 @@ def _line(channel: Channel, noise_m: float) -> tuple[float, float]:
 
 MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
-_HUM_BLOCK_S = 0.4
-"""Whole cycles of 50, 60 and of all the frequencies beside them."""
+_HUM_BLOCK_S = 0.4  # whole cycles of 50, 60 and of all the frequencies beside them
 _BLOCKS = 25
 _REMAINING_POWER = (1.0 - np.sinc(np.array([*MAINS_HZ, *_BESIDE_HZ]) / MAINS_HZ[0])) ** 2
 """What taking off means over a cycle, twice, leaves of each frequency."""
 _BLOCK_READINGS_MIN = 20
-_HUM_RATIO_MIN = 8.0
-"""Mean power of the mains over that beside them."""
+_HUM_RATIO_MIN = 8.0  # mean power of the mains over that beside them
 _NOTHING_M = 1e-7
 _DISTURBS = 0.002
 """Hum of less than this share of the widest swing does not disturb the search for the release."""

@@ -45,8 +45,7 @@ _SURE = 0.1  # slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0
 _UNEXPLAINED = 0.02
 """Swing of gauge 2 beyond that slope, as a share of the table's: the plate still slips where it is more."""
 _NOISE_SIGMAS = 3.0
-_SWINGS = 0.05
-"""The swing is followed until it falls below this share of its first."""
+_SWINGS = 0.05  # the swing is followed until it falls below this share of its first
 _AGAINST = 0.3  # correlation of gauge 2's first slips with the table's velocity from which on it is reversed
 _LINE_READINGS = 10
 _MEANS = 60
@@ -174,8 +173,7 @@ class _Stretch:
     """Gauge 2 likewise, positive where the plate lies ahead of the table; against the base where
     `gauge_2_absolute`."""
     gauge_2_absolute: bool
-    sign: int
-    """What the readings of gauge 1 were multiplied by."""
+    sign: int  # what the readings of gauge 1 were multiplied by
     relative_sign: int
     release: Release
 
@@ -203,11 +201,9 @@ class FreeDecay(_Stretch):
     period_s: float  # of the stick tail, or of the spectrum where the tail is too short
     tail: DampedCosine | None  # None where the tail is shorter than `TAIL_PERIODS_MIN`
     noise_m: tuple[float, float]
-    noise_reading_counts: tuple[int, int]
-    """Numbers of readings that the noise was measured from."""
+    noise_reading_counts: tuple[int, int]  # numbers of readings that the noise was measured from
     warnings: tuple[ResultWarning, ...]
-    drift_m_per_s: float = 0.0
-    """Steady drift of gauge 2 as turned, already subtracted; zero at the release."""
+    drift_m_per_s: float = 0.0  # steady drift of gauge 2 as turned, already subtracted; zero at the release
     table_drift_m_per_s: float = 0.0  # the same of gauge 1
 
     @property

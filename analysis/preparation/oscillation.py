@@ -23,8 +23,7 @@ _HELD_S = 0.1
 """A table slower than `_SLOW`, relative to its fastest, for longer than this is held: no turn lasts."""
 _PLATEAU_MAX_S = 1.0
 _PLATEAU_MIN_S = 0.05
-_STILL = 0.005
-"""Share of the widest swing that hum may move a table that is held."""
+_STILL = 0.005  # share of the widest swing that hum may move a table that is held
 _CHANCE = 4.0
 """A median distance of n readings exceeds that of many by more than this over sqrt(n) only once in 10,000."""
 _RISE_S = 0.3  # from the hold to the fastest swing takes less
@@ -34,8 +33,7 @@ _GROWTH = 1.25  # a free decay never swings this much wider than before; a secon
 _SMALL_SWING = 0.03  # share of the widest swing
 _STEP_SIGMAS = 5.0
 _READINGS_MIN = 8
-_GAP = 5.0
-"""Readings this many median intervals apart have a gap between them."""
+_GAP = 5.0  # readings this many median intervals apart have a gap between them
 _NEAR_GAP = 0.2  # share of a swing's time
 _TRAVEL_SIGMAS = 20.0  # a travel wider than so many standard deviations of the noise is one
 
@@ -282,8 +280,7 @@ def _away_from_gaps(time_s: Floats, pivots: list[int]) -> NDArray[np.bool_]:
 _LENGTH_MIN_S = 1e-3
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
-_SLOW_S = 0.01
-"""Readings closer together than this are enough for any stand with a period of 0.1 s or more."""
+_SLOW_S = 0.01  # readings closer together than this are enough for any stand with a period of 0.1 s or more
 _READINGS_A_SWING = 10  # fewer hide when the table is let go, and how fast it swings
 _PULLBACK_FACTOR = 3.0
 """Between pullback and that of the series: beyond it is not the operator who pulled otherwise."""
@@ -403,8 +400,7 @@ class DampedCosine:
 
     start_s: float  # stretch of the record that was fitted
     end_s: float
-    parameters: Floats
-    """(5,) float64: n (1/s), damped w (rad/s), a, b, offset (m)."""
+    parameters: Floats  # (5,) float64: n (1/s), damped w (rad/s), a, b, offset (m)
     covariance: Floats  # (5, 5) float64: from the residual, type A
     residual_m: Floats  # (n,) float64: reading minus curve
 
