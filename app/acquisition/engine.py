@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from app.acquisition import messages
+from app.acquisition import messages, run_setup
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
 from app.acquisition.live_client import LiveIdentifier
@@ -20,21 +20,7 @@ from app.acquisition.pullback.plan import ObservedSlip
 from app.acquisition.recording import Latency, Recording, RecordingContext
 from app.acquisition.ring import RingWriter, create_ring, live_folder, ring_capacity
 from app.acquisition.run_file import end_reason
-from app.acquisition.run_setup import (
-    RunSequence,
-    build_metadata,
-    check_run_settings,
-    complete_port_settings,
-    create_run_journal,
-)
-from app.acquisition.stream.live_stream import (
-    DecodedRead,
-    LiveStream,
-    ReadHistory,
-    StreamNotice,
-    concatenate,
-    open_stream,
-)
+from app.acquisition.stream import live_stream
 from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
 from app.runs.errors import RunError
@@ -91,7 +77,7 @@ class Engine:
         port: messages.PortSettings,
         stand: Stand,
         gauges: Gauges,
-        stream: LiveStream,
+        stream: live_stream.LiveStream,
         ring: RingWriter,
         commands: CommandReader[messages.Command],
         events: EventSender[messages.Event],
@@ -107,13 +93,13 @@ class Engine:
         self._events = events
         self._poll_schedule = PollSchedule(low_latency=low_latency)
         self._rate_hz = stream.rate_hz
-        self._history = ReadHistory(round(_HISTORY_S * self._rate_hz))
+        self._history = live_stream.ReadHistory(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
         self._live = LiveIdentifier(
             str(ring.path), lambda first: stream.time_base(first, self._history.next_index, recent=True)
         )
         self._recording: Recording | None = None
-        self._sequence = RunSequence()
+        self._sequence = run_setup.RunSequence()
         self._last_slip: ObservedSlip | None = None
         self._disk = DiskSpaceMonitor(Path(tempfile.gettempdir()))
         self._health_due_s = 0.0
@@ -162,13 +148,13 @@ class Engine:
         return Latency.BATCHED if self._recording is None else self._recording.latency
 
     def _take_reads(self) -> None:
-        reads, wait_s = list[DecodedRead](), _WAIT_S
+        reads, wait_s = list[live_stream.DecodedRead](), _WAIT_S
         try:
             while len(reads) < _READS_PER_STEP and (read := self._stream.next_read(wait_s)) is not None:
                 reads.append(read)
                 wait_s = 0.0
         finally:  # also what came before the end of a stream
-            for rows in concatenate(tuple(rows for read in reads for rows in read.rows)):
+            for rows in live_stream.concatenate(tuple(rows for read in reads for rows in read.rows)):
                 self._ring.append(rows.counts, rows.status)
             for read in reads:
                 self._history.add(read)
@@ -177,7 +163,7 @@ class Engine:
 
     def _follow_stream(self) -> None:
         for event in self._stream.take_events():
-            if not isinstance(event, StreamNotice):
+            if not isinstance(event, live_stream.StreamNotice):
                 self._events.send(event)
             if self._recording is None:
                 self._send_idle(event.message)
@@ -227,13 +213,13 @@ class Engine:
         self._send_idle()
 
     def _arm(self, run: messages.RunSettings) -> None:
-        check_run_settings(run)
+        run_setup.check_run_settings(run)
         folder = Path(run.directory).absolute()
         demand = self._disk_demand()
         note = check_disk_space(folder, run, demand)
-        metadata = build_metadata(run, self._stand, self._gauges, self._stream)
+        metadata = run_setup.build_metadata(run, self._stand, self._gauges, self._stream)
         self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
-        journal = create_run_journal(self._port, run, metadata)
+        journal = run_setup.create_run_journal(self._port, run, metadata)
         self._disk.begin(folder, demand)
         if self._writer.failure is not None:
             self._writer.abandon()
@@ -351,9 +337,9 @@ def serve(
         raise AcquisitionError("an engine is told what to connect to first: send Connect")
     events.send(messages.StateChanged(messages.PullbackState.CONNECTING, 0.0))
     stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
-    port = complete_port_settings(connect.port, gauges.device)
+    port = run_setup.complete_port_settings(connect.port, gauges.device)
     with (
-        open_stream(port, gauges) as stream,
+        live_stream.open_stream(port, gauges) as stream,
         create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz, gauges) as ring,
     ):
         engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
