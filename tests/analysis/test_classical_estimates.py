@@ -1,4 +1,4 @@
-"""The paper's own figures, and the budget checked by drawing."""
+"""The paper's own estimates, and the budget checked by Monte Carlo draws."""
 
 import numpy as np
 import pytest

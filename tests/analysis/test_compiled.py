@@ -1,4 +1,4 @@
-"""What is kept on disk is not used once anything that it was made of has changed."""
+"""Compiled code on disk is not used once any of its sources has changed."""
 
 import os
 import shutil

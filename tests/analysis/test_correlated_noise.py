@@ -1,4 +1,4 @@
-"""Noise that remembers itself: uncertainties grow as they must, and those of white noise do not."""
+"""Correlated noise enlarges the uncertainties; white noise does not."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ RATE_HZ = 500.0
 
 
 def correlated(count, time_s, rng):
-    """Noise of standard deviation 1 that forgets itself over `time_s` (first-order autoregression)."""
+    """Noise of standard deviation 1 with correlation time `time_s` (first-order autoregression)."""
     kept = np.exp(-1.0 / (RATE_HZ * time_s)) if time_s > 0.0 else 0.0
     white = np.sqrt(1.0 - kept**2) * rng.standard_normal(count + 500)
     return lfilter([1.0], [1.0, -kept], white)[500:]

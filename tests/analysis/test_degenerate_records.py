@@ -1,4 +1,4 @@
-"""Records that hold less, or more, than one clean pullback: each gives what it can and says what not."""
+"""Records that hold less, or more, than one clean pullback: what is determined, and what is refused."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figures of a gauge at rest against made readings of known noise, drift and hum, and what is said."""
+"""Health of a gauge at rest, from readings of known noise, drift and hum."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Identification of whole records: what was put in comes out, and what cannot be analysed is refused."""
+"""Identification of whole records: true values are recovered, and invalid records are refused."""
 
 import subprocess
 import sys

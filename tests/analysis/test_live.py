@@ -1,4 +1,4 @@
-"""Live identification: what it says while the motion dies away, and where it ends."""
+"""Live identification: its values during the decay, and its end."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Numbers that no sound analysis gives: a campaign and a gauge's figures are made of what is left."""
+"""Results that are not finite or not plausible: campaigns and gauge figures use the others."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Records that no stand gives but a bad cable may: whatever comes, a result or one clear line."""
+"""Records of faulty devices: each gives a result or one clear line."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Plans held against tests that were made: simulated ones of the same noise, identified in ignorance."""
+"""Plans against simulated tests of the same noise, identified without knowledge of the truth."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Refits from near a minimum: they find it again, hold what is held, and stay in the frame of the record."""
+"""Refits from near a minimum: they find it again, keep fixed parameters, and use the record's time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What waiting promises against what longer records give."""
+"""Predicted gain of a longer record against longer records."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A made-up campaign as the worker would find it: three contacts' worth of runs with known friction."""
+"""A campaign as its worker would return it: runs of three contacts with known friction."""
 
 import datetime
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A recording made of device bytes, with the real journal and the real writer, and no process but that."""
+"""A recording made of device bytes, with the real journal and the real writer, in one process."""
 
 import datetime
 import time

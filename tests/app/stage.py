@@ -1,4 +1,4 @@
-"""Fakes for presenters and views: an engine that plays one made-up pullback, instantly or bit by bit."""
+"""Fakes for presenters and views: an engine that plays one scripted pullback."""
 
 import datetime
 from collections.abc import Callable

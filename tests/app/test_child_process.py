@@ -1,4 +1,4 @@
-"""Child processes: whole messages whatever the cuts; hanging, dead and silent processes on either side."""
+"""Child processes: messages in any cuts; hanging, dead and silent processes on either side."""
 
 import contextlib
 import os

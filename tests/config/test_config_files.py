@@ -1,4 +1,4 @@
-"""Settings files: the shipped ones are right, and a wrong one is explained in one line."""
+"""Settings files: the shipped ones are valid, and an invalid one is explained in one line."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The history of gauge checks: what is added stays, and which of it holds for a calibration."""
+"""The history of gauge checks: entries stay, and the newest valid one counts."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A person's settings and the window's place: kept, explained when wrong, never overwritten unseen."""
+"""Personal settings and window geometry: stored, explained when invalid, never overwritten."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a simulated stand has sent, to hold recorded runs against: counts, sample by sample."""
+"""The counts that a simulated stand has sent, sample by sample, to compare recorded runs with."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Streams of all devices as the drill with garbage knows them, and of two devices as one."""
+"""Streams of all devices for the drill with random bytes, and of two devices as one."""
 
 from collections.abc import Iterator
 

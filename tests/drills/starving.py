@@ -1,4 +1,4 @@
-"""Processes that get no processor for a while: stopped at random moments (SIGSTOP), and let go on."""
+"""Processes that get no processor time for a while: stopped at random moments (SIGSTOP) and continued."""
 
 import contextlib
 import os

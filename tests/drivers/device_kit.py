@@ -1,4 +1,4 @@
-"""A wire and a clock of the test's own for the simulated device."""
+"""A wire and a clock for tests of the simulated device."""
 
 import math
 

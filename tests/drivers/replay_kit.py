@@ -1,4 +1,4 @@
-"""Captured bytes through the decoder that takes them live."""
+"""Captured bytes through the decoder of live bytes."""
 
 from collections.abc import Iterable, Iterator
 

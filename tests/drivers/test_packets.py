@@ -1,4 +1,4 @@
-"""What the host's clock says is lost: not what comes late, on however busy a computer."""
+"""The loss estimate from the host's clock counts lost samples and not late ones, on a busy computer too."""
 
 from drivers.packets import LossEstimator
 

@@ -1,4 +1,4 @@
-"""Listening and asking on a wire that is set to one baud rate, by a clock of the test's own."""
+"""Listening and asking on a wire of one baud rate, by a simulated clock."""
 
 from collections.abc import Callable
 from functools import cache

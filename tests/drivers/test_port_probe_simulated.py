@@ -1,4 +1,4 @@
-"""Ports with a simulated device on them are looked at, in real time."""
+"""Ports with a simulated device are probed in real time."""
 
 import sys
 import threading

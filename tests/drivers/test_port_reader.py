@@ -1,4 +1,4 @@
-"""Reads of a port in which bytes gather: whole, in order, in time, with the last word of a lost device."""
+"""Reads of a port: complete, in order, in time, with the last bytes of a lost device."""
 
 import time
 

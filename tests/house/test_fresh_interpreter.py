@@ -1,4 +1,4 @@
-"""What a fresh interpreter loads: no screen for numbers, no file reader for settings."""
+"""Modules that a fresh interpreter loads: no Qt for numbers, no HDF5 for settings."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The house of DESIGN.md: its contracts hold, and each one notices a planted violation."""
+"""The import contracts hold, and each one notices a planted violation."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""Campaigns summed up: rows and their order, what is left out, and what is said."""
+"""Summaries of campaigns: rows and their order, excluded runs, and warnings."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What f_d depends on: effects that are there are found, others are not claimed, and the power is as said."""
+"""Effects on f_d: existing ones are found, others are not claimed, and the power is as stated."""
 
 from dataclasses import replace
 

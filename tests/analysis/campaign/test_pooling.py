@@ -1,4 +1,4 @@
-"""Pooled repeats: what shrinks, what does not, and whether intervals hold the truth."""
+"""Pooled repeats: which uncertainties shrink, and whether intervals hold the truth."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The variance between runs, against published meta-analyses and what follows by hand."""
+"""The variance between runs, against published meta-analyses and hand calculations."""
 
 import math
 

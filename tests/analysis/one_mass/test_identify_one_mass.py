@@ -1,4 +1,4 @@
-"""One-mass identification: right on simulated decays, as often as it says, and silent on what is no decay."""
+"""One-mass identification: accuracy and coverage on simulated decays, and refusal of what is no decay."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Hum of the mains: found where it is, not found where it is not, and no motion."""
+"""Mains hum is found where it is, and motion is not taken for it."""
 
 import numpy as np
 import pytest

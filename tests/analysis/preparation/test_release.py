@@ -1,4 +1,4 @@
-"""Finding release, hold, disturbance and slip end in readings of known course."""
+"""Finding release, hold, disturbance and slip end in readings of a known motion."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Release, slip end and rest lie within what their uncertainties say, also where f_s is hardly above f_d."""
+"""Release, slip end and rest agree with the truth within u, also where f_s is close to f_d."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from analysis.results.fitted_quantities import find_rest
 
 
 def drawn(seed):
-    """A record's truth, many of them with f_s within some per cent of f_d."""
+    """A random truth; f_s is often within some per cent of f_d."""
     rng = np.random.default_rng(seed)
     friction = rng.uniform(0.06, 0.2)
     return Truth(

@@ -1,4 +1,4 @@
-"""Masses that contradict the motion are said, with those that would explain it."""
+"""Masses that contradict the motion are reported, with masses that would explain it."""
 
 import pytest
 from synthetic import Truth, simulate_record

@@ -1,4 +1,4 @@
-"""What the tests of the engine share: a stand, a connection, and patience."""
+"""Shared by the tests of the engine: a simulated stand, a connection, and waiting."""
 
 import contextlib
 import os

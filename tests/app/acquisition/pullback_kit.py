@@ -1,4 +1,4 @@
-"""What the tests of the pullback share: stands that are released, and hands that do it wrong."""
+"""Shared by the tests of the pullback: simulated motions, also with mistakes of the operator."""
 
 import numpy as np
 

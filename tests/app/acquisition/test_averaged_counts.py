@@ -1,4 +1,4 @@
-"""Counts averaged while nothing moves, over a stream that a test makes up."""
+"""Counts averaged at rest, over a scripted stream."""
 
 import threading
 from collections.abc import Callable

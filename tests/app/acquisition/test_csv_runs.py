@@ -1,4 +1,4 @@
-"""Every form of lines, through the recording into a run file, faster than they come: f_d within 1 %."""
+"""Every form of lines, recorded faster than real time into a run file: f_d within 1 %."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Room on the disk: what a run takes, when it is refused, warned of, and ended in time."""
+"""Disk space: what a run needs, and when it is refused, warned of, and ended."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How the engine, its device and its owner end, and what is kept then."""
+"""Ends of engine, device and parent process, and what is stored then."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Real processes, killed one by one: what the others do, and what is left of the run."""
+"""Killed processes: how the others react, and what is left of the run."""
 
 import os
 import signal

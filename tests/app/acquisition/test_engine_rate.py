@@ -1,4 +1,4 @@
-"""What an engine says and keeps of a device that sends at another rate than it says, by scripted arrivals.
+"""A device that sends at another rate than it reports, by scripted arrivals.
 
 A stand in real time cannot show it on a busy machine: its own clock stands still while it has no core.
 """

@@ -1,4 +1,4 @@
-"""Several pullbacks over one connection, with nobody at the keyboard."""
+"""Several pullbacks over one connection, armed automatically."""
 
 import contextlib
 import sys

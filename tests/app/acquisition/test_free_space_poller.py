@@ -1,4 +1,4 @@
-"""Free bytes asked by a thread of its own, which a disk that hangs holds up alone."""
+"""Free space is read in a thread, so that a hanging disk holds up that thread alone."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""What is told of a run is what file and journal hold, wherever the disk fails; what can be kept is kept."""
+"""Run file and journal hold the samples that the engine reports as stored, wherever the disk fails."""
 
 import errno
 import threading

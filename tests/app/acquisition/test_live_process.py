@@ -1,4 +1,4 @@
-"""The live identification as a process: fed by a ring, told what to follow, gone with who started it."""
+"""The live identification as a process: reads a ring, follows commands, ends with its parent."""
 
 import datetime
 import os

@@ -1,4 +1,4 @@
-"""The live identification beside a run of the real engine: heard, missed by nobody, never left behind."""
+"""The live identification beside a run of the real engine: its values arrive, its failure stops nothing."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""A stream over a loose cable: a device made of the wall clock, driven through the real driver."""
+"""A stream that is interrupted: a device driven by the wall clock, read by the real driver."""
 
 import itertools
 import time

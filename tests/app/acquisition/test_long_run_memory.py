@@ -1,4 +1,4 @@
-"""An engine that is fed hours of samples as quickly as it takes them holds no more at last than at first."""
+"""The engine's memory does not grow while it reads hours of samples."""
 
 import gc
 import sys

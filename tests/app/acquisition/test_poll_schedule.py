@@ -1,4 +1,4 @@
-"""How often the engine takes what was read, and how long bytes may gather before."""
+"""How often the engine takes what was read, and how long bytes gather before."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The pullback state machine on motions from the solver, and on hands that do it wrong."""
+"""The pullback state machine on simulated motions, and on pullbacks with mistakes."""
 
 import math
 

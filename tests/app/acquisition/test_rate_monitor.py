@@ -1,4 +1,4 @@
-"""A wrong rate is said; a busy host is not taken for one."""
+"""A wrong sampling rate is reported; a busy host causes no false report."""
 
 import numpy as np
 import pytest

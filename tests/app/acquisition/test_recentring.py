@@ -1,4 +1,4 @@
-"""Where the plate must stand before the pull, and how the operator is led there."""
+"""Where the plate must stand before the pull, and how the operator is guided there."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""One run from arming to its end, on a simulated motion and with a writer that only remembers."""
+"""One run from arming to its end, with a simulated motion and a fake writer."""
 
 import datetime
 import time

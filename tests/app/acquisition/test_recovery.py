@@ -1,4 +1,4 @@
-"""Runs from journals: the same to the bit as those that were closed, and nothing lost on the way."""
+"""Runs rebuilt from journals are bit-identical to runs that were closed."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""The live ring: what is read was written, and what was overwritten is said."""
+"""The live ring: rows are read as written; overwritten rows are reported."""
 
 import subprocess
 import sys

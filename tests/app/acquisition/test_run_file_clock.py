@@ -1,4 +1,4 @@
-"""The times of day of a run, whatever happens to the clock of the computer."""
+"""Times of day of a run when the clock of the computer is changed."""
 
 import datetime
 from concurrent.futures import Future

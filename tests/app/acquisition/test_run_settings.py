@@ -1,4 +1,4 @@
-"""What a run is to be, checked before anybody pulls."""
+"""The settings of a run are checked before it is armed."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Processes, threads and disks that hang, stand still or die in the middle of a word."""
+"""Processes, threads and disks that hang or end in the middle of a message."""
 
 import datetime
 import os

@@ -1,4 +1,4 @@
-"""Averaging, standing still, calibration and history: the small steps between wire and state machine."""
+"""Averaging, detection of rest, calibration and history between decoder and state machine."""
 
 import itertools
 

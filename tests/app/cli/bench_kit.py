@@ -1,4 +1,4 @@
-"""A device that a test moves, and the operator who types: for what calibrates and checks gauges."""
+"""A device that a test moves, and the operator's input, for calibration and check of gauges."""
 
 import socket
 import threading

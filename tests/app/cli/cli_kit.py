@@ -1,4 +1,4 @@
-"""What the tests of the command line check alike."""
+"""Checks shared by the tests of the command line."""
 
 from typing import Any
 

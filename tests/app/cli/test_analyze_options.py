@@ -1,4 +1,4 @@
-"""What `slipstand analyze` can be asked beside the plain identification, and what it refuses."""
+"""Options of `slipstand analyze`, and what it refuses."""
 
 from pathlib import Path
 from typing import Any

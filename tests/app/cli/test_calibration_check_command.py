@@ -1,4 +1,4 @@
-"""`slipstand calibrate check` against a device that the test moves, and what later runs make of it."""
+"""`slipstand calibrate check` against a device that the test moves; runs carry its result."""
 
 import datetime
 from collections.abc import Iterator

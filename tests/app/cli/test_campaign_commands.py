@@ -1,4 +1,4 @@
-"""`analyze` over many runs and `demo --campaign`: what is kept is not done again; found beside true."""
+"""`analyze` over many runs and `demo --campaign`: kept results are reused; results agree with the truth."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Circumstances given to `import`, and shown by `runs`."""
+"""Conditions given to `import`, and shown by `runs`."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The whole way: wire, engine, run file, identification, found beside true."""
+"""`slipstand demo`: wire, engine, run file and identification, compared with the truth."""
 
 import json
 import os

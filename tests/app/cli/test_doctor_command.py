@@ -1,4 +1,4 @@
-"""`slipstand doctor`: what is well is said to be, what is not has a remedy."""
+"""`slipstand doctor`: every finding that is not ok has a remedy."""
 
 import datetime
 import json

@@ -1,4 +1,4 @@
-"""`slipstand import`: a foreign record gives what the run itself gives, and a wrong one is told in a line."""
+"""`slipstand import`: a foreign record gives the run's own results; an invalid one, one clear line."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`slipstand plan`: what a test will show, told before it is made."""
+"""`slipstand plan`: prediction of a test."""
 
 import pytest
 

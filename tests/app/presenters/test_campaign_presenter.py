@@ -1,4 +1,4 @@
-"""The Campaign screen as values: table, figure, sentences, leaving out, and where one comes to."""
+"""The Campaign presenter: table, figure, findings, exclusions and navigation."""
 
 from dataclasses import replace
 from typing import Any

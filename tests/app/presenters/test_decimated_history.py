@@ -1,4 +1,4 @@
-"""The live history draws exactly what the rows hold, whatever the span, the pixels and the cuts."""
+"""The decimated live history draws the extremes of its rows, for any span, pixels and cuts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The export dialog as values: what is offered, where it goes, what is said of it."""
+"""The export presenter: formats, destination and messages."""
 
 from pathlib import Path
 

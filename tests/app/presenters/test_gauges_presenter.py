@@ -1,4 +1,4 @@
-"""The Gauges screen as values: calibrations in use, health of live samples, ports, a calibration made."""
+"""The Gauges presenter: calibrations in use, health of live samples, ports, and a new calibration."""
 
 import datetime
 from dataclasses import replace

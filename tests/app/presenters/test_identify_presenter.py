@@ -1,4 +1,4 @@
-"""Identify as values: curves, laws side by side, cursors, the hand, and runs that lack something."""
+"""The Identify presenter: curves, laws side by side, cursors, manual fit, and incomplete runs."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""The import dialog as values: columns offered, one look at a time, file after file, faults in its words."""
+"""The import presenter: columns, previews, several files and faults."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Record as values: what it says, allows and shows, from connecting to the result."""
+"""The Record presenter: what it shows and allows, from connecting to the result."""
 
 import numpy as np
 import pytest

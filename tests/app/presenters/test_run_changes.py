@@ -1,4 +1,4 @@
-"""Changes of runs as values: what was typed, what is said, and the way back; the lines of a library."""
+"""Changes of runs: input, messages and undo; rows of the library."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What becomes of runs on Record as values: kept, repeated, discarded, brought back; plan and form kept."""
+"""Decisions on runs on Record: keep, repeat, discard, restore; stored plan and form."""
 
 from dataclasses import replace
 

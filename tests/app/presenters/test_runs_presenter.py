@@ -1,4 +1,4 @@
-"""The Runs screen as values: what is listed, in which order, and what becomes of work on runs."""
+"""The Runs presenter: listing, sorting, and results of work on runs."""
 
 import datetime
 from pathlib import Path

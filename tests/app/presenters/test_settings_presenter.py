@@ -1,4 +1,4 @@
-"""Settings as values: each change holds and is kept at once, can be taken back, and is refused in words."""
+"""The Settings presenter: changes are stored at once, can be undone, or are refused with a reason."""
 
 from pathlib import Path
 

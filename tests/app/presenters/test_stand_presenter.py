@@ -1,4 +1,4 @@
-"""The Simulated stand screen as values: options, faults on demand, truth."""
+"""The Simulated stand presenter: options, faults on demand, truth."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The window as values: the whole way from the start page to the result, with fakes at the edges."""
+"""The window presenter from the start page to the result, with fake engine and workers."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Words as the window sets them."""
+"""Texts as the window sets them."""
 
 import pytest
 from looking import plain

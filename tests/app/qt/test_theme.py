@@ -1,4 +1,4 @@
-"""Colours can be told apart, the typeface is there, and the theme follows the system."""
+"""Colours are distinguishable, the typeface is present, and the theme follows the system."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""The whole way on the simulated stand: start page, a pullback over a real port, result, kept, exported."""
+"""A whole test with the simulated stand: start page, pullback over a real port, result, kept, exported."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""How the window was left comes back, as far as it still fits."""
+"""Place and size of the window are restored, as far as they fit the screen."""
 
 import pytest
 from PySide6.QtCore import QRect, Qt

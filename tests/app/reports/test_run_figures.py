@@ -1,4 +1,4 @@
-"""Figs. 3a to 5b: what is drawn is what was recorded and what the exact motion says, the same each time."""
+"""Figs. 3a to 5b draw the recorded samples and the exact motion, the same bytes each time."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""The report to sign: everything in it, taken literally, the same bytes each time."""
+"""The report: complete, user text taken literally, the same bytes each time."""
 
 import datetime
 import hashlib

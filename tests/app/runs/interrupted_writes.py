@@ -1,4 +1,4 @@
-"""What a run file is at each moment of its writing: each write of HDF5 is kept, and done again."""
+"""Run files at each moment of their writing: the writes of HDF5 are captured and replayed."""
 
 from collections.abc import Iterator
 from pathlib import Path

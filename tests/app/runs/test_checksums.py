@@ -1,4 +1,4 @@
-"""Numbers that are not what was stored are refused, in whatever column a bit has flipped."""
+"""Samples that differ from their checksum are refused, in whatever column a bit has flipped."""
 
 import h5py
 import numpy as np

@@ -1,4 +1,4 @@
-"""Circumstances of a test: what they may be, and how text becomes them."""
+"""Conditions of a test: limits, and their text form."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Run files brought into a library: never over one that is there, and only what is a run."""
+"""Run files copied into a library: nothing is overwritten, and only runs are taken."""
 
 import pytest
 from runs_kit import small_run

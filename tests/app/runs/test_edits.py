@@ -1,4 +1,4 @@
-"""Edits can be undone, one after another; nothing is ever taken away."""
+"""Edits can be undone, one after another; nothing is removed."""
 
 import pytest
 from runs_kit import small_run

@@ -1,4 +1,4 @@
-"""The calibration that a run carries: bends, validity, and which of it an analysis takes."""
+"""The calibration that a run carries: polynomials, validity, and which part an analysis uses."""
 
 import datetime
 from pathlib import Path

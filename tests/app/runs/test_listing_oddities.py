@@ -1,4 +1,4 @@
-"""What may lie in a library folder, or in its cache, beside good runs: none of it stops the listing."""
+"""Odd files in a library folder or in its cache do not stop the listing."""
 
 import datetime
 import json

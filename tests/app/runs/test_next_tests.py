@@ -1,4 +1,4 @@
-"""What is planned in a folder of runs is kept there, and what is done is counted from the runs."""
+"""The plan of a folder is stored in it; finished tests are counted from the runs."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Where runs go: by the environment, else by the person's settings."""
+"""The recordings folder: from the environment, else from the personal settings."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What it does to the friction coefficient when gauge 2 is read later, and that a run carries it."""
+"""How a later reading of gauge 2 changes the friction coefficient; a run carries the skew."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Names that are to last through a power cut, on file systems that cannot promise it."""
+"""Folder entries are synced, on file systems that support it."""
 
 import errno
 import os

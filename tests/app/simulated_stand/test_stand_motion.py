@@ -1,4 +1,4 @@
-"""What the simulated stand does and shows, against the solver, the calibration and its own promises."""
+"""Motion and signals of the simulated stand against solver, calibration and options."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The simulated stand as a process: what it sends is what it says, and it never outlives its owner."""
+"""The simulated stand as a process: its truth file agrees with its bytes, and it ends with its parent."""
 
 import os
 import select

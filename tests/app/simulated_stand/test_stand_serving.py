@@ -1,4 +1,4 @@
-"""Where the simulated stand listens, and what its command line takes."""
+"""Ports of the simulated stand, and its command line."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Each fault of the simulated device against the decoder that must live with it, and its own account."""
+"""Each fault of the simulated device: the decoder handles it, and the truth file accounts for it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What happens to a device when: the words for it, and the times at which it holds."""
+"""Scheduled faults of a device: their options and times."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The pseudo-terminal: raw, never blocking, and aware of who reads it."""
+"""The pseudo-terminal: raw, non-blocking, and aware of its reader."""
 
 import contextlib
 import os

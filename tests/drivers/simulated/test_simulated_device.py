@@ -1,4 +1,4 @@
-"""The simulated device against the decoder of its protocol, on a wire and a clock of the test's own."""
+"""The simulated device against the decoder of its protocol, on a simulated wire and clock."""
 
 import math
 

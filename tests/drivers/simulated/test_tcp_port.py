@@ -1,4 +1,4 @@
-"""The simulated device's TCP port: one reader at a time, who may go and come back."""
+"""The simulated device's TCP port: one reader at a time, who may reconnect."""
 
 import socket
 import time

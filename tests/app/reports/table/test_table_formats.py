@@ -1,4 +1,4 @@
-"""The table in all its formats: the same numbers, read back by others; hostile texts stay texts."""
+"""The table in all formats: the same numbers, read by other programs; hostile texts stay texts."""
 
 import csv
 import io

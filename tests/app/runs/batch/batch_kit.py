@@ -1,4 +1,4 @@
-"""Work that processes and clusters can be given."""
+"""Functions for worker processes and clusters."""
 
 import os
 import signal

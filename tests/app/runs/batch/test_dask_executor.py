@@ -1,4 +1,4 @@
-"""A Dask cluster of two workers on loopback: the same answers, also where one worker is killed."""
+"""A Dask cluster of two workers on loopback: the same results, also where one worker is killed."""
 
 import importlib
 import os

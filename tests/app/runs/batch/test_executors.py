@@ -1,4 +1,4 @@
-"""Many pieces of work by a crew: order, bounds, what fails, what dies, what is interrupted."""
+"""Many tasks in worker processes: order, bounds, failures, dead workers, interruption."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Runs gathered for a campaign: kept results, stale ones, faults, and what must be known of them together."""
+"""Runs collected for a campaign: kept results, stale ones, faults, and what the runs share."""
 
 import shutil
 from pathlib import Path

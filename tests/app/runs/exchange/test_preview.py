@@ -1,4 +1,4 @@
-"""A look into foreign files: how their lines are read, and which column is likely what."""
+"""Previews of foreign files: how lines are read, and which column is likely which."""
 
 from pathlib import Path
 

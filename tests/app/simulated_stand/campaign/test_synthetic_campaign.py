@@ -1,4 +1,4 @@
-"""A synthetic campaign: what is drawn, what is true, and that it is written as it is stated."""
+"""A synthetic campaign: its random values, its truth and its files."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The simulated GSV, asked as a reader asks it."""
+"""The simulated GSV answers requests as a GSV does."""
 
 import struct
 

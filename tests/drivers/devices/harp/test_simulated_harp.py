@@ -1,4 +1,4 @@
-"""The simulated Harp LoadCells, asked as a reader asks it."""
+"""The simulated Harp LoadCells answers requests as the board does."""
 
 import numpy as np
 import pytest

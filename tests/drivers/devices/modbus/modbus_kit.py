@@ -1,4 +1,4 @@
-"""A transmitter for tests: answers at once by the simulated registers, or wrongly as told."""
+"""A transmitter for tests: answers from the simulated registers, or with an error on demand."""
 
 from collections.abc import Callable, Iterable
 

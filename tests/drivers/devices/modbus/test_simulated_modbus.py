@@ -1,4 +1,4 @@
-"""The simulated transmitter, asked as a master asks it, on a clock of the test's own."""
+"""The simulated transmitter answers a master's requests, on a simulated clock."""
 
 import numpy as np
 import pytest

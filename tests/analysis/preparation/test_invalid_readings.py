@@ -1,4 +1,4 @@
-"""Readings without noise, and readings beside gaps, are as good as others; stuck and spiked ones are not."""
+"""Stuck and spiked readings are invalid. Readings without noise and readings beside gaps are valid."""
 
 import numpy as np
 import pytest
