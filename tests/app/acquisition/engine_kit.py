@@ -92,12 +92,12 @@ def gone(process_id: int, patience_s: float = 20.0) -> bool:
     """Wait until a process has ended; one that waits to be collected has."""
     end = time.monotonic() + patience_s
     while time.monotonic() < end:
+        stat = Path(f"/proc/{process_id}/stat")
         try:
             os.kill(process_id, 0)
-        except ProcessLookupError:
-            return True
-        stat = Path(f"/proc/{process_id}/stat")
-        if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
+            if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except (ProcessLookupError, FileNotFoundError):  # it may end between two calls
             return True
         time.sleep(0.02)
     return False
