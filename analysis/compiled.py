@@ -1,7 +1,7 @@
 """The two ways in which this package compiles: both without the interpreter lock, and kept on disk.
 
 A compiled function holds copies of the functions that it calls, but numba keeps it on disk until its own
-file changes. Here it is compiled anew when any file of the package changes that holds compiled functions.
+file changes. Here it is compiled again when any file of the package that holds compiled functions changes.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Compile a function that makes arrays, at its first call; later starts load it from the cache.
 
-    Each new combination of argument types is compiled anew, so hand over writable C-contiguous
+    Each new combination of argument types is compiled separately, so pass writable C-contiguous
     float64 arrays (numba takes a read-only array for another type). Division by zero gives inf or nan,
     as in numpy. Copy slices in loops: numba's slice assignment takes seconds to compile.
     """
@@ -54,7 +54,7 @@ def compile_with(
     templates : iterable of (decorator, function)
         Uncompiled functions with one of the decorators of this module, each before its callers.
     name : str
-        Tells the copies apart on disk: an identifier.
+        Identifier that distinguishes the copies on disk.
     **replaced
         Compiled functions by the global name under which the templates call them.
 

@@ -1,4 +1,4 @@
-"""What an identification says: numbers with uncertainties, the chosen law and its verdict, and warnings."""
+"""Result of an identification: numbers with uncertainties, the chosen law and its verdict, and warnings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -51,7 +51,7 @@ class Curves:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MonteCarlo:
-    """What drawing gives beside the budget."""
+    """Result of the propagation of distributions, to compare with the budget."""
 
     draws: int  # through the linearised fit
     refits: int  # full fits

@@ -1,4 +1,4 @@
-"""The whole way from a record to friction with its uncertainty and verdict."""
+"""Identification of friction from a record, with its uncertainty and verdict."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -39,7 +39,7 @@ _STEPS = 3
 _ANEW_S = 0.5  # interval of full analyses once slip has ended; between them the chosen law is refined
 _SAME_START = 0.1  # tails that begin so close, in periods, are one
 _TAIL_PERIODS = 10.0
-"""So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
+"""A tail this long gives period and damping. Until then the joint fit determines them far better."""
 _FRICTION_WEIGHTS = np.eye(PARAMETER_COUNT)[Parameter.FRICTION_DYNAMIC]
 FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
@@ -109,7 +109,7 @@ class LiveIdentification:
         return replace(known, state=state, anew_s=last.anew_s)
 
     def _analyse_again(self, record: Record, now_s: float) -> "_LiveFit | LiveState":
-        """Look at the whole record again, as if it were complete."""
+        """Analyse the whole record again, as if it were complete."""
         decay = prepare(record)
         release_s = decay.channels.to_record_time(decay.release.time_s)
         since_s = float(decay.table.time_s[-1]) - decay.release.time_s
@@ -170,7 +170,7 @@ class _LiveFit:
 def _known(
     now_s: float, record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, before: DampedCosine | None
 ) -> _LiveFit:
-    """What the fitted law says; `before` is the tail as last fitted."""
+    """Results of the fitted law; `before` is the tail as last fitted."""
     fitted = joint_fit_uncertainty(record, decay, problem, fit, [fit])
     stuck_s = _stuck_since(fit, decay)
     decay = _with_tail(decay, stuck_s, before)
@@ -203,7 +203,7 @@ def _narrowing(known: _LiveFit, problem: FitProblem) -> tuple[str, ...]:
 
 
 def extend_decay(decay: FreeDecay, record: Record) -> FreeDecay | None:
-    """`decay` with what the record holds beyond it, turned alike.
+    """`decay` extended by the later readings of the record, with the same signs.
 
     None where its motion had ended before, or the clock is now known to go otherwise.
     """
@@ -307,7 +307,7 @@ def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:
 RELATIVE_REDUCTION_MIN = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
 LATEST_END_S = 20.0  # after the release no record goes on for longer
-_LATER_READINGS = 400  # so many later readings a channel stand for all of them, with the noise of their mean
+_LATER_READINGS = 400  # later readings a channel that stand for all of them, with the noise of their mean
 
 
 def is_worth_waiting(deviation: float, removed_variance: float) -> bool:

@@ -33,7 +33,7 @@ from messages.message import joined, message
 CLOCK_UNCERTAINTY = 5e-5  # relative, of a device's rate after ten seconds beside a quiet host (decision 6)
 _NOTHING_STATED = GaugeUncertainty()
 _RELEASE_PHASE = 0.3  # of the release between two samples: a real one hardly ever coincides with one
-_SETTLED_S = 60.0  # simulated at least so long, so that the motion has ended whatever is recorded
+_SETTLED_S = 60.0  # shortest simulated duration: the motion has ended by then
 _NOISE_MIN_M = 1e-7  # with less, rounding errors decide the normal equations
 _FRICTION_MIN = 1e-4  # the search does not look for less
 _PER_PERIOD = 400  # points a period: extremes of a sine are then exact to 3e-5 of the amplitude

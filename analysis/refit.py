@@ -1,7 +1,7 @@
 """Fit a law to a record again from parameters that are near: no search, and no choice among laws.
 
-For a slider that holds one parameter while the others follow, and for everything else that knows about
-where the minimum is::
+For a slider that holds one parameter while the others follow, and for any other caller that knows
+roughly where the minimum is::
 
     again = Refitter(record)
     found = again.refit(identification.parameters, model=identification.model.name, hold="friction_dynamic")

@@ -40,7 +40,7 @@ class Truth:
     step_m: float = 0.0  # of the converter; 0: none
     offsets_m: tuple[float, float] = (3e-4, 6e-3)
     gain_errors: tuple[float, float] = (0.0, 0.0)
-    """What the record does not know of: relative gain errors, lateness of gauge 2 (s), and by how much true
+    """Errors not stated in the record: relative gain errors, lateness of gauge 2 (s), and by how much true
     time runs faster than the record's."""
     lag_s: float = 0.0
     clock_error: float = 0.0
@@ -77,7 +77,7 @@ def simulate_readings(
 def simulate_record(truth: Truth, displacements: Displacements | None = None, **known: Any) -> Record:
     """The record of `truth` as an analysis gets it; `known` replaces fields of `Record`.
 
-    It knows the nominal table mass and the true plate mass unless `known` says otherwise.
+    It states the nominal table mass and the true plate mass unless `known` replaces them.
     """
     masses = StandMasses(TABLE_MASS_KG, truth.plate_mass_kg)
     record = Record(*simulate_readings(truth, displacements), masses, pullback_m=truth.pullback_m)

@@ -182,7 +182,7 @@ def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
 def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], place: int) -> float:
     """Chance of a value so far from the others of its series, by the scatter of all series."""
     mates = (repeats.series == repeats.series[place]) & ~suspects
-    if not mates.any():  # two runs that differ: each is held against the other
+    if not mates.any():  # two runs that differ: each is compared with the other
         mates = (repeats.series == repeats.series[place]) & (np.arange(len(suspects)) != place)
     kept = ~suspects | mates
     rest = repeats.select(kept)

@@ -1,1 +1,1 @@
-"""How a law of motion is fitted: laws, start values, chi-square with its derivatives, and the way down."""
+"""Fit of a law of motion: initial guess, chi-square with its derivatives, and search for the minimum."""

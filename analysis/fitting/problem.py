@@ -67,7 +67,7 @@ def minimise(
     free: NDArray[np.int64],
     steps_max: int = 30,
 ) -> Minimum:
-    """Go downhill from `start` in the `free` parameters.
+    """Minimise chi-square from `start` over the `free` parameters.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60),
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
 _FINE = np.linspace(0.975, 1.025, 51)  # f_s over its last value
 _HOPS = 4  # most jumps of chi-square that are crossed one after the other; each costs two refinements
-_FIRST_WINDOW_PERIODS = 0.6  # so early f_s plays no part
+_FIRST_WINDOW_PERIODS = 0.6  # before this time f_s has no effect
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
 """Each about twice as long as the one before: few new minima at a time."""
 _KEPT = 4  # minima that are followed from one window to the next
@@ -66,7 +66,7 @@ class Fit:
         return float(self.parameters[parameter])
 
     def determines(self, parameter: Parameter) -> bool:
-        """Whether the record tells this parameter apart from the others."""
+        """Whether the record distinguishes this parameter from the others."""
         _, loose = covariance(self.normal_matrix)
         return bool((~loose[self.free == parameter]).all()) and parameter in self.free
 
@@ -118,7 +118,7 @@ class Search:
     def fit(self, law: FrictionLaw, starts: list[Floats], rival: Floats | None = None) -> Fit:
         """Fit `model` from the best of several starts.
 
-        Far above the chi-square of a `rival` law's parameters nothing can be won: a rough fit will do.
+        Far above the chi-square of a `rival` law's parameters the fit is only rough.
         """
         if not law.has_tilt:
             starts = [*starts, *(_without_tilt(start) for start in starts if start[Parameter.TILT] != 0.0)]
@@ -227,7 +227,7 @@ def _without_tilt(point: Floats) -> Floats:
 
 
 def _cross_jumps(problem: FitProblem, model: FrictionLaw, best: Minimum) -> Minimum:
-    """Step off the cliffs of chi-square, along f_s with the others following, to lower minima nearby.
+    """Step across the jumps of chi-square, along f_s with the others following, to lower minima nearby.
 
     Where a stick begins or ends to exist, chi-square jumps, and a search that meets the jump stops there.
     """
@@ -363,14 +363,14 @@ _UNKNOWN = (
     *(place for part in IDEAL_STAND for place in part.free),
 )
 _TAIL_TRUST = 5.0
-"""First estimates' uncertainties are widened so much when they guide the first steps."""
+"""Factor that widens the uncertainties of first estimates when they guide the first steps."""
 _FRICTION_GUESS = 0.1
 _SHARES = (0.08, 0.15, 0.25, 0.4, 0.6, 0.8, 0.93)
 """f_d over the largest that lets the plate slip at all."""
 
 
 def build_problem(record: Record, decay: FreeDecay) -> FitProblem:
-    """Readings and noise of `decay` with what `record` knows of masses and gauges."""
+    """Readings and noise of `decay` with what `record` states of masses and gauges."""
     return build_problem_from_channels(
         record, (decay.table, decay.relative), decay.noise_m, decay.period_s, absolute=decay.gauge_2_absolute
     )
@@ -384,7 +384,7 @@ def build_problem_from_channels(
     *,
     absolute: bool,
 ) -> FitProblem:
-    """Readings of both gauges, turned so that the pullback is positive, with what `record` knows beside."""
+    """Readings of both gauges, turned so that the pullback is positive, with what `record` states."""
     table, relative = channels
     mean = default_point()
     deviation = np.zeros(len(mean))
@@ -508,7 +508,7 @@ def _with_estimates_as_priors(
     return problem
 
 
-EARLIEST_PERIODS = 6.0  # a record that begins later after its release tells too little of it
+EARLIEST_PERIODS = 6.0  # a record that begins later after its release does not determine the release
 _WINDOW_PERIODS = 1.5
 _READINGS = 60
 _STEPS_PER_PERIOD = 48

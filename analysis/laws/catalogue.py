@@ -1,4 +1,4 @@
-"""The friction laws that an identification knows. A new law is a file of its own and one line here."""
+"""The friction laws that an identification can use. A new law is a file of its own and one line here."""
 
 from collections.abc import Container
 from dataclasses import replace

@@ -28,7 +28,7 @@ SLIP_PHASE_MIN_RAD = 1e-10
 
 PHASE_LIMIT = 1e5
 
-# Motions that are fitted are followed at least so long (s): a fit may try a release after the last reading.
+# Shortest duration of a fitted motion (s): a fit may try a release after the last reading.
 DURATION_MIN_S = 1e-3
 
 

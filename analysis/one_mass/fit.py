@@ -19,7 +19,7 @@ COULOMB = 4  # place of x_k among the parameters
 _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
 _GROWTH = 20.0  # largest natural logarithm by which a trial swing may grow over the record
-_FAR = 1e12  # residual, in units of the swing, of trial parameters that are none
+_FAR = 1e12  # residual, in units of the swing, of impossible trial parameters
 
 
 class Parameters(NamedTuple):

@@ -1,1 +1,1 @@
-"""What a record's readings hold before any law of motion is fitted to them."""
+"""Analysis of a record's readings before any law of motion is fitted to them."""

@@ -407,8 +407,8 @@ def noise_with_floor(noise_m: float, step_m: float) -> float:
 def merge_repeated_readings(channel: Channel, noise_m: float, step_m: float) -> Channel:
     """Readings of a converter coarser than the noise with each run of equal ones as a single reading.
 
-    A repeated reading repeats its rounding error, so it says nothing new; counted each time, a plate at
-    rest would outvote its motion.
+    A repeated reading repeats its rounding error, so it adds no information. Counted each time, a
+    plate at rest would outweigh its motion.
     """
     if noise_m > _DITHER * step_m or step_m < NOISE_FLOOR_M:
         return channel

@@ -57,7 +57,7 @@ class Mounting:
 
     measures_plate: bool  # against the base, instead of against the table
     sign: int  # what makes its readings positive where the plate lies ahead
-    warnings: tuple[ResultWarning, ...] = ()  # where that is not as the record says
+    warnings: tuple[ResultWarning, ...] = ()  # where that differs from what the record states
 
 
 def relative_to_table(table: Channel, relative: Channel, measures_plate: bool) -> Channel:
@@ -418,7 +418,7 @@ def _drift(
 
 
 def _slip_by_table_alone(stretch: _Stretch, period_s: float) -> _Slip:
-    """Without gauge 2 the last half of the motion is taken as tail until the joint fit knows better.
+    """Without gauge 2 the last half of the motion is taken as tail until the joint fit determines it.
 
     Unless the whole motion is that of one mass: then nothing slipped that the table could show.
     """

@@ -106,7 +106,7 @@ def find_last_slip(relative: Channel, release_s: float, period_s: float, noise_m
 
     Means of quarter periods are compared with their neighbours, against the noise and a steady drift.
     A slip smaller than about five standard deviations of such a mean is not seen: the fitted motion
-    tells later whether there was one.
+    shows later whether there was one.
     """
     moving = relative.between(release_s, np.inf)
     edges = np.arange(relative.time_s[-1], release_s, -period_s / 4.0)[::-1]

@@ -1,1 +1,1 @@
-"""What is candidates of a fit: quantities with uncertainties, events, the verdict, warnings, curves."""
+"""What is derived from a fit: quantities with uncertainties, events, the verdict, warnings, curves."""

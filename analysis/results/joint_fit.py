@@ -34,7 +34,7 @@ _NEGLIGIBLE = 0.25  # of the noise's variance: smaller residuals may have any co
 
 
 def identifiable_fits(fits: list[Fit]) -> list[Fit]:
-    """Fits of those laws whose tilt, if they have one, the record tells from f_d.
+    """Fits of those laws whose tilt, if they have one, the record distinguishes from f_d.
 
     Raises RecordError if there is none.
     """
@@ -344,7 +344,7 @@ def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
 
 
 def _shift_by_bend(record: Record, decay: FreeDecay, tail: DampedCosine) -> Floats:
-    """Shift (2,) of n1 and w by one standard uncertainty of a bent gauge: large swings read other than small.
+    """Shift (2,) of n1 and w by one standard uncertainty of the non-linearity of a gauge.
 
     As for one mass, the deviation from the calibration line is odd and vanishes at both ends of the range in
     use (T3 of Chebyshev).

@@ -1,8 +1,8 @@
 """Uncertainty by the propagation of distributions (JCGM 101), to check the budget by it.
 
 Linearised: every source is drawn from its own distribution and carried through the fit's sensitivities.
-Full: whole records are made anew, with other noise, gains, masses, lag, time base and gravity, and
-fitted again in ignorance of them.
+Full: whole records are generated with other noise, gains, masses, lag, time base and gravity, and
+fitted again without knowledge of them.
 """
 
 import os

@@ -81,7 +81,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     noise_m: float = 20e-6  # standard deviation of both gauges' white noise
     table_drift_m_per_s: float = 0.0
     relative_drift_m_per_s: float = 0.0
-    """Drifts begin anew with each pullback test."""
+    """Drifts begin again with each pullback test."""
     nonlinearity_m: float = 0.0  # largest deviation of both gauges from their calibration line
     table_clip_m: float | None = None
     relative_clip_m: float | None = None

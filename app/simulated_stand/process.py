@@ -30,7 +30,7 @@ def serve(
     on_truth: Callable[[Truth], None] | None = None,
     next_disturbance: Callable[[], Disturbance | None] = lambda: None,
 ) -> None:
-    """Be a simulated stand in this process until `has_ended()`.
+    """Run a simulated stand in this process until `has_ended()`.
 
     Raises ConfigError, DriverError, AnalysisError if it cannot be set up as asked; `on_ready` was not called
     then. `on_ready` receives what a reader must know, `on_truth` the truth at the start, at each change and

@@ -256,7 +256,7 @@ def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
 
 
 class RecordedTest(msgspec.Struct, frozen=True):
-    """What became of a test: its run, or why there is none."""
+    """Result of a test: its run, or why there is none."""
 
     path: str
     error: Message = Message("")

@@ -47,7 +47,7 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     wire: TransmissionLog
     """The running stream, or the last one."""
     earlier: list[TransmissionLog] = []
-    """Those of this session before that one, which were torn by a cable or a reader that went."""
+    """Those of this session before that one, which ended when a cable or a reader was disconnected."""
     disturbances: list[Disturbance] = []
     """What is planned for this session or was asked for in it, each with its time."""
 
