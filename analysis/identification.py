@@ -71,7 +71,7 @@ class Identification:
     """Result of `identify`; the same values as `analyze --json`."""
 
     kind: str  # "two-mass" or "one-mass"
-    results: dict[str, Quantity]  # by the names of INTERFACE ("results"); what cannot be determined is absent
+    results: dict[str, Quantity]  # by quantity (`analysis.catalogue`); what cannot be determined is absent
     labels: dict[str, str | bool] = field(default_factory=dict)
     """Results that are not numbers: msk64_degree, coulomb_significant."""
     model: ModelSelection | None = None  # None where no law of motion was fitted

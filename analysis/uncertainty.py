@@ -36,7 +36,7 @@ class ParameterUncertainty:
     """Linearised distribution of the parameters about a fit."""
 
     shifts: dict[Source, Floats]  # (p,) by source: shift by one standard uncertainty of it
-    noise_covariance: Floats  # (16, 16) float64: covariance from the noise of the readings
+    noise_covariance: Floats  # (p, p) float64: covariance from the noise of the readings
 
     def standard_uncertainty(self, weights: Floats) -> float:
         return float(np.sqrt(sum(share**2 for share in self.contributions(weights).values())))
@@ -80,10 +80,10 @@ def white_noise_variance(problem: FitProblem, fit: Fit, place: int) -> float:
 def propagate_with_model_choice(
     problem: FitProblem, chosen: Fit, candidates: list[Fit], block_s: float
 ) -> ParameterUncertainty:
-    """Distribution about the chosen law with the chance that another one of `told` is the true one.
+    """Distribution about the chosen law with the probability that another of `candidates` is the true one.
 
     Each law counts with its share exp(-BIC/2); its own noise and its distance from the chosen law enter
-    (law of total variance). Where one law is far more likely than the others this is `spread`.
+    (law of total variance). Where one law is far more likely than the others this is `propagate`.
     """
     own = propagate(problem, chosen, block_s)
     shares = np.array([np.exp(-0.5 * min(fit.bic - chosen.bic, 1400.0)) for fit in candidates])

@@ -8,7 +8,7 @@ from drivers.arrays import Counts, Floats, UInt8s
 
 
 class SampleStatus(IntFlag):
-    """Flags of one sample, as stored in the run file (INTERFACE: `status`)."""
+    """Flags of one sample, as stored in the run file (`status`)."""
 
     GOOD = 0
     MISSING = 1  # never arrived; the row replaces it

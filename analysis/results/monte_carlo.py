@@ -48,13 +48,13 @@ class MonteCarloModel:
         return np.concatenate((self.joint.chosen.parameters, self.constants.point[:2]))
 
     def linear(self, rng: np.random.Generator, draws: int) -> Floats:
-        """Drawn values (draws, 18), those of T and n1 independent of the others."""
+        """Drawn values (draws, p + 2), those of T and n1 independent of the others."""
         parameters = _drawn(self.joint.chosen.parameters, self.joint.uncertainty, rng, draws)
         constants = _drawn(self.constants.point, self.constants.uncertainty, rng, draws)
         return np.hstack((parameters, constants[:, :2]))
 
     def refitted(self, seed: int) -> Floats:
-        """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
+        """Values (p + 2,) as far on the other side of what was found as a refit of a new record errs."""
         rng = np.random.default_rng(seed)
         made, truth = self._made(rng)
         chosen, tail = self.joint.chosen, self.joint.decay.tail

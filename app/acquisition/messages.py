@@ -218,7 +218,7 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     damping_n1: Quantity | None = None
     law: str = ""
     slip_end_s: float | None = None
-    narrowing: tuple[str, ...] = ()  # what waiting longer would still narrow, by the names of INTERFACE
+    narrowing: tuple[str, ...] = ()  # quantities that waiting longer would still narrow
     may_stop: bool = False  # waiting longer does not narrow f_d
     is_enough: bool = False  # nor T, nor n1: a run without a set duration ends now
     message: Message = EMPTY  # why there are no more of these, where something went wrong

@@ -75,7 +75,7 @@ def _report(done: list[RunEnded], count: int, as_json: bool) -> None:
 
 
 def run_document(ended: RunEnded) -> dict[str, Any]:
-    """JSON object of one recorded run (INTERFACE, `record --json`)."""
+    """JSON object of one recorded run (`record --json`)."""
     time_base = ended.time_base
     document: dict[str, Any] = msgspec.to_builtins(ended) | {"message": str(ended.message)}
     del document["type"], document["remaining"], document["time_base"]
