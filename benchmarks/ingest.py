@@ -38,10 +38,11 @@ OURS = """
 import json, queue, resource, sys, time
 from drivers.port import open_port
 from drivers.stream import PortReader
-from drivers.devices.slipstand_binary.codec import FrameDecoder, compile_decoder
+from drivers.devices.slipstand_binary.codec import FrameDecoder
+from drivers.devices.slipstand_binary.source import make_source
 
 port_name, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-compile_decoder()
+make_source({}, rate).prepare()
 print("ready", flush=True)
 reads = queue.SimpleQueue()
 decoder, skipped, samples = FrameDecoder(rate), None, 0

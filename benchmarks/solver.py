@@ -32,7 +32,7 @@ START = """
 import time
 import numpy as np
 from analysis.laws import stribeck
-from analysis.motion import events, gradients, paper_method
+from analysis.motion import events, paper_method, sampling
 from analysis.motion.two_mass import TwoMassParameters
 
 parameters = TwoMassParameters(
@@ -42,7 +42,7 @@ parameters = TwoMassParameters(
 vector, times, stamps = parameters.vector(), np.linspace(0.0, 1.0, 9), [time.process_time()]
 parameters.simulate(1.0).sample(times)
 stamps.append(time.process_time())
-gradients.sample_with_gradient(vector, events.integrate_events(vector, 1.0), times, np.eye(10))
+sampling.sample_with_gradient(vector, events.integrate_events(vector, 1.0), times, np.eye(10))
 stamps.append(time.process_time())
 stribeck.simulate(parameters, stribeck_velocity_m_per_s=0.01, duration_s=1.0).sample(times)
 stamps.append(time.process_time())
