@@ -16,6 +16,7 @@ from drivers.port import open_port
 from drivers.samples import Losses
 
 DROPPED = FrameFlags.DROPPED_BEFORE
+_SYNC = b"\xaa\x55\x01"
 
 
 class Head(NamedTuple):
@@ -26,13 +27,13 @@ class Head(NamedTuple):
 
 
 def heads(wire: bytes) -> list[Head]:
-    """Frames that follow each other without a byte between; the last one may be cut off."""
-    return list(_heads(wire))
+    """Frames that follow each other without a byte between; the first and the last may be cut off."""
+    return list(_heads(wire[wire.index(_SYNC) :]))
 
 
 def _heads(wire: bytes) -> Iterator[Head]:
     while len(wire) >= 13:
-        assert wire[:3] == b"\xaa\x55\x01"
+        assert wire[:3] == _SYNC
         head = Head(*struct.unpack_from("<BIIB", wire, 3))
         yield head
         wire = wire[13 + 8 * head.samples + 2 :]
