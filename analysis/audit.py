@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.motion.two_mass import MotionError, TwoMassMotion, TwoMassParameters
+from analysis.motion.two_mass import Motion, MotionError, TwoMassParameters
 from analysis.record import AnalysisError
 from messages.message import message
 
@@ -80,7 +80,7 @@ class _Case:
     def mass_kg(self) -> float:
         return self.table_mass_kg + self.row.plate_mass_kg
 
-    def motion(self, friction: float) -> TwoMassMotion:
+    def motion(self, friction: float) -> Motion:
         """Simulated until its last slip is over; f_s = f_d = `friction`, no tilt."""
         parameters = TwoMassParameters.from_free_decay(
             period_s=self.row.period_s,

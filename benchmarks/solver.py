@@ -13,12 +13,12 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from motion_gradient import sample_with_gradient
 from reference_solvers import integrate_with_events, march_like_the_paper
 
-from analysis.laws import stribeck
+from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.motion import paper_method
 from analysis.motion.events import integrate_events
-from analysis.motion.sampling import sample_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from config.files import load_stand, published_table
 
@@ -31,9 +31,10 @@ STRIBECK_VELOCITY_M_PER_S = 0.005
 START = """
 import time
 import numpy as np
-from analysis.laws import stribeck
-from analysis.motion import events, paper_method, sampling
+from analysis.laws.stribeck import STRIBECK_TILT
+from analysis.motion import events, paper_method
 from analysis.motion.two_mass import TwoMassParameters
+from benchmarks.motion_gradient import sample_with_gradient
 
 parameters = TwoMassParameters(
     table_mass_kg=131.6, plate_mass_kg=22.4, stiffness_n_per_m=6e4, damping_coefficient_kg_per_s=37.0,
@@ -42,9 +43,9 @@ parameters = TwoMassParameters(
 vector, times, stamps = parameters.vector(), np.linspace(0.0, 1.0, 9), [time.process_time()]
 parameters.simulate(1.0).sample(times)
 stamps.append(time.process_time())
-sampling.sample_with_gradient(vector, events.integrate_events(vector, 1.0), times, np.eye(10))
+sample_with_gradient(vector, events.integrate_events(vector, 1.0), times, np.eye(10))
 stamps.append(time.process_time())
-stribeck.simulate(parameters, stribeck_velocity_m_per_s=0.01, duration_s=1.0).sample(times)
+STRIBECK_TILT.solver.simulate(parameters, [0.01], 1.0).sample(times)
 stamps.append(time.process_time())
 paper_method.simulate(parameters, duration_s=1.0).sample(times)
 stamps.append(time.process_time())
@@ -87,8 +88,8 @@ def report_methods(p: TwoMassParameters) -> None:
         "DOP853 with events, steps of 2 ms at most": lambda: integrate_with_events(
             p, DURATION_S, max_step=2e-3, dense=False
         ),
-        "Stribeck friction": lambda: stribeck.simulate(
-            softened, stribeck_velocity_m_per_s=STRIBECK_VELOCITY_M_PER_S, duration_s=DURATION_S
+        "Stribeck friction": lambda: STRIBECK_TILT.solver.simulate(
+            softened, [STRIBECK_VELOCITY_M_PER_S], DURATION_S
         ),
         "DOP853 with events, Stribeck friction": lambda: integrate_with_events(
             softened, DURATION_S, stribeck_velocity_m_per_s=STRIBECK_VELOCITY_M_PER_S, dense=False
@@ -118,7 +119,7 @@ def report_samples(p: TwoMassParameters) -> None:
         "u1, rel and 8 derivatives at 10,000 uneven times": lambda: slopes(UNEVEN),
         "u1, rel and 8 derivatives at 400 even times": lambda: slopes(FEW),
         "Stribeck: u1, rel and 8 differences at 400 even times": lambda: (
-            stribeck.STRIBECK_TILT.solver.kernels.sample_with_gradient(eleven, FEW, np.eye(11)[:8].copy())
+            STRIBECK_TILT.solver.kernels.sample_with_gradient(eleven, FEW, np.eye(11)[:8].copy())
         ),
     }
     print("| 1FFM0, 10 s, simulated and sampled | ms |")

@@ -1,9 +1,10 @@
 """The model of the stand: a friction law with its motion, and suspension, release and gauges beside it."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,38 +21,44 @@ from analysis.laws.parameters import (
     OwnParameter,
     Parameter,
 )
-from analysis.motion import events
 from analysis.motion.events import DURATION_MIN_S, integrate_events
-from analysis.motion.integration import Friction, final_relative, integrated_kernels, simulate_integrated
-from analysis.motion.sampling import phase_responses, sample_displacements
-from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.motion.integration import Friction, IntegratedKernels, integrated_kernels
+from analysis.motion.sampling import phase_responses
+from analysis.motion.two_mass import EXACT, Motion, MotionKernels, TwoMassParameters, simulate_kernels
 
 Gauge = tuple[Floats, Floats, int, float]
 """Times, readings (m), which gauge (see `closed_form`) and standard deviation of the noise (m)."""
 
 
-class MotionSolver(Protocol):
+class MotionSolver(ABC):
     """Motion of the stand with one friction law; a `vector` holds what `FrictionLaw.vector` returns."""
 
-    @property
-    def is_closed_form(self) -> bool:
-        """Whether it is fast enough for scans, and for following chi-square to the ends of an interval."""
+    is_closed_form: ClassVar[bool]
+    """Whether it is fast enough for scans, and for following chi-square to the ends of an interval."""
+    kernels: MotionKernels
 
     def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:
         """Motion from release to `duration_s`; `own` are the values of the law's own parameters."""
+        return simulate_kernels(self.kernels, np.append(parameters.vector(), own), duration_s)
 
     def phases(self, vector: Floats, duration_s: float) -> Floats:
         """Phases (m, 5) from release: start, sign of slip (0 stick), and u1, u1', u2 - u1 there."""
+        return self.kernels.integrate(vector, duration_s)[0][:, :5]
 
     def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
         """u1 and u2 - u1 (2, n) at rising `time_s`, the last of them `duration_s` after release."""
+        return self.kernels.sample(vector, *self.kernels.integrate(vector, duration_s), time_s, 2)
 
     def final_relative(self, vector: Floats, duration_s: float) -> float:
         """u2 - u1 at the end (m)."""
+        return self.kernels.final_relative(vector, self.kernels.integrate(vector, duration_s), duration_s)
 
     def peak_rates(self, vector: Floats, duration_s: float) -> Floats:
         """Largest |u1'|, |u2'|, |u1''|, |u2''|, (4,)."""
+        state = self.kernels.integrate(vector, duration_s)
+        return np.array(self.kernels.peak_rates(vector, *state, duration_s))
 
+    @abstractmethod
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
     ) -> list[Floats]:
@@ -71,25 +78,11 @@ class MotionSolver(Protocol):
         """
 
 
-class ClosedFormSolver:
+class ClosedFormSolver(MotionSolver):
     """Coulomb friction in each phase: every phase is a damped oscillation with constant load."""
 
     is_closed_form = True
-
-    def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:  # noqa: ARG002
-        return parameters.simulate(duration_s)
-
-    def phases(self, vector: Floats, duration_s: float) -> Floats:
-        return integrate_events(vector, duration_s)
-
-    def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
-        return sample_displacements(vector, integrate_events(vector, duration_s), time_s)
-
-    def final_relative(self, vector: Floats, duration_s: float) -> float:
-        return float(events.final_relative(vector, integrate_events(vector, duration_s), duration_s))
-
-    def peak_rates(self, vector: Floats, duration_s: float) -> Floats:
-        return np.array(events.peak_rates(vector, integrate_events(vector, duration_s), duration_s))
+    kernels = EXACT
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
@@ -100,7 +93,7 @@ class ClosedFormSolver:
         return [gauge_normal_equations(point, free, phases, rows, *gauge) for gauge in gauges]
 
 
-class IntegratedSolver:
+class IntegratedSolver(MotionSolver):
     """Friction that depends on the sliding velocity: slips are integrated, derivatives are differences.
 
     Parameters
@@ -112,25 +105,10 @@ class IntegratedSolver:
     """
 
     is_closed_form = False
+    kernels: IntegratedKernels
 
     def __init__(self, friction: Friction, name: str) -> None:
         self.kernels = integrated_kernels(friction, name)
-
-    def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:
-        return simulate_integrated(self.kernels, np.append(parameters.vector(), own), duration_s)
-
-    def phases(self, vector: Floats, duration_s: float) -> Floats:
-        return self.kernels.integrate(vector, duration_s)[0][:, :5]
-
-    def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
-        return self.kernels.sample(vector, *self.kernels.integrate(vector, duration_s), time_s, 2)
-
-    def final_relative(self, vector: Floats, duration_s: float) -> float:
-        return float(final_relative(*self.kernels.integrate(vector, duration_s)))
-
-    def peak_rates(self, vector: Floats, duration_s: float) -> Floats:
-        phases, nodes = self.kernels.integrate(vector, duration_s)
-        return np.array(self.kernels.peak_rates(vector, phases, nodes, duration_s))
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]

@@ -3,16 +3,11 @@
 import math
 from itertools import product
 
-import numpy as np
-
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled_part
 from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Parameter
 from analysis.motion.events import FRICTION_DYNAMIC, FRICTION_STATIC
-from analysis.motion.integration import IntegratedMotion, simulate_integrated
-from analysis.motion.two_mass import MotionError, TwoMassParameters
-from messages.i18n import N_
 
 VELOCITY = OwnParameter("stribeck_velocity_m_per_s", "m/s", default=0.01, lower=1e-4, upper=1.0)
 _VELOCITY = MOTION_PARAMETER_COUNT
@@ -42,26 +37,11 @@ def start_points(point: Floats, own: Indices) -> list[Floats]:
     return found
 
 
-_SOLVER = IntegratedSolver(friction, "stribeck")
 STRIBECK_TILT = FrictionLaw(
     "stribeck+tilt",
     "friction falls from f_s to f_d with the sliding velocity, on a tilted plane",
-    _SOLVER,
+    IntegratedSolver(friction, "stribeck"),
     (Parameter.FRICTION_STATIC, Parameter.TILT),
     (VELOCITY,),
     start_points,
 )
-
-
-def simulate(
-    parameters: TwoMassParameters, *, stribeck_velocity_m_per_s: float, duration_s: float = 10.0
-) -> IntegratedMotion:
-    """Motion from release to `duration_s` (s); f_s is the friction at standstill, f_d that at high speed.
-
-    Raises MotionError if a velocity or the duration is not positive and finite.
-    """
-    if not 0.0 < stribeck_velocity_m_per_s < math.inf:
-        template = N_("stribeck_velocity_m_per_s is {velocity:g}: give a positive velocity")
-        raise MotionError(template, velocity=stribeck_velocity_m_per_s)
-    vector = np.append(parameters.vector(), stribeck_velocity_m_per_s)
-    return simulate_integrated(_SOLVER.kernels, vector, duration_s)

@@ -268,11 +268,12 @@ def advance(
 
 
 @compiled
-def _doubled(phases: Floats) -> Floats:
-    larger = np.empty((2 * len(phases), 5))
-    for k in range(len(phases)):
-        for column in range(5):
-            larger[k, column] = phases[k, column]
+def doubled(rows: Floats) -> Floats:
+    """Return the rows with as many empty ones after them."""
+    larger = np.empty((2 * len(rows), rows.shape[1]))
+    for k in range(len(rows)):
+        for column in range(rows.shape[1]):
+            larger[k, column] = rows[k, column]
     return larger
 
 
@@ -310,7 +311,7 @@ def integrate_events(parameters: Floats, duration_s: float) -> Floats:
     most = phase_limit(parameters, duration_s)
     while time < duration_s and not count >= most:
         if count == len(phases):
-            phases = _doubled(phases)
+            phases = doubled(phases)
         row = phases[count]
         row[START], row[SIGN] = time, sign
         row[TABLE], row[VELOCITY], row[RELATIVE] = table, velocity, relative
@@ -353,16 +354,6 @@ def peak_rates_in_stick(
     second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
     speed = _largest(damping, frequency, cosine, sine, span)
     return speed, _largest(damping, frequency, second_cosine, second_sine, span)
-
-
-@compiled_part
-def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> float:
-    """Displacement of the plate against the table at `duration_s`."""
-    last = phases[len(phases) - 1]
-    tau = duration_s - last[START]
-    _, _, slipped = advance(parameters, last[SIGN], last[TABLE], last[VELOCITY], tau)
-    relative: float = last[RELATIVE] + slipped
-    return relative
 
 
 @compiled_part

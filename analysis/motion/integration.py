@@ -11,8 +11,7 @@ friction of one law.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from analysis.motion.events import (
     VELOCITY,
     advance,
     after_slip,
+    doubled,
     first_sign,
     first_zero,
     oscillation_amplitudes,
@@ -53,29 +53,22 @@ from analysis.motion.sampling import (
     phase_blocks,
     rotation_tables,
 )
-from analysis.motion.two_mass import Motion, MotionError
+from analysis.motion.two_mass import MotionKernels
 
 Friction = Callable[[float, Floats], float]
-"""Compiled: coefficient of friction at a sliding speed (m/s) with the parameters of `IntegratedKernels`."""
-Peaks = tuple[float, float, float, float]
+"""Compiled: coefficient of friction at a sliding speed (m/s) with the parameters of `MotionKernels`."""
 
 
-class IntegratedKernels(NamedTuple):
-    """Compiled functions of one friction law; all run without the interpreter lock.
+@dataclass(frozen=True)
+class IntegratedKernels(MotionKernels):
+    """Kernels of a law whose slips are integrated: the friction above which a stick ends is FRICTION_STATIC.
 
-    `parameters` are the ten of `analysis.motion.events`, then those of the law's own. FRICTION_STATIC is the
-    coefficient above which a stick ends.
+    `state` is phases (m, 6) and nodes (k, 7). The sixth column of a phase is its first row in the nodes. A
+    node is a step of a slip: NODE_TAU (s since the phase began), u1, u1', u2' - u1', u2 - u1, u1'' and
+    u2'' - u1''.
+    The largest rates of a slip are those at five times in each step.
     """
 
-    integrate: Callable[[Floats, float], tuple[Floats, Floats]]
-    """(parameters, duration_s) -> phases (m, 6), nodes (k, 7). Phases as `integrate_events` gives them, and
-    the first row of the phase in `nodes`. A node is a step of a slip: NODE_TAU (s since the phase began), u1,
-    u1', u2' - u1', u2 - u1, u1'', u2'' - u1''."""
-    sample: Callable[[Floats, Floats, Floats, Floats, int], Floats]
-    """(parameters, phases, nodes, times, channels) -> (channels, n), as `sampling.sample`; times rise."""
-    peak_rates: Callable[[Floats, Floats, Floats, float], Peaks]
-    """(parameters, phases, nodes, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|; of a slip those at
-    five times in each step."""
     sample_with_gradient: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
     """(parameters, times, directions (q, p)) -> u1 and u2 - u1 (2, n), and their central differences along
     the directions (q, 2, n), good to about 1e-4 of their largest."""
@@ -84,45 +77,7 @@ class IntegratedKernels(NamedTuple):
 def integrated_kernels(friction: Friction, name: str) -> IntegratedKernels:
     """Kernels for a compiled `friction`; `name` is an identifier that no other law has."""
     kernels = compile_with(_TEMPLATES, name, friction_coefficient=friction)
-    return IntegratedKernels(*(kernels[field_name] for field_name in IntegratedKernels._fields))
-
-
-@dataclass(frozen=True, eq=False)
-class IntegratedMotion(Motion):
-    """A motion with slips integrated numerically."""
-
-    _kernels: IntegratedKernels = field(repr=False)
-    _vector: Floats = field(repr=False)
-    _phases: Floats = field(repr=False)
-    _nodes: Floats = field(repr=False)
-
-    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
-        return self._kernels.sample(self._vector, self._phases, self._nodes, times_s, count)
-
-
-def simulate_integrated(kernels: IntegratedKernels, vector: Floats, duration_s: float) -> IntegratedMotion:
-    """Motion from release to `duration_s` (s).
-
-    Raises MotionError if the duration is not positive and finite.
-    """
-    if not 0.0 < duration_s < math.inf:
-        raise MotionError(
-            "duration_s is {duration_s:g}: give a positive number of seconds", duration_s=duration_s
-        )
-    phases, nodes = kernels.integrate(vector, duration_s)
-    starts, signs = phases[:, START].copy(), phases[:, SIGN].astype(np.int8)
-    return IntegratedMotion(
-        duration_s,
-        starts,
-        signs,
-        float(starts[-1]) if signs[-1] == 0 else duration_s,
-        final_relative(phases, nodes),
-        *kernels.peak_rates(vector, phases, nodes, duration_s),
-        _kernels=kernels,
-        _vector=vector,
-        _phases=phases,
-        _nodes=nodes,
-    )
+    return IntegratedKernels(*(kernels[field.name] for field in fields(IntegratedKernels)))
 
 
 def friction_coefficient(speed: float, parameters: Floats) -> float:
@@ -222,11 +177,7 @@ def _may_have_stopped(sign: float, state: Floats, slopes: Floats, trial: Floats,
 def _append_node(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) -> Floats:
     """Write a node into row `count`; the array is doubled when full."""
     if count == len(nodes):
-        larger = np.empty((2 * len(nodes), 7))
-        for k in range(len(nodes)):
-            for column in range(7):
-                larger[k, column] = nodes[k, column]
-        nodes = larger
+        nodes = doubled(nodes)
     row = nodes[count]
     row[NODE_TAU], row[NODE_TABLE], row[NODE_VELOCITY], row[NODE_SLIP] = tau, state[0], state[1], state[2]
     row[NODE_RELATIVE], row[NODE_ACCELERATION], row[NODE_SLIP_RATE] = state[3], slope[1], slope[2]
@@ -296,7 +247,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     most_nodes = min(_NODES_A_PHASE * most, _MOST_NODES)
     while time < duration_s and not count >= most:
         if count == len(phases):
-            phases = _more_phases(phases)
+            phases = doubled(phases)
         row = phases[count]
         row[START], row[SIGN], row[FIRST_NODE] = time, sign, node
         row[TABLE], row[VELOCITY], row[RELATIVE] = table, velocity, relative
@@ -315,15 +266,6 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
         time = time + tau if sign == 0.0 or stopped else duration_s
         sign = following
     return phases[:count], nodes[:node]
-
-
-@compiled
-def _more_phases(phases: Floats) -> Floats:
-    larger = np.empty((2 * len(phases), 6))
-    for k in range(len(phases)):
-        for column in range(6):
-            larger[k, column] = phases[k, column]
-    return larger
 
 
 @compiled_part
@@ -428,14 +370,6 @@ def _raise(largest: Floats, table: float, plate: float, table_rate: float, plate
     largest[1] = max(largest[1], abs(plate))
     largest[2] = max(largest[2], abs(table_rate))
     largest[3] = max(largest[3], abs(plate_rate))
-
-
-@compiled_part
-def final_relative(phases: Floats, nodes: Floats) -> float:
-    """Displacement of the plate against the table at the end of the motion."""
-    last = phases[len(phases) - 1]
-    relative: float = last[RELATIVE] if last[SIGN] == 0.0 else nodes[len(nodes) - 1, NODE_RELATIVE]
-    return relative
 
 
 @compiled_part

@@ -30,7 +30,6 @@ _MOST_STEPS = 10_000_000
 class SteppedMotion(Motion):
     """A motion stepped in time; between steps it follows the formulas that the step took."""
 
-    parameters: TwoMassParameters
     step_s: float
     _vector: Floats = field(repr=False)
     _states: Floats = field(repr=False)
@@ -72,11 +71,10 @@ def simulate(
         float(starts[-1]) if phases[-1] == 0 else duration_s,
         float(end[1, 0]),
         *largest,
-        parameters=parameters,
-        step_s=step_s,
-        _vector=vector,
-        _states=states,
-        _signs=signs,
+        step_s,
+        vector,
+        states,
+        signs,
     )
 
 

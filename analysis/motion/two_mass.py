@@ -8,6 +8,7 @@ rounding can resolve.
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
-from analysis.motion.events import SIGN, START, final_relative, integrate_events, peak_rates
+from analysis.motion.events import RELEASE, SIGN, START, integrate_events, peak_rates
 from analysis.motion.sampling import out_of_order, sample
 from analysis.record import AnalysisError
 from messages.i18n import N_
@@ -134,6 +135,67 @@ def rising_times(
     return times, back
 
 
+@dataclass(frozen=True)
+class MotionKernels:
+    """Compiled functions of the motion with one friction law; all run without the interpreter lock.
+
+    `parameters` are the ten of `analysis.motion.events`, then those of the law's own.
+    """
+
+    integrate: Callable[[Floats, float], tuple[Floats, ...]]
+    """(parameters, duration_s) -> state: phases (m, 5 at least) as `integrate_events` gives them, and what
+    else tells the motion within them."""
+    sample: Callable[..., Floats]
+    """(parameters, *state, times, channels) -> (channels, n) as `sampling.sample` gives them; times rise."""
+    peak_rates: Callable[..., tuple[float, float, float, float]]
+    """(parameters, *state, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|."""
+
+    def final_relative(self, parameters: Floats, state: tuple[Floats, ...], duration_s: float) -> float:
+        """u2 - u1 at `duration_s` after release (m)."""
+        end_s = np.array([parameters[RELEASE] + duration_s])
+        return float(self.sample(parameters, *state, end_s, 2)[1, 0])
+
+
+def _integrate_exactly(parameters: Floats, duration_s: float) -> tuple[Floats]:
+    return (integrate_events(parameters, duration_s),)
+
+
+EXACT = MotionKernels(_integrate_exactly, sample, peak_rates)
+"""Coulomb friction in closed form: sampled at any time without interpolation."""
+
+
+@dataclass(frozen=True, eq=False)
+class KernelMotion(Motion):
+    """A motion sampled by the kernels that integrated it."""
+
+    _kernels: MotionKernels = field(repr=False)
+    _vector: Floats = field(repr=False)
+    _state: tuple[Floats, ...] = field(repr=False)
+
+    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
+        return self._kernels.sample(self._vector, *self._state, times_s, count)
+
+
+def simulate_kernels(kernels: MotionKernels, vector: Floats, duration_s: float) -> KernelMotion:
+    """Motion from release to `duration_s` (s); raises MotionError if that is not positive and finite."""
+    if not 0.0 < duration_s < math.inf:
+        template = N_("duration_s is {duration_s:g}: give a positive number of seconds")
+        raise MotionError(template, duration_s=duration_s)
+    state = kernels.integrate(vector, duration_s)
+    starts, signs = state[0][:, START].copy(), state[0][:, SIGN].astype(np.int8)
+    return KernelMotion(
+        duration_s,
+        starts,
+        signs,
+        duration_s if signs[-1] else float(starts[-1]),  # the last stick follows the last slip
+        kernels.final_relative(vector, state, duration_s),
+        *kernels.peak_rates(vector, *state, duration_s),
+        kernels,
+        vector,
+        state,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class TwoMassParameters:
     """The stand, the contact and the pullback of one test.
@@ -191,44 +253,12 @@ class TwoMassParameters:
         masses = (self.table_mass_kg, self.plate_mass_kg, self.gravity_m_per_s2)
         return np.array((*friction, *springs, self.pullback_m, self.tilt_rad, release_s, *masses))
 
-    def simulate(self, duration_s: float = 10.0) -> "TwoMassMotion":
-        """Motion from release to `duration_s`.
-
-        Raises MotionError if the duration is not positive and finite.
-        """
-        if not 0.0 < duration_s < math.inf:
-            raise MotionError(
-                "duration_s is {duration_s:g}: give a positive number of seconds", duration_s=duration_s
-            )
-        parameters = self.vector()
-        phases = integrate_events(parameters, duration_s)
-        starts, signs = phases[:, START].copy(), phases[:, SIGN].astype(np.int8)
-        return TwoMassMotion(
-            duration_s,
-            starts,
-            signs,
-            _slip_end(starts, signs, duration_s),
-            final_relative(parameters, phases, duration_s),
-            *peak_rates(parameters, phases, duration_s),
-            parameters=self,
-            _vector=parameters,
-            _phases=phases,
-        )
+    def simulate(self, duration_s: float = 10.0) -> Motion:
+        """Motion from release to `duration_s`; raises MotionError if that is not positive and finite."""
+        return simulate_kernels(EXACT, self.vector(), duration_s)
 
 
-@dataclass(frozen=True, eq=False)
-class TwoMassMotion(Motion):
-    """A motion in closed form: sampled at any time without interpolation."""
-
-    parameters: TwoMassParameters
-    _vector: Floats = field(repr=False)
-    _phases: Floats = field(repr=False)
-
-    def _sample_rising(self, times_s: Floats, count: int) -> Floats:
-        return sample(self._vector, self._phases, times_s, count)
-
-
-def simulate(*, duration_s: float = 10.0, **parameters: Any) -> TwoMassMotion:
+def simulate(*, duration_s: float = 10.0, **parameters: Any) -> Motion:
     """Motion after a pullback, from release to `duration_s`; the other arguments are `TwoMassParameters`."""
     return TwoMassParameters(**parameters).simulate(duration_s)
 
@@ -245,12 +275,6 @@ def stiffness_and_damping(
     mass = table_mass_kg + plate_mass_kg
     frequency = 2.0 * math.pi / period_s
     return (frequency**2 + damping_n1_per_s**2) * mass, 2.0 * damping_n1_per_s * mass
-
-
-def _slip_end(starts: Floats, signs: NDArray[np.int8], duration_s: float) -> float:
-    if signs[-1] != 0:
-        return duration_s
-    return float(starts[-1])  # a walk never has two sticks in a row, so the last stick follows the last slip
 
 
 def _check(parameters: TwoMassParameters) -> None:

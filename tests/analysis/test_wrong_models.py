@@ -7,7 +7,7 @@ import pytest
 from synthetic import Truth, simulate_readings, simulate_record
 
 from analysis.identify import identify
-from analysis.laws import stribeck
+from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.record import Record, StandMasses
 
 MASSES = StandMasses(131.6, 22.4)
@@ -20,9 +20,7 @@ def within(found, sigmas=3.0, truth=0.1):
 
 def stribeck_record(velocity_m_per_s, friction_static, noise_m=2e-5):
     truth = Truth(friction_static=friction_static)
-    motion = stribeck.simulate(
-        truth.parameters(), stribeck_velocity_m_per_s=velocity_m_per_s, duration_s=10.0
-    )
+    motion = STRIBECK_TILT.solver.simulate(truth.parameters(), [velocity_m_per_s], 10.0)
     rng = np.random.default_rng(4)
     time = np.arange(11000) / 1000.0
     table, relative = motion.sample_displacements(time - 1.0003)

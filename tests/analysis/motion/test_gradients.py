@@ -14,8 +14,9 @@ from analysis.motion.events import (
     TILT,
     integrate_events,
 )
-from analysis.motion.sampling import sample, sample_with_gradient
+from analysis.motion.sampling import sample
 from analysis.motion.two_mass import TwoMassParameters
+from benchmarks.motion_gradient import sample_with_gradient
 
 STAND = TwoMassParameters(
     table_mass_kg=131.6,

@@ -20,15 +20,15 @@ from analysis.motion.events import (
     STIFFNESS,
     integrate_events,
 )
-from analysis.motion.sampling import sample_with_gradient
 from analysis.motion.two_mass import (
+    Motion,
     MotionError,
     MotionSamples,
-    TwoMassMotion,
     TwoMassParameters,
     simulate,
     stiffness_and_damping,
 )
+from benchmarks.motion_gradient import sample_with_gradient
 from benchmarks.reference_solvers import integrate_with_events
 
 # Made independently of this project and handed over with the task; times and displacements to 1e-12.
@@ -38,7 +38,7 @@ PARAMETERS = tuple(TwoMassParameters.__dataclass_fields__)
 FIRST = TwoMassParameters(**{name: GOLDEN[0][name] for name in PARAMETERS})
 
 
-def golden_motion(case: dict[str, Any]) -> TwoMassMotion:
+def golden_motion(case: dict[str, Any]) -> Motion:
     return simulate(**{name: case[name] for name in (*PARAMETERS, "duration_s")})
 
 
@@ -330,7 +330,7 @@ def test_kernels_end_on_parameters_that_no_stand_can_have():
             KERNELS.sample(vector, *KERNELS.integrate(vector, 3.0), times, 6)
 
 
-def test_walks_over_far_too_long_a_time_are_bounded():
+def test_motions_over_far_too_long_a_time_are_bounded():
     """Stiffness and duration as a search may try them when the times of a record are wrong by thousands."""
     vector = np.append(changed().vector(), 0.005)
     vector[[FRICTION_DYNAMIC, FRICTION_STATIC, STIFFNESS, DAMPING]] = 1e-4, 1e-4, 1e12, 0.0

@@ -8,7 +8,7 @@ from reports_kit import truth_of
 
 from analysis.identification import Events, Identification, ModelSelection
 from analysis.identify import identify
-from analysis.laws.stribeck import simulate as simulate_stribeck
+from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.quantities import Quantity
 from analysis.synthetic import simulate_record
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
@@ -140,9 +140,7 @@ def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
     )
     run = RunFigureData.from_identification(made, found)
 
-    exact = simulate_stribeck(
-        truth_of(friction_static=0.12).parameters(), stribeck_velocity_m_per_s=0.005, duration_s=6.0
-    )
+    exact = STRIBECK_TILT.solver.simulate(truth_of(friction_static=0.12).parameters(), [0.005], 6.0)
     _, relative = exact.sample_displacements(run.motion.time_s)
     assert run.motion.relative_displacement_m == pytest.approx(relative, abs=1e-9)
 
