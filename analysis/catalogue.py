@@ -114,7 +114,7 @@ class QuantityDefinition:
     display: Unit
     display_at: dict[Place, Unit] = field(default_factory=dict)  # other units, by place
     column: TableColumn | None = None  # None for quantities that the campaign's table does not hold
-    is_minor: bool = False  # listed in reports only
+    is_minor: bool = False  # in reports; window and terminal give it no row of its own
 
     def unit_at(self, place: Place, unit: str = "") -> Unit:
         """Unit shown at a place; a `unit` other than that of the catalogue is shown as it is.

@@ -14,11 +14,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, project_to_bounds
-from analysis.fitting.search import Fit, build_problem, fit_at_minimum
+from analysis.fitting.search import build_problem, fit_at_minimum
 from analysis.identification import Curves
-from analysis.laws.catalogue import OWN_PARAMETERS, law_by_name
+from analysis.laws.catalogue import law_by_name
 from analysis.laws.law import FrictionLaw
-from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
+from analysis.laws.parameters import Parameter
 from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
 from analysis.results.joint_fit import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
@@ -50,41 +50,31 @@ class Refitter:
     def refit(
         self, start: Mapping[str, float], *, model: str, hold: str | None = None, steps_max: int = 12
     ) -> Refit:
-        """Refine `start`.
+        """Refine `start` in at most `steps_max` evaluations.
 
-        Parameters
-        ----------
-        start : mapping of float
-            `Identification.parameters`, or such; near a minimum, for there may be many.
-        model : str
-            One of `Model`'s values.
-        hold : str, optional
-            Name of a parameter that stays as it is in `start`, such as "friction_dynamic".
-        steps_max : int
-            Most evaluations.
+        `start` is near a minimum, for there may be many: `Identification.parameters`, and the values of the
+        law's own parameters, which are among the results. `hold` names a parameter that stays as it is.
         """
-        law, point = law_by_name(model), self._point(start)
+        law = law_by_name(model)
         held = None if hold is None else self._held(hold, law)
-        minimum = self._problem.minimise(_zeroed(self._problem, point, law), law, steps_max, fixed=held)
+        point = _zeroed(self._problem, self._point(start, law), law)
+        minimum = self._problem.minimise(point, law, steps_max, fixed=held)
         fit = fit_at_minimum(self._problem, law, minimum)
         named = named_parameters(fit.parameters, self._decay)
-        for place, parameter in zip(law.own_places, law.own, strict=True):
-            named[parameter.name] = float(fit.parameters[place])
-        return Refit(named, fit.chi_square, fit.rms_m, self._curves(fit), minimum.steps)
+        own = zip((own.name for own in law.own), fit.parameters[law.own_places].tolist(), strict=True)
+        curves = fitted_curves(fit, self._decay, self._delays_s)
+        return Refit({**named, **dict(own)}, fit.chi_square, fit.rms_m, curves, minimum.steps)
 
-    def _curves(self, fit: Fit) -> Callable[[Floats], Curves]:
-        return fitted_curves(fit, self._decay, self._delays_s)
-
-    def _point(self, start: Mapping[str, float]) -> Floats:
-        missing = [name for name in (*PARAMETER_NAMES.values(), "release_s") if name not in start]
+    def _point(self, start: Mapping[str, float], law: FrictionLaw) -> Floats:
+        own_names = [own.name for own in law.own]
+        missing = [name for name in (*PARAMETER_NAMES.values(), "release_s", *own_names) if name not in start]
         if missing:
             template = N_("the start of a refit lacks {missing}: hand over Identification.parameters.")
             raise AnalysisError(template, missing=", ".join(missing))
         point = self._problem.prior_mean.copy()
         for place, name in PARAMETER_NAMES.items():
             point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)
-        for own_place, own in enumerate(OWN_PARAMETERS, start=SHARED_PARAMETER_COUNT):
-            point[own_place] = start.get(own.name, own.default)
+        point[law.own_places] = [start[name] for name in own_names]
         point[Parameter.RELEASE] = self._decay.channels.from_record_time(np.array(start["release_s"]))
         return point
 

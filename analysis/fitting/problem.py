@@ -67,17 +67,10 @@ def minimise(
     free: NDArray[np.int64],
     steps_max: int = 30,
 ) -> Minimum:
-    """Minimise chi-square from `start` over the `free` parameters.
+    """Minimise chi-square from `start` (p,) over the parameters at the places `free` (k,).
 
-    Parameters
-    ----------
-    evaluate : callable
-        Chi-square with its quadratic form over the free parameters.
-    project : callable
-        Moves a parameter vector into the allowed region.
-    start : (p,) float64
-    free : (k,) int
-        Places of the free parameters in the vector.
+    `evaluate` gives chi-square with its quadratic form over them; `project` moves a point into the allowed
+    region.
     """
     point = project(start)
     here = evaluate(point)
@@ -102,12 +95,7 @@ def minimise(
 def covariance(normal: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Invert a normal matrix, leaving out combinations of parameters that it does not determine.
 
-    Returns
-    -------
-    (k, k) float64
-        Covariance within the determined combinations.
-    (k,) bool
-        True for a parameter that takes part in an undetermined combination.
+    Returns the covariance (k, k) within the determined ones, and which parameters (k,) take part in others.
     """
     curvature = np.diag(normal)
     scale = np.sqrt(np.where(curvature > 0.0, curvature, 1.0))  # a parameter without any is loose
@@ -120,21 +108,9 @@ def covariance(normal: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 @compiled
 def levenberg_marquardt_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats, float]:
-    """Solve for the step of Levenberg and Marquardt.
+    """Step (k,) of Levenberg and Marquardt, and the fall of chi-square that it promises.
 
-    Parameters
-    ----------
-    normal, descent : (k, k) and (k,) float64
-        See `QuadraticModel`.
-    damping : float
-        Added to the diagonal of the normal matrix, scaled to ones.
-
-    Returns
-    -------
-    (k,) float64
-        The step.
-    float
-        The fall of chi-square that it promises.
+    `damping` is added to the diagonal of the normal matrix, scaled to ones.
     """
     scale, scaled, move = np.empty(len(descent)), np.empty(normal.shape), np.empty(len(descent))
     for k in range(len(descent)):

@@ -522,14 +522,8 @@ def guess_release(
 ) -> list[Floats]:
     """Look back over six periods for releases whose motion fits the first readings; the best few, refined.
 
-    Parameters
-    ----------
-    guided : FitProblem
-        With prior knowledge of friction, tilt, stiffness and damping.
-    start : (p,) float64
-        Release and pullback in it are ignored.
-    pullback_m : float or None
-        Nominal pullback; any up to twice the first swing where None.
+    `guided` has prior knowledge of friction, tilt, stiffness and damping. Release and pullback in `start` are
+    ignored. The nominal pullback may be None: any up to twice the first swing is tried then.
     """
     first_s = float(guided.table.time_s[0])
     window = guided.before(first_s + _WINDOW_PERIODS * period_s).decimated(_READINGS, np.inf)

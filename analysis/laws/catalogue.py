@@ -39,13 +39,7 @@ PARAMETER_COUNT = SHARED_PARAMETER_COUNT + len(OWN_PARAMETERS)
 
 
 def law_by_name(name: str) -> FrictionLaw:
-    """The law of this name.
-
-    Raises
-    ------
-    AnalysisError
-        There is none.
-    """
+    """The law of this name; raises AnalysisError if there is none."""
     for law in LAWS:
         if law.name == name:
             return law

@@ -34,8 +34,8 @@ _MOTION = MOTION_PARAMETER_COUNT
 # Rows of moments: the residual, and the functions whose combinations all displacements are.
 RESIDUAL, ONE, COS, SIN, TAU_COS, TAU_SIN, TAU, TAU_2 = range(8)
 BASIS_SIZE = 8
-# How many of them it takes where nothing moves, where the gauge swings, and where the plate slips.
-CONSTANT, SWING, SLIP = 2, 6, 8
+# How many of them it takes where nothing moves, where the displacement oscillates, and where the plate slips.
+CONSTANT, OSCILLATION, SLIP = 2, 6, 8
 
 _TABLE_OFFSET, _TABLE_GAIN = int(Parameter.TABLE_OFFSET), int(Parameter.TABLE_GAIN)
 _RELATIVE_OFFSET, _RELATIVE_GAIN = int(Parameter.RELATIVE_OFFSET), int(Parameter.RELATIVE_GAIN)
@@ -54,8 +54,8 @@ def gauge_response(point: Floats, which: int) -> tuple[float, float, float]:
 def basis_size(sign: float, which: int) -> int:
     """How many of the functions a gauge takes in a phase with this sign."""
     if sign == 0.0:
-        return CONSTANT if which == 1 else SWING
-    return SWING if which == 0 else SLIP
+        return CONSTANT if which == 1 else OSCILLATION
+    return OSCILLATION if which == 0 else SLIP
 
 
 @compiled_part
@@ -64,25 +64,19 @@ def displacement_coefficients(
 ) -> tuple[float, float, float]:
     """Write the coefficients of the displacement in a phase into `motion` (8,).
 
-    Returns
-    -------
-    float
-        The share of u1 in it, but for that of u2 where the plate slips.
-    float
-        1 where u2 - u1 is in it.
-    float
-        1 where that slips.
+    Returns the share of u1 in it but for that of u2 where the plate slips, then 1 where u2 - u1 is in it, and
+    1 where that slips.
     """
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
     damping, frequency, load, drive = oscillator(parameters, sign)
     cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, position - load, velocity)
     plate = 0.0 if which == 0 else 1.0
     slips = plate if sign != 0.0 else 0.0
-    swings = (1.0 if which != 1 else 0.0) - slips  # where the plate slips it does not swing
-    motion[ONE] = swings * load + plate * phase[RELATIVE] + slips * position
-    motion[COS], motion[SIN] = swings * cosine, swings * sine
+    oscillates = (1.0 if which != 1 else 0.0) - slips  # the displacement of a slipping plate does not
+    motion[ONE] = oscillates * load + plate * phase[RELATIVE] + slips * position
+    motion[COS], motion[SIN] = oscillates * cosine, oscillates * sine
     motion[TAU], motion[TAU_2] = slips * velocity, slips * 0.5 * drive
-    return swings, plate, slips
+    return oscillates, plate, slips
 
 
 GaugeReadings = tuple[Floats, Floats, Floats, Floats, Floats, int]
@@ -227,10 +221,10 @@ def gauge_normal_equations(
 @compiled_part
 def _held_slopes(motion: Floats, slopes: Floats, parameters: Floats, rows: Floats, which: int) -> None:
     """Before release the table stands at the pullback, and the plate on it."""
-    swings = 0.0 if which == 1 else 1.0
-    motion[ONE] = swings * parameters[PULLBACK]
+    oscillates = 0.0 if which == 1 else 1.0
+    motion[ONE] = oscillates * parameters[PULLBACK]
     for d in range(len(rows)):
-        slopes[ONE, d] = swings * rows[d, 0, 0]
+        slopes[ONE, d] = oscillates * rows[d, 0, 0]
 
 
 @compiled_part
@@ -238,12 +232,12 @@ def _phase_slopes(
     motion: Floats, slopes: Floats, parameters: Floats, phase: Floats, rows: Floats, p: int, which: int
 ) -> None:
     """Write the coefficients of the gauge's displacement in a phase, and of its derivatives."""
-    swings, plate, slips = displacement_coefficients(parameters, phase, which, motion)
+    oscillates, plate, slips = displacement_coefficients(parameters, phase, which, motion)
     for d in range(len(rows)):
         row = rows[d, p]
-        slopes[ONE, d] = swings * row[4] + plate * row[3] + slips * row[0]
-        slopes[COS, d], slopes[SIN, d] = swings * row[6], swings * row[7]
-        slopes[TAU_COS, d], slopes[TAU_SIN, d] = swings * row[8], swings * row[9]
+        slopes[ONE, d] = oscillates * row[4] + plate * row[3] + slips * row[0]
+        slopes[COS, d], slopes[SIN, d] = oscillates * row[6], oscillates * row[7]
+        slopes[TAU_COS, d], slopes[TAU_SIN, d] = oscillates * row[8], oscillates * row[9]
         slopes[TAU, d], slopes[TAU_2, d] = slips * row[2], slips * 0.5 * row[5]
 
 

@@ -64,17 +64,8 @@ class MotionSolver(ABC):
     ) -> list[Floats]:
         """Gauss-Newton form of each gauge's chi-square over the `free` places (k,) of a point (p,).
 
-        Parameters
-        ----------
-        free : (k,) int64
-            Those that move the motion first.
-        directions : (q, v) float64
-            How these move `vector`.
-
-        Returns
-        -------
-        list of (k + 1, k + 1) float64
-            Normal matrix, descent (last column) and chi-square (corner), priors aside.
+        Those that move the motion come first; `directions` (q, v) are how these move `vector`. A form is
+        (k + 1, k + 1): normal matrix, descent (last column) and chi-square (corner), priors aside.
         """
 
 
@@ -96,12 +87,8 @@ class ClosedFormSolver(MotionSolver):
 class IntegratedSolver(MotionSolver):
     """Friction that depends on the sliding velocity: slips are integrated, derivatives are differences.
 
-    Parameters
-    ----------
-    friction : callable
-        Compiled, see `analysis.motion.integration.Friction`.
-    name : str
-        An identifier that no other law has.
+    `friction` is compiled, see `analysis.motion.integration.Friction`; `name` is an identifier that no other
+    law has.
     """
 
     is_closed_form = False
@@ -145,16 +132,9 @@ def _sampled_normal_equations(
 ) -> Floats:
     """X X^T of a gauge: the rows of X are the derivatives and, last, the residual, over the noise.
 
-    Parameters
-    ----------
-    moved, slopes : (n,) and (q, n) float64
-        Displacement that the gauge reads, and its derivatives by the q free parameters of the motion.
-    response : (3,) int64
-        Places of the gauge's offset, gain and delay; -1 for a gauge without delay.
-    release : int
-        Row of the release in `slopes`: a delay of the gauge is a later release.
-    extra : (e,) int64
-        The other free places.
+    `moved` (n,) is the displacement that the gauge reads, `slopes` (q, n) its derivatives by the free
+    parameters of the motion, and `release` the row of the release in them: a delay of the gauge is a later
+    release. `response` (3,) are the places of offset, gain and delay (-1: none), `extra` the other free ones.
     """
     weight, gain, late = 1.0 / noise, 1.0 + point[response[1]], response[2] >= 0
     rows = np.zeros((len(slopes) + len(extra) + 1, len(readings)))
@@ -270,7 +250,7 @@ def _bound_friction(point: Floats, has_static_friction: bool, has_tilt: bool) ->
 _ANGULAR_MIN, _ANGULAR_MAX = 2.0 * math.pi / (3.0 * PERIOD_MAX_S), 2.0 * math.pi * 3.0 / PERIOD_MIN_S
 """Of the joint motion (rad/s): a fit may pass the limits of plausible stands by three times."""
 _DAMPING_RATIO_MAX = 0.5
-"""A table damped more than half critically hardly swings: it is no stand, and no motion of the kernels."""
+"""A table damped more than half critically hardly oscillates: it is no stand."""
 _STIFFNESS, _DAMPING, _PULLBACK = int(Parameter.STIFFNESS), int(Parameter.DAMPING), int(Parameter.PULLBACK)
 _TABLE_MASS, _PLATE_MASS = int(Parameter.TABLE_MASS), int(Parameter.PLATE_MASS)
 

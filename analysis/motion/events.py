@@ -86,14 +86,14 @@ def first_zero(frequency: float, cosine: float, sine: float) -> tuple[float, boo
 @compiled_part
 def peak_amplitude(damping: float, frequency: float, cosine: float, sine: float, turn: float) -> float:
     """Size of e^(-n tau) (cosine cos + sine sin) where its derivative vanishes, at tau = turn."""
-    swing = math.hypot(cosine, sine) * math.exp(-damping * turn)
-    return swing * frequency / math.hypot(damping, frequency)
+    envelope = math.hypot(cosine, sine) * math.exp(-damping * turn)
+    return envelope * frequency / math.hypot(damping, frequency)
 
 
 @compiled_part
 def _zero(
     mode: tuple[float, float],
-    swing: tuple[float, float],
+    amplitudes: tuple[float, float],
     line: tuple[float, float],
     low: float,
     high: float,
@@ -102,18 +102,10 @@ def _zero(
     """Tau in [low, high] where offset + drive tau - e^(-n tau) (cosine cos + sine sin) falls to zero.
 
     It does so once. Halley's steps from `guess`, kept inside a bracket; they end when what the next one
-    would change, to leading order, is below rounding.
-
-    Parameters
-    ----------
-    mode : (float, float)
-        Damping n and damped frequency w.
-    swing : (float, float)
-        Coefficients cosine and sine.
-    line : (float, float)
-        drive and offset.
+    would change, to leading order, is below rounding. `mode` is (n, w), `amplitudes` (cosine, sine) and
+    `line` (drive, offset).
     """
-    (damping, frequency), (cosine, sine), (drive, offset) = mode, swing, line
+    (damping, frequency), (cosine, sine), (drive, offset) = mode, amplitudes, line
     rate_cosine, rate_sine = oscillation_derivative(damping, frequency, cosine, sine)
     bend_cosine, bend_sine = oscillation_derivative(damping, frequency, rate_cosine, rate_sine)
     tau = guess
@@ -143,9 +135,9 @@ def _limit_reached(
     damping: float, frequency: float, cosine: float, sine: float, limit: float, low: float, high: float
 ) -> float:
     """Tau in [low, high] where the monotone e^(-n tau) (cosine cos + sine sin) rises to `limit`."""
-    swing = math.hypot(cosine, sine) * math.exp(-damping * low)
+    envelope = math.hypot(cosine, sine) * math.exp(-damping * low)
     # What rises to the limit would, undamped, be this angle before its peak.
-    angle = math.acos(min(max(limit / swing, -1.0), 1.0))
+    angle = math.acos(min(max(limit / envelope, -1.0), 1.0))
     tau = (math.atan2(sine, cosine) - angle) / frequency
     period = 2.0 * math.pi / frequency
     tau += period * math.ceil((low - tau) / period)
@@ -181,17 +173,14 @@ def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[flo
 
 
 @compiled_part
-def _speed(
-    damping: float, frequency: float, cosine: float, sine: float, drive: float, velocity: float, tau: float
-) -> float:
-    """Speed of a slip: velocity + drive tau - e^(-n tau) (cosine cos + sine sin)."""
-    swing = cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau)
-    return velocity + drive * tau - math.exp(-damping * tau) * swing
+def _oscillation(damping: float, frequency: float, cosine: float, sine: float, tau: float) -> float:
+    """Value of e^(-n tau) (cosine cos w tau + sine sin w tau)."""
+    return math.exp(-damping * tau) * (cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau))
 
 
 @compiled_part
 def slip_end(parameters: Floats, sign: float, position: float, velocity: float, longest: float) -> float:
-    """How long a slip from this state lasts; inf when over `longest` or `MOST_PHASES` half swings.
+    """How long a slip from this state lasts; inf when over `longest` or `PHASE_LIMIT` half periods.
 
     Follows the speed of the slip, sign (u2' - u1'), which is zero at first and grows. It is concave
     while u1'' (mirrored likewise) rises and convex while u1'' falls.
@@ -227,7 +216,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
             bottom = turn
             if drive + decay * peak > 0.0:
                 bottom = _limit_reached(damping, frequency, -rate_cosine, -rate_sine, -drive, low, turn)
-            if _speed(damping, frequency, cosine, sine, drive, velocity, bottom) <= 0.0:
+            if velocity + drive * bottom <= _oscillation(damping, frequency, cosine, sine, bottom):
                 return _zero((damping, frequency), (cosine, sine), (drive, velocity), low, bottom, low)
         low, turn, peak = turn, turn + half_period, decay * decay * peak
 
@@ -289,20 +278,10 @@ def phase_limit(parameters: Floats, duration_s: float) -> float:
 
 @compiled
 def integrate_events(parameters: Floats, duration_s: float) -> Floats:
-    """Phases of the motion until `duration_s` after release.
+    """Phases of the motion until `duration_s` after release, (m, 5) with m >= 1.
 
-    Parameters
-    ----------
-    parameters : (10,) float64
-        In the order of the constants above, and such as `two_mass.TwoMassParameters` allows: with others
-        the integration may end early, at `phase_limit`.
-    duration_s : float
-        Positive.
-
-    Returns
-    -------
-    (m, 5) float64
-        A row a phase, columns START, SIGN, TABLE, VELOCITY, RELATIVE; at least one row.
+    Columns are START, SIGN, TABLE, VELOCITY, RELATIVE. With parameters that `two_mass.TwoMassParameters`
+    does not allow the integration may end early, at `phase_limit`.
     """
     phases = np.empty((64, 5))
     count = 0
@@ -330,27 +309,21 @@ def integrate_events(parameters: Floats, duration_s: float) -> Floats:
 
 
 @compiled_part
-def _swing(damping: float, frequency: float, cosine: float, sine: float, tau: float) -> float:
-    swing = cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau)
-    return math.exp(-damping * tau) * swing
-
-
-@compiled_part
 def _largest(damping: float, frequency: float, cosine: float, sine: float, span: float) -> float:
     """Largest |e^(-n tau) (cosine cos w tau + sine sin w tau)| for tau in [0, span]."""
-    ends = max(abs(cosine), abs(_swing(damping, frequency, cosine, sine, span)))
+    ends = max(abs(cosine), abs(_oscillation(damping, frequency, cosine, sine, span)))
     slope_cosine, slope_sine = oscillation_derivative(damping, frequency, cosine, sine)
     turn, _ = first_zero(frequency, slope_cosine, slope_sine)
     return max(ends, peak_amplitude(damping, frequency, cosine, sine, turn)) if turn < span else ends
 
 
 @compiled_part
-def peak_rates_in_stick(
-    parameters: Floats, position: float, velocity: float, span: float
+def table_peak_rates(
+    parameters: Floats, sign: float, position: float, velocity: float, span: float
 ) -> tuple[float, float]:
-    """Largest |u1'| and |u1''| within `span` of joint motion from this state."""
-    damping, frequency, _, _ = oscillator(parameters, 0.0)
-    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position, velocity)
+    """Largest |u1'| and |u1''| within `span` of a phase with `sign` from this state."""
+    damping, frequency, load, _ = oscillator(parameters, sign)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
     second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
     speed = _largest(damping, frequency, cosine, sine, span)
     return speed, _largest(damping, frequency, second_cosine, second_sine, span)
@@ -364,11 +337,8 @@ def peak_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[f
         row = phases[k]
         start, sign, position, velocity = row[START], row[SIGN], row[TABLE], row[VELOCITY]
         span = (phases[k + 1, START] if k + 1 < len(phases) else duration_s) - start
-        damping, frequency, load, drive = oscillator(parameters, sign)
-        _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
-        second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
-        speed = _largest(damping, frequency, cosine, sine, span)
-        acceleration = _largest(damping, frequency, second_cosine, second_sine, span)
+        drive = oscillator(parameters, sign)[3]
+        speed, acceleration = table_peak_rates(parameters, sign, position, velocity, span)
         table_speed, table_acceleration = max(table_speed, speed), max(table_acceleration, acceleration)
         if sign == 0.0:
             plate_speed, plate_acceleration = max(plate_speed, speed), max(plate_acceleration, acceleration)

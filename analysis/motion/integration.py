@@ -40,9 +40,9 @@ from analysis.motion.events import (
     oscillation_amplitudes,
     oscillation_derivative,
     oscillator,
-    peak_rates_in_stick,
     phase_limit,
     stick_end,
+    table_peak_rates,
 )
 from analysis.motion.events import PARAMETER_COUNT as OWN
 from analysis.motion.sampling import (
@@ -347,17 +347,18 @@ def sample(parameters: Floats, phases: Floats, nodes: Floats, times: Floats, cha
 def peak_rates(
     parameters: Floats, phases: Floats, nodes: Floats, duration_s: float
 ) -> tuple[float, float, float, float]:
-    """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`, in slips among four looks a step."""
+    """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`, in slips at five times a step."""
     largest, state, slope = np.zeros(4), np.empty(4), np.empty(4)
     for p in range(len(phases)):
         if phases[p, SIGN] == 0.0:
             span = (phases[p + 1, START] if p + 1 < len(phases) else duration_s) - phases[p, START]
-            speed, acceleration = peak_rates_in_stick(parameters, phases[p, TABLE], phases[p, VELOCITY], span)
+            table, velocity = phases[p, TABLE], phases[p, VELOCITY]
+            speed, acceleration = table_peak_rates(parameters, 0.0, table, velocity, span)
             _raise(largest, speed, speed, acceleration, acceleration)
             continue
         for k in range(int(phases[p, FIRST_NODE]), _nodes_end(phases, nodes, p) - 1):
-            for look in range(5):
-                tau = nodes[k, NODE_TAU] + 0.25 * look * (nodes[k + 1, NODE_TAU] - nodes[k, NODE_TAU])
+            for quarter in range(5):
+                tau = nodes[k, NODE_TAU] + 0.25 * quarter * (nodes[k + 1, NODE_TAU] - nodes[k, NODE_TAU])
                 _between(nodes, k, tau, state)
                 slope_in_slip(parameters, phases[p, SIGN], state, slope)
                 _raise(largest, state[1], state[1] + state[2], slope[1], slope[1] + slope[2])

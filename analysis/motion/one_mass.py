@@ -138,7 +138,7 @@ def _stop_cycle(cycle: Floats, first_m: complex, decrement: complex, coulomb_m: 
 
 
 def _half_wave(since_s: NDArray[Any], omega: complex, n: complex, order: int) -> NDArray[Any]:
-    """Derivative `order` of e^(-n t) (cos w t + n/w sin w t): a swing from rest at 1 about 0."""
+    """Derivative `order` of e^(-n t) (cos w t + n/w sin w t): oscillation about 0 from rest at 1."""
     decay, cosine, sine = np.exp(-n * since_s), np.cos(omega * since_s), np.sin(omega * since_s)
     if order == 0:
         return np.asarray(decay * (cosine + (n / omega) * sine))

@@ -110,7 +110,7 @@ def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> N
 
 @compiled_part
 def _mode(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
-    """As `oscillation`, but with k2 for the damped frequency of a slip."""
+    """As `oscillator`, but with k2 for the damped frequency of a slip."""
     damping, frequency, load, drive = oscillator(parameters, sign)
     if sign != 0.0:
         frequency = math.hypot(frequency, damping)

@@ -116,14 +116,14 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
 
 
 @compiled_part
-def _swing_at(damping: float, frequency: float, tau: float) -> tuple[float, float]:
+def _basis_at(damping: float, frequency: float, tau: float) -> tuple[float, float]:
     """Return e^(-n tau) cos w tau and e^(-n tau) sin w tau."""
     decay = math.exp(-damping * tau)
     return decay * math.cos(frequency * tau), decay * math.sin(frequency * tau)
 
 
 @compiled_part
-def _small_swing(decay: float, angle: float) -> tuple[float, float]:
+def _small_basis(decay: float, angle: float) -> tuple[float, float]:
     """Return e^-decay cos angle and e^-decay sin angle, for arguments as small as the series allow."""
     x, y = angle * angle, -decay
     cos = _C8 + x * (_C10 + x * (_C12 + x * _C14))
@@ -142,11 +142,11 @@ def _uneven_basis(
     for k in range(len(times)):
         step = times[k] - times[k - 1] if k % _ANCHORED else math.inf
         if frequency * step < _SMALL_ANGLE and damping * step < _SMALL_DECAY:
-            cos, sin = _small_swing(damping * step, frequency * step)
+            cos, sin = _small_basis(damping * step, frequency * step)
             cosines[k] = cosines[k - 1] * cos - sines[k - 1] * sin
             sines[k] = sines[k - 1] * cos + cosines[k - 1] * sin
         else:
-            cosines[k], sines[k] = _swing_at(damping, frequency, times[k] - start)
+            cosines[k], sines[k] = _basis_at(damping, frequency, times[k] - start)
 
 
 @compiled_part
@@ -158,7 +158,7 @@ def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats
     if len(tables) == 0:
         _uneven_basis(damping, frequency, start, times, cosines, sines)
         return
-    cosines[0], sines[0] = _swing_at(damping, frequency, times[0] - start)
+    cosines[0], sines[0] = _basis_at(damping, frequency, times[0] - start)
     table = tables[0] if phase[SIGN] == 0.0 else tables[1]
     cos, sin, table_cosines, table_sines = cosines[0], sines[0], table[0], table[1]
     for k in range(len(times)):
@@ -245,7 +245,7 @@ Response = tuple[float, float, float, float, float, float]
 
 @compiled_part
 def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> Change:
-    """Change of what `oscillation` returns: n, w, u_e and the plate's acceleration."""
+    """Change of what `oscillator` returns: n, w, u_e and the plate's acceleration."""
     damping, frequency, load, drive = oscillator(parameters, sign)
     mass, d_mass = parameters[TABLE_MASS], direction[TABLE_MASS]
     d_load, d_drive = 0.0, 0.0
@@ -285,11 +285,11 @@ def _released(parameters: Floats, direction: Floats, sign: float) -> Change:
 
 @compiled_part
 def _at_end(
-    mode: Floats, swing: tuple[float, float, float], joint: bool, change: Change, response: Response
+    mode: Floats, end: tuple[float, float, float], joint: bool, change: Change, response: Response
 ) -> Change:
-    """Change at the end of a phase, before that has moved; swing is tau and the basis there."""
+    """Change at the end of a phase, before that has moved; `end` is tau and the basis there."""
     d_load, d_drive, pc, ps, qc, qs = response
-    tau, cos, sin = swing
+    tau, cos, sin = end
     cosine, sine = pc + qc * tau, ps + qs * tau
     rate_cosine, rate_sine = oscillation_derivative(mode[0], mode[1], cosine, sine)
     table = d_load + (cosine * cos + sine * sin)
@@ -347,14 +347,14 @@ def _after_event(
     else:
         drop = before[SIGN] * 2.0 * dynamic
         delay = _reversal_delay(parameters, after, before[SIGN], change)
-    # The plate is held back by `drop` less after the event, and the table pushed on less.
+    # The plate is held back by `drop` less after the event, and the table driven on less.
     table = change[1] + plate_mass / table_mass * drop * delay
     return change[0], table, change[2] - drop * delay, change[3]
 
 
 @compiled
 def _modes(parameters: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """Return `oscillation` for the signs -1, 0, 1, (3, 4), and its changes, (q, 3, 4)."""
+    """Return `oscillator` for the signs -1, 0, 1, (3, 4), and its changes, (q, 3, 4)."""
     modes, d_modes = np.empty((3, 4)), np.empty((len(directions), 3, 4))
     for k in range(3):
         modes[k, 0], modes[k, 1], modes[k, 2], modes[k, 3] = oscillator(parameters, k - 1.0)
@@ -375,7 +375,7 @@ def phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> F
         last = p + 1 == len(phases)
         tau = 0.0 if last else phases[p + 1, START] - phase[START]
         decay, angle = math.exp(-modes[k, 0] * tau), modes[k, 1] * tau
-        swing = tau, decay * math.cos(angle), decay * math.sin(angle)
+        end = tau, decay * math.cos(angle), decay * math.sin(angle)
         for d in range(len(directions)):
             row = out[d, p]
             if p == 0:
@@ -384,7 +384,7 @@ def phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> F
             response = _response(modes[k], d_modes[d, k], phase, change)
             row[4], row[5], row[6], row[7], row[8], row[9] = response
             if not last:
-                change = _at_end(modes[k], swing, k == 1, change, response)
+                change = _at_end(modes[k], end, k == 1, change, response)
                 change = _after_event(parameters, directions[d], phase, phases[p + 1], change)
                 row = out[d, p + 1]
                 row[0], row[1], row[2], row[3] = change

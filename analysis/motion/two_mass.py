@@ -101,19 +101,9 @@ class Motion(ABC):
 def rising_times(
     times_s: ArrayLike, duration_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.intp] | None]:
-    """Times as the kernels want them: rising, contiguous, writable.
+    """Times as the kernels want them (rising, contiguous, writable), and where each given time went.
 
-    Returns
-    -------
-    (n,) float64
-        The given array itself where it is so already.
-    (n,) intp or None
-        Where each given time went; None when they rose already.
-
-    Raises
-    ------
-    MotionError
-        A time is not a number, or later than `duration_s`.
+    None where they rose already. Raises MotionError if a time is not a number, or later than `duration_s`.
     """
     times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
     if times.ndim != 1:
@@ -211,8 +201,8 @@ class TwoMassParameters:
     friction_dynamic: float  # f_d; not negative
     friction_static: float | None = None  # f_s, not less than f_d; None means f_d
     tilt_rad: float = 0.0
-    """alpha, positive where gravity pulls the plate forward; |alpha| <= f_s, else the plate would not have
-    waited for the release."""
+    """alpha, positive where gravity pulls the plate forward; |alpha| <= f_s, else the plate would
+    slide before the release."""
     pullback_m: float  # u1 before release
     gravity_m_per_s2: float = 9.81  # positive
 

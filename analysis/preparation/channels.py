@@ -57,18 +57,10 @@ class Channels:
 
 
 def read_channels(record: Record) -> tuple[Channels, list[ResultWarning]]:
-    """Check `record` and take its valid readings.
+    """Check `record` and take its valid readings; the warnings say what was left out, and why.
 
-    Returns
-    -------
-    Channels
-    list of ResultWarning
-        What was left out, and why.
-
-    Raises
-    ------
-    RecordError
-        Times that go back, columns of unequal length, masses or clock that cannot be, no valid reading.
+    Raises RecordError for times that go back, columns of unequal length, masses or clock that cannot be, and
+    no valid reading.
     """
     check_masses(record.masses)
     check_gauges(record)

@@ -463,14 +463,8 @@ def dominant_period(channel: Channel) -> float:
 def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
     """Fit a damped cosine with offset by least squares, over two periods first and then over twice as many.
 
-    Raises RecordError when the channel is shorter than a period or holds fewer than ten readings.
-
-    Parameters
-    ----------
-    channel : Channel
-        At least a period of free decay.
-    period_s : float
-        Period to start from, within a tenth.
+    `period_s` is the period to start from, within a tenth. Raises RecordError when the channel is shorter
+    than a period or holds fewer than ten readings.
     """
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:

@@ -68,12 +68,21 @@ def test_a_table_pushed_the_other_way_is_refitted_in_its_own_frame():
     assert again.parameters["friction_dynamic"] == pytest.approx(0.1, rel=1e-3)
 
 
+def test_a_refit_begins_with_the_laws_own_parameters_as_given(made, found):
+    start = found.parameters | {"stribeck_velocity_m_per_s": 0.03}
+
+    again = Refitter(made).refit(start, model="stribeck+tilt", steps_max=1)
+
+    assert again.parameters["stribeck_velocity_m_per_s"] == 0.03
+
+
 @pytest.mark.parametrize(
     ("change", "options", "words"),
     [
         ({}, {"model": "viscous"}, "'viscous' is unknown"),
         ({}, {"model": "coulomb", "hold": "tilt_rad"}, "'tilt_rad' cannot be held"),
         ({"release_s": None}, {"model": "coulomb"}, "lacks release_s"),
+        ({}, {"model": "stribeck+tilt"}, "lacks stribeck_velocity_m_per_s"),
     ],
 )
 def test_what_cannot_be_refitted_is_named(made, found, change, options, words):

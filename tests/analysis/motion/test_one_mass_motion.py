@@ -104,11 +104,11 @@ def test_agrees_with_equation_of_motion():
     t = np.linspace(0.001, 2.0, 4001)
     motion = simulate(decay, t)
     k, n, x_k = decay.frequency_rad_per_s, 0.4, 0.0003
-    push = motion.acceleration_m_per_s2 + 2 * n * motion.velocity_m_per_s + k**2 * motion.displacement_m
+    force = motion.acceleration_m_per_s2 + 2 * n * motion.velocity_m_per_s + k**2 * motion.displacement_m
     moving = np.abs(motion.velocity_m_per_s) > 0.0
     wanted = -(k**2) * x_k * np.sign(motion.velocity_m_per_s)
     assert moving.sum() > 3900
-    np.testing.assert_allclose(push[moving], wanted[moving], atol=1e-10)
+    np.testing.assert_allclose(force[moving], wanted[moving], atol=1e-10)
 
 
 def test_stops_off_zero_inside_the_rest_band():

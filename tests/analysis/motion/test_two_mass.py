@@ -140,8 +140,8 @@ def assert_friction_opposes(p: TwoMassParameters, s: MotionSamples) -> None:
     friction = s.plate_acceleration_m_per_s2 / p.gravity_m_per_s2 - p.tilt_rad
     sliding, held = friction[s.phase != 0], friction[s.phase == 0]
     np.testing.assert_allclose(sliding, -s.phase[s.phase != 0] * p.friction_dynamic, rtol=0, atol=1e-14)
-    push = np.abs(s.plate_acceleration_m_per_s2).max() / p.gravity_m_per_s2
-    assert (np.abs(held) <= p.static_or_dynamic + 1e-14 * push).all()
+    load = np.abs(s.plate_acceleration_m_per_s2).max() / p.gravity_m_per_s2
+    assert (np.abs(held) <= p.static_or_dynamic + 1e-14 * load).all()
 
 
 def assert_energy_falls(p: TwoMassParameters, s: MotionSamples) -> None:
