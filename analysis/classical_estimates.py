@@ -101,16 +101,11 @@ def _parameters(identification: Identification, friction: float, *, plain: bool 
     fitted = identification.parameters
     ratio = 1.0 if plain else fitted["friction_static"] / fitted["friction_dynamic"]
     tilt = 0.0 if plain else fitted["tilt_rad"]
-    return TwoMassParameters(
-        table_mass_kg=fitted["table_mass_kg"],
-        plate_mass_kg=fitted["plate_mass_kg"],
-        stiffness_n_per_m=fitted["stiffness_n_per_m"],
-        damping_coefficient_kg_per_s=fitted["damping_coefficient_kg_per_s"],
+    return TwoMassParameters.from_fit(
+        fitted,
         friction_dynamic=friction,
         friction_static=max(ratio * friction, abs(tilt)),
         tilt_rad=tilt,
-        pullback_m=fitted["pullback_m"],
-        gravity_m_per_s2=fitted["gravity_m_per_s2"],
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.motion.two_mass import simulate
+from analysis.motion.two_mass import TwoMassParameters
 from app.acquisition.messages import PullbackState
 from app.acquisition.pullback.plan import PullbackPlan
 from app.acquisition.pullback.state_machine import PullbackStateMachine
@@ -78,7 +78,7 @@ def motion(
     options = SimulatedStandOptions(series=str(random.choice(SERIES)), tilt_rad=random.normal(0.0, 5e-4))
     true = stand_truth(options, stand)
     pullback_m = true.pullback_m * random.choice([-1.0, 1.0]) * random.uniform(0.985, 1.015)
-    released = simulate(
+    released = TwoMassParameters(
         table_mass_kg=true.table_mass_kg,
         plate_mass_kg=true.plate_mass_kg,
         stiffness_n_per_m=true.stiffness_n_per_m,
@@ -87,9 +87,8 @@ def motion(
         friction_static=true.friction_dynamic * random.uniform(1.0, 1.4),
         tilt_rad=true.tilt_rad,
         pullback_m=pullback_m,
-        duration_s=AFTER_S + 0.1,
         gravity_m_per_s2=true.gravity_m_per_s2,
-    )
+    ).simulate(AFTER_S + 0.1)
     pulled = np.clip((time_s - REST_S) / PULL_S, 0.0, 1.0)
     creep = random.uniform(-40e-6, 40e-6) * np.clip(time_s - REST_S - PULL_S, 0.0, None)
     table_m = pullback_m * pulled**2 * (3.0 - 2.0 * pulled) + creep

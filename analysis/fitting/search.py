@@ -12,7 +12,7 @@ from analysis.laws.law import IDEAL_STAND, FrictionLaw
 from analysis.laws.parameters import SHARED_PARAMETER_COUNT, Parameter
 from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay, relative_to_table
-from analysis.preparation.oscillation import local_slopes, white_noise
+from analysis.preparation.oscillation import local_slopes, slope_noise, white_noise
 from analysis.record import GaugeUncertainty, Record
 
 _FEW = 500  # readings a channel for searching: the shape of chi-square needs no more, ..
@@ -318,9 +318,7 @@ def _phases(relative: Channel, period_s: float) -> list[tuple[int, int, int]]:
         return []
     half_window = period_s / 24.0
     w = local_slopes(relative, half_window)
-    interval = float(np.median(np.diff(relative.time_s)))
-    count = max(5.0, 2.0 * half_window / interval)
-    noise = white_noise(relative) * float(np.sqrt(12.0 / count**3)) / interval
+    noise = slope_noise(relative, half_window, white_noise(relative))
     threshold = max(5.0 * noise, 0.05 * float(np.abs(w).max()), 1e-6)
     side = np.where(w > threshold, 1, np.where(w < -threshold, -1, 0))
     edges = np.concatenate(([0], np.flatnonzero(np.diff(side)) + 1, [len(side)]))

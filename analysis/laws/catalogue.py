@@ -30,9 +30,16 @@ LAWS = _with_places(_COMPARED + _FALLBACK)
 COMPARED_LAWS, FALLBACK_LAWS = LAWS[: len(_COMPARED)], LAWS[len(_COMPARED) :]
 WIDEST_LAW = max(COMPARED_LAWS, key=lambda law: len(law.free_parameters))
 """The compared law that has all others as special cases."""
-FIRST_SLIP_LAW = next(
-    law for law in COMPARED_LAWS if law.has_tilt == WIDEST_LAW.has_tilt and not law.has_static_friction
-)
+
+
+def compared_law(*, static_friction: bool, tilt: bool) -> FrictionLaw:
+    """The compared law with exactly these parameters beside f_d."""
+    return next(
+        law for law in COMPARED_LAWS if (law.has_static_friction, law.has_tilt) == (static_friction, tilt)
+    )
+
+
+FIRST_SLIP_LAW = compared_law(static_friction=False, tilt=WIDEST_LAW.has_tilt)
 """Until the first slip ends no stick has ended, so that f_s plays no part."""
 OWN_PARAMETERS = tuple(parameter for law in LAWS for parameter in law.own)
 PARAMETER_COUNT = SHARED_PARAMETER_COUNT + len(OWN_PARAMETERS)
@@ -52,13 +59,6 @@ def fitted_law(name: str, results: Container[str]) -> FrictionLaw:
     """The law of this name if its own parameters are among the results; else the widest in closed form."""
     law = law_by_name(name)
     return law if all(own.name in results for own in law.own) else WIDEST_LAW
-
-
-def compared_law(*, static_friction: bool, tilt: bool) -> FrictionLaw:
-    """The compared law with exactly these parameters beside f_d."""
-    return next(
-        law for law in COMPARED_LAWS if (law.has_static_friction, law.has_tilt) == (static_friction, tilt)
-    )
 
 
 def law_without(law: FrictionLaw, parameter: Parameter) -> FrictionLaw | None:

@@ -8,7 +8,7 @@ rounding can resolve.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
@@ -231,6 +231,12 @@ class TwoMassParameters:
             **others,
         )
 
+    @classmethod
+    def from_fit(cls, fitted: Mapping[str, float], **changes: float) -> Self:
+        """The parameters of an `Identification`, with some of them changed."""
+        values = {field.name: fitted[field.name] for field in fields(cls)}
+        return cls(**{**values, **changes})
+
     @property
     def static_or_dynamic(self) -> float:
         """f_s, which is f_d where none was given."""
@@ -246,11 +252,6 @@ class TwoMassParameters:
     def simulate(self, duration_s: float = 10.0) -> Motion:
         """Motion from release to `duration_s`; raises MotionError if that is not positive and finite."""
         return simulate_kernels(EXACT, self.vector(), duration_s)
-
-
-def simulate(*, duration_s: float = 10.0, **parameters: Any) -> Motion:
-    """Motion after a pullback, from release to `duration_s`; the other arguments are `TwoMassParameters`."""
-    return TwoMassParameters(**parameters).simulate(duration_s)
 
 
 def stiffness_and_damping(

@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from analysis.arrays import Floats
+from analysis.averaging import block_means
 from analysis.preparation.channels import (
     NOISE_FLOOR_M,
     Channel,
@@ -51,15 +51,6 @@ _LINE_READINGS = 10
 _MEANS = 60
 
 
-@dataclass(frozen=True, slots=True)
-class Mounting:
-    """How gauge 2 is mounted."""
-
-    measures_plate: bool  # against the base, instead of against the table
-    sign: int  # what makes its readings positive where the plate lies ahead
-    warnings: tuple[ResultWarning, ...] = ()  # where that differs from what the record states
-
-
 def relative_to_table(table: Channel, relative: Channel, measures_plate: bool) -> Channel:
     """Displacement of the plate against the table."""
     if not measures_plate:
@@ -69,27 +60,30 @@ def relative_to_table(table: Channel, relative: Channel, measures_plate: bool) -
     )
 
 
-def detect_mounting(
-    table: Channel, relative: Channel, release_s: float, period_s: float, measures_plate: bool
-) -> Mounting:
-    """Decide how gauge 2 is mounted; it is said to measure the plate against the base if `absolute`.
+def _detect_mounting(
+    table: Channel,
+    relative: Channel,
+    release: tuple[float, float],
+    stated_absolute: bool,
+    warnings: list[ResultWarning],
+) -> tuple[bool, int]:
+    """Whether gauge 2 measures the plate against the base, and the sign of its readings ahead of the table.
 
-    Once the plate sticks, gauge 2 stands still, or follows the table, or mirrors it.
+    `release` is its time and the period of the swing (s). Once the plate sticks, gauge 2 stands still, or
+    follows the table, or mirrors it.
     """
-    slope = _slope_on_table(table, relative, release_s, period_s)
-    if slope:
-        return _against_base(slope, measures_plate)
-    if slope is None and measures_plate:
-        return Mounting(True, 1)
-    warnings = (_warning("gauge-2-relative"),) if measures_plate else ()
-    if not _leads(table, relative, release_s, period_s):
-        return Mounting(False, 1, warnings)
-    return Mounting(False, -1, (*warnings, _warning("gauge-2-reversed")))
-
-
-def _against_base(sign: int, absolute: bool) -> Mounting:
-    warnings = () if absolute else (_warning("gauge-2-absolute"),)
-    return Mounting(True, sign, warnings if sign > 0 else (*warnings, _warning("gauge-2-reversed")))
+    slope = _slope_on_table(table, relative, *release)
+    absolute = stated_absolute if slope is None else slope != 0
+    sign = slope or 1
+    if not absolute and _leads(table, relative, *release):
+        sign = -1
+    if absolute and not stated_absolute:
+        warnings.append(_warning("gauge-2-absolute"))
+    if stated_absolute and not absolute:
+        warnings.append(_warning("gauge-2-relative"))
+    if sign < 0:
+        warnings.append(_warning("gauge-2-reversed"))
+    return absolute, sign
 
 
 def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_s: float) -> int | None:
@@ -108,16 +102,12 @@ def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_
     columns = np.column_stack((u1 - u1.mean(), np.ones(len(t)), t))
     found = np.linalg.lstsq(columns, late.value_m, rcond=None)[0]
     count = max(1, len(t) // _MEANS)
-    left = _means(late.value_m - columns @ found, count)
+    whole = len(late) // count * count  # means, so that noise does not pass for motion
+    left = block_means((late.value_m - columns @ found)[:whole], count)
     noise = np.hypot(white_noise(table), white_noise(relative)) / np.sqrt(count)
     slope = round(float(found[0]))
     clear = abs(slope) <= 1 and abs(found[0] - slope) < _SURE
     return slope if clear and left.std() < _UNEXPLAINED * u1.std() + _NOISE_SIGMAS * noise else None
-
-
-def _means(x: Floats, count: int) -> Floats:
-    """Means of `count` neighbours each, so that noise does not pass for motion."""
-    return np.asarray(x[: len(x) // count * count].reshape(-1, count).mean(axis=1))
 
 
 def _leads(table: Channel, relative: Channel, release_s: float, period_s: float) -> bool:
@@ -351,11 +341,9 @@ def _oriented_stretch(
     if channels.relative is None:
         return _Stretch(channels, table, None, measures_plate, sign, sign, turned), period_s
     relative = channels.relative.between(begin_s, end_s).scaled(sign)
-    mounting = detect_mounting(table, relative, release.time_s, period_s, measures_plate)
-    warnings += mounting.warnings
-    relative, relative_sign = relative.scaled(mounting.sign), sign * mounting.sign
-    stretch = _Stretch(channels, table, relative, mounting.measures_plate, sign, relative_sign, turned)
-    return stretch, period_s
+    timing = release.time_s, period_s
+    absolute, turn = _detect_mounting(table, relative, timing, measures_plate, warnings)
+    return _Stretch(channels, table, relative.scaled(turn), absolute, sign, sign * turn, turned), period_s
 
 
 def _slip_by_gauge_2(

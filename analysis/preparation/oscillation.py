@@ -146,11 +146,11 @@ def _next_release(table: Channel, noise: float) -> Release | None:
     """First release in the readings, or None where nothing swings."""
     if len(table) < _READINGS_MIN:
         return None
-    slopes, slope_noise = local_slopes(table, _HALF_WINDOW_S), _slope_noise(table, noise)
+    slopes, scatter = local_slopes(table, _HALF_WINDOW_S), slope_noise(table, _HALF_WINDOW_S, noise)
     speed = np.abs(slopes)
     fast = int(np.argmax(speed > _FAST * speed.max()))
     pivots = _pivots(
-        table.value_m, _turning_points(slopes, fast, max(5.0 * slope_noise, 0.01 * float(speed.max()))), noise
+        table.value_m, _turning_points(slopes, fast, max(5.0 * scatter, 0.01 * float(speed.max()))), noise
     )
     if len(pivots) < 2:
         return None
@@ -162,10 +162,10 @@ def _next_release(table: Channel, noise: float) -> Release | None:
     return replace(release, end_s=float(table.time_s[end]))
 
 
-def _slope_noise(table: Channel, noise_m: float) -> float:
+def slope_noise(channel: Channel, half_window_s: float, noise_m: float) -> float:
     """Standard deviation of `local_slopes` of white noise (m/s)."""
-    interval_s = float(np.median(np.diff(table.time_s)))
-    count = max(5.0, 2.0 * _HALF_WINDOW_S / interval_s)
+    interval_s = float(np.median(np.diff(channel.time_s)))
+    count = max(5.0, 2.0 * half_window_s / interval_s)
     return noise_m * float(np.sqrt(12.0 / count**3)) / interval_s
 
 

@@ -128,8 +128,8 @@ def _motion(found: Identification, record: Record) -> Motion | None:
         return None
     if not fitted_law(found.model.name, found.results).solver.is_closed_form:
         return None
-    of_motion = {name: value for name, value in found.parameters.items() if name != "release_s"}
-    return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])
+    duration_s = float(record.time_s[-1]) - found.parameters["release_s"]
+    return TwoMassParameters.from_fit(found.parameters).simulate(duration_s)
 
 
 def _kinematics(motion: Motion, found: Identification) -> Kinematics:

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from analysis.audit import FLAGS, KILOGRAM_FORCE_N, AuditError, PublishedRow, audit, count_flags
-from analysis.motion.two_mass import simulate
+from analysis.motion.two_mass import TwoMassParameters
 from config import files
 
 TABLE_MASS_KG = 131.6
@@ -19,10 +19,10 @@ def consistent_row() -> PublishedRow:
     plate, stiffness, mu = 22.4, 5000 * KILOGRAM_FORCE_N, 40.0
     mass = TABLE_MASS_KG + plate
     n1 = mu / (2 * mass)
-    motion = simulate(
+    motion = TwoMassParameters(
         table_mass_kg=TABLE_MASS_KG, plate_mass_kg=plate, stiffness_n_per_m=stiffness,
-        damping_coefficient_kg_per_s=mu, friction_dynamic=0.1, pullback_m=0.012, duration_s=60.0,
-    )  # fmt: skip
+        damping_coefficient_kg_per_s=mu, friction_dynamic=0.1, pullback_m=0.012,
+    ).simulate(60.0)  # fmt: skip
     return PublishedRow(
         series="1FFM0", plate_mass_kg=plate, stiffness_as_printed=5000.0,
         period_s=2 * math.pi / math.sqrt(stiffness / mass - n1**2),

@@ -85,12 +85,10 @@ def _period_s(found: Identification) -> float:
 def _fitted_motion(record: Record, found: Identification) -> Motion | None:
     if found.model is None or "release_s" not in found.parameters:
         return None
-    parameters = dict(found.parameters)
-    duration_s = float(record.time_s[-1]) - parameters.pop("release_s")
-    of_motion = TwoMassParameters(**parameters)
+    duration_s = float(record.time_s[-1]) - found.parameters["release_s"]
     law = fitted_law(found.model.name, found.results)
     own = [found.results[parameter.name].value for parameter in law.own]
-    return law.solver.simulate(of_motion, own, duration_s)
+    return law.solver.simulate(TwoMassParameters.from_fit(found.parameters), own, duration_s)
 
 
 def _times(motion: Motion, first_s: float, last_s: float, period_s: float) -> Floats:

@@ -25,7 +25,6 @@ from analysis.motion.two_mass import (
     MotionError,
     MotionSamples,
     TwoMassParameters,
-    simulate,
     stiffness_and_damping,
 )
 from benchmarks.motion_gradient import sample_with_gradient
@@ -39,7 +38,7 @@ FIRST = TwoMassParameters(**{name: GOLDEN[0][name] for name in PARAMETERS})
 
 
 def golden_motion(case: dict[str, Any]) -> Motion:
-    return simulate(**{name: case[name] for name in (*PARAMETERS, "duration_s")})
+    return TwoMassParameters(**{name: case[name] for name in PARAMETERS}).simulate(case["duration_s"])
 
 
 @pytest.fixture(params=GOLDEN, ids=lambda case: case["name"])

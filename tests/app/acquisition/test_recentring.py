@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, states, with_noise
 
-from analysis.motion.two_mass import simulate
+from analysis.motion.two_mass import TwoMassParameters
 from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.messages import PullbackState as State
 from app.acquisition.pullback.plan import (
@@ -41,7 +41,7 @@ def plate_moved(*corners, seconds):
 def test_the_usual_excursion_holds_every_row_of_table_1_on_a_level_stand(series):
     stand = load_stand()
     true = stand_truth(SimulatedStandOptions(series=series), stand)
-    motion = simulate(
+    motion = TwoMassParameters(
         table_mass_kg=true.table_mass_kg,
         plate_mass_kg=true.plate_mass_kg,
         stiffness_n_per_m=true.stiffness_n_per_m,
@@ -49,9 +49,8 @@ def test_the_usual_excursion_holds_every_row_of_table_1_on_a_level_stand(series)
         friction_dynamic=true.friction_dynamic,
         friction_static=true.friction_static,
         pullback_m=true.pullback_m,
-        duration_s=10.0,
         gravity_m_per_s2=true.gravity_m_per_s2,
-    )
+    ).simulate(10.0)
     table, relative = motion.sample_displacements(np.arange(20_000) / 2000.0)
     expected = default_excursion(true.pullback_m)
     for seen in (relative, relative + table):  # gauge 2 against the table, or against the base
