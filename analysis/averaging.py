@@ -48,16 +48,14 @@ def average_record(record: Record) -> Record:
     count = block_size((rows - 1) / float(record.time_s[-1] - record.time_s[0])) if rows > 1 else 1
     if count < 2:
         return record
-    relative = record.relative_displacement_m
-    whole = rows // count * count
+    whole, relative = rows // count * count, record.relative_displacement_m
+    table = mask(record.table_displacement_m, record.table_overload)
+    if relative is not None:
+        relative = block_means(mask(relative, record.relative_overload)[:whole], count)
     return record.replace(
         time_s=block_means(record.time_s[:whole], count),
-        table_displacement_m=block_means(
-            mask(record.table_displacement_m, record.table_overload)[:whole], count
-        ),
-        relative_displacement_m=None
-        if relative is None
-        else block_means(mask(relative, record.relative_overload)[:whole], count),
+        table_displacement_m=block_means(table[:whole], count),
+        relative_displacement_m=relative,
         table_overload=None,
         relative_overload=None,
     )

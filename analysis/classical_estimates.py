@@ -52,7 +52,8 @@ def estimate_classically(record: Record, identification: Identification) -> Clas
     decay = prepare(record)
     duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
     period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
-    residuals = np.array([_residual(identification, friction, duration_s) for friction in FRICTION_GRID])
+    motions = (_parameters(identification, friction).simulate(duration_s) for friction in FRICTION_GRID)
+    residuals = np.array([motion.residual_displacement_m for motion in motions])
     measured = identification.results.get("residual_displacement_m")
     return ClassicalEstimates(
         period,
@@ -74,10 +75,8 @@ def zero_crossings(x: Floats, y: Floats) -> tuple[float, ...]:
 
 
 def _with_fitted_tail(decay: FreeDecay, identification: Identification) -> FreeDecay:
-    end = identification.events.slip_end_s
-    return (
-        decay if end is None else decay.with_tail_from(float(decay.channels.from_record_time(np.array(end))))
-    )
+    end_s = identification.events.slip_end_s
+    return decay if end_s is None else decay.with_tail_from(decay.channels.from_record_time(end_s))
 
 
 def _turning_points(decay: FreeDecay) -> tuple[float | None, float | None, float | None, int]:
@@ -101,16 +100,10 @@ def _parameters(identification: Identification, friction: float, *, plain: bool 
     fitted = identification.parameters
     ratio = 1.0 if plain else fitted["friction_static"] / fitted["friction_dynamic"]
     tilt = 0.0 if plain else fitted["tilt_rad"]
+    static = max(ratio * friction, abs(tilt))
     return TwoMassParameters.from_fit(
-        fitted,
-        friction_dynamic=friction,
-        friction_static=max(ratio * friction, abs(tilt)),
-        tilt_rad=tilt,
+        fitted, friction_dynamic=friction, friction_static=static, tilt_rad=tilt
     )
-
-
-def _residual(identification: Identification, friction: float, duration_s: float) -> float:
-    return _parameters(identification, friction).simulate(duration_s).residual_displacement_m
 
 
 def _friction_by_paper_method(decay: FreeDecay, identification: Identification) -> float:
@@ -121,22 +114,19 @@ def _friction_by_paper_method(decay: FreeDecay, identification: Identification) 
 
 def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float], float]:
     """Mean square deviation of the record of gauge 2 (without it, of gauge 1) from the paper's motion."""
-    release_s = float(decay.channels.from_record_time(np.array(identification.parameters["release_s"])))
+    release_s = decay.channels.from_record_time(identification.parameters["release_s"])
     sign, channel = decay.sign, decay.table
     if decay.relative is not None:
-        sign, channel = (
-            decay.relative_sign,
-            relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute),
-        )
+        sign = decay.relative_sign
+        channel = relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute)
     moving = channel.between(release_s, np.inf)
     step = max(1, len(moving) // _COMPARED)
     moving = Channel(moving.time_s[::step], moving.value_m[::step])
     since_s = moving.time_s - release_s
 
     def misfit(friction: float) -> float:
-        motion = paper_method.simulate(
-            _parameters(identification, friction, plain=True), duration_s=float(since_s[-1]) + 1e-3
-        )
+        parameters = _parameters(identification, friction, plain=True)
+        motion = paper_method.simulate(parameters, duration_s=float(since_s[-1]) + 1e-3)
         table, relative = motion.sample_displacements(since_s)
         away = sign * moving.value_m - (table if decay.relative is None else relative)
         return float(np.var(away))

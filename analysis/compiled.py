@@ -49,19 +49,9 @@ def compile_with(
     numba neither keeps functions that take functions on disk nor inlines their arguments. So code that is
     common to several friction laws is written as templates, and each law has its own compiled copy.
 
-    Parameters
-    ----------
-    templates : iterable of (decorator, function)
-        Uncompiled functions with one of the decorators of this module, each before its callers.
-    name : str
-        Identifier that distinguishes the copies on disk.
-    **replaced
-        Compiled functions by the global name under which the templates call them.
-
-    Returns
-    -------
-    dict
-        The compiled functions, and everything else that the templates see, by name.
+    A template is a decorator of this module and an uncompiled function; each stands before its callers.
+    `name` is an identifier that tells the copies apart on disk. `replaced` are compiled functions by the
+    global name under which the templates call them. Returns all that the templates see, the copies included.
     """
     scope: dict[str, Any] = {}
     for decorate, template in templates:

@@ -10,8 +10,6 @@ roughly where the minimum is::
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.search import build_problem, fit_at_minimum
@@ -75,7 +73,7 @@ class Refitter:
         for place, name in PARAMETER_NAMES.items():
             point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)
         point[law.own_places] = [start[name] for name in own_names]
-        point[Parameter.RELEASE] = self._decay.channels.from_record_time(np.array(start["release_s"]))
+        point[Parameter.RELEASE] = self._decay.channels.from_record_time(start["release_s"])
         return point
 
     def _held(self, name: str, law: FrictionLaw) -> Parameter:

@@ -289,7 +289,6 @@ class PlatePathEstimate:
     tilt_rad: float
     covariance: Floats
     """(2, 2) float64: of (friction, tilt), from the noise."""
-    slips: int  # number of slip phases used
     misfit: float  # chi-square per degree of freedom of the phases' curvatures about the common two
 
 
@@ -351,7 +350,7 @@ def _common(signs: Floats, curvatures: Floats, weights: Floats) -> PlatePathEsti
     residual = curvatures + signs * friction - tilt
     freedom = max(1, len(signs) - 1 - int(both_ways))
     misfit = float(residual**2 @ weights) / freedom
-    return PlatePathEstimate(float(friction), float(tilt), covariance, len(signs), misfit)
+    return PlatePathEstimate(float(friction), float(tilt), covariance, misfit)
 
 
 _UNKNOWN = (
@@ -491,12 +490,10 @@ def _with_estimates_as_priors(
     if decay.tail is not None:
         mass = float(start[Parameter.TABLE_MASS] + start[Parameter.PLATE_MASS])
         stiffness = 2.0 * decay.tail.period_uncertainty_s / decay.tail.period_s + 1e-4
+        damping = 2.0 * mass * decay.tail.damping_uncertainty_per_s
         trusts += [
             (Parameter.STIFFNESS, stiffness * float(start[Parameter.STIFFNESS])),
-            (
-                Parameter.DAMPING,
-                2.0 * mass * decay.tail.damping_uncertainty_per_s + 1e-2 * float(start[Parameter.DAMPING]),
-            ),
+            (Parameter.DAMPING, damping + 1e-2 * float(start[Parameter.DAMPING])),
             (Parameter.TABLE_OFFSET, decay.noise_m[0]),
         ]
     if decay.plateau is not None:
@@ -543,10 +540,8 @@ def _candidates(window: FitProblem, start: Floats, period_s: float, pullback_m: 
     statics = np.array(_STATIC_RATIOS) * start[Parameter.FRICTION_DYNAMIC]
     grid = np.meshgrid(statics, np.concatenate((pullbacks, -pullbacks)), releases, indexing="ij")
     found = np.tile(start, (grid[0].size, 1))
-    for place, values in zip(
-        (Parameter.FRICTION_STATIC, Parameter.PULLBACK, Parameter.RELEASE), grid, strict=True
-    ):
-        found[:, place] = values.ravel()
+    places = Parameter.FRICTION_STATIC, Parameter.PULLBACK, Parameter.RELEASE
+    found[:, places] = np.stack([values.ravel() for values in grid], axis=1)
     return found
 
 

@@ -14,20 +14,9 @@ import numpy as np
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled, compiled_part, compiled_sum
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
-from analysis.motion.events import (
-    DURATION_MIN_S,
-    PULLBACK,
-    RELATIVE,
-    RELEASE,
-    SIGN,
-    START,
-    TABLE,
-    VELOCITY,
-    integrate_events,
-    oscillation_amplitudes,
-    oscillator,
-)
-from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
+from analysis.motion import events, sampling
+from analysis.motion.events import DURATION_MIN_S, PULLBACK, RELATIVE, RELEASE, SIGN, START, TABLE, VELOCITY
+from analysis.motion.sampling import BLOCK
 
 GAUGE_1, GAUGE_2, GAUGE_2_BASE = 0, 1, 2
 _MOTION = MOTION_PARAMETER_COUNT
@@ -68,8 +57,8 @@ def displacement_coefficients(
     1 where that slips.
     """
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillator(parameters, sign)
-    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = events.oscillator(parameters, sign)
+    cosine, sine, _, _ = events.oscillation_amplitudes(damping, frequency, position - load, velocity)
     plate = 0.0 if which == 0 else 1.0
     slips = plate if sign != 0.0 else 0.0
     oscillates = (1.0 if which != 1 else 0.0) - slips  # the displacement of a slipping plate does not
@@ -108,7 +97,7 @@ def _sums(point: Floats, readings: GaugeReadings) -> Floats:
     table_time, table, relative_time, relative, noise, which = readings
     parameters, result = point[:_MOTION].copy(), np.zeros((2, 2))
     end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
-    phases = integrate_events(parameters, max(DURATION_MIN_S, end - point[RELEASE]))
+    phases = events.integrate_events(parameters, max(DURATION_MIN_S, end - point[RELEASE]))
     _add_residuals(point, phases, table_time, table / noise[0], 0, noise[0], result[0])
     if len(relative) > 0:
         _add_residuals(point, phases, relative_time, relative / noise[1], which, noise[1], result[1])
@@ -123,14 +112,14 @@ def _add_residuals(
     parameters, (offset, gain, late) = point[:_MOTION].copy(), gauge_response(point, which)
     parameters[RELEASE] += late
     offset, gain = offset / noise, gain / noise
-    motion, basis, tables = np.zeros(BASIS_SIZE), np.empty((2, BLOCK)), rotation_tables(parameters, times)
-    last = first_at(times, parameters[RELEASE])
+    motion, basis = np.zeros(BASIS_SIZE), np.empty((2, BLOCK))
+    tables, last = sampling.rotation_tables(parameters, times), sampling.first_at(times, parameters[RELEASE])
     held = 0.0 if which == 1 else gain * parameters[PULLBACK]
     _sum_still(values[:last], offset + held, sums)
     for p in range(len(phases)):
         first, last, start = last, len(times), phases[p, START] + parameters[RELEASE]
         if p + 1 < len(phases):
-            last = first_at(times, phases[p + 1, START] + parameters[RELEASE])
+            last = sampling.first_at(times, phases[p + 1, START] + parameters[RELEASE])
         if first == last:
             continue
         displacement_coefficients(parameters, phases[p], which, motion)
@@ -139,7 +128,7 @@ def _add_residuals(
             continue
         for begin in range(first, last, BLOCK):
             at, read = times[begin : min(begin + BLOCK, last)], values[begin : min(begin + BLOCK, last)]
-            block_basis(parameters, phases[p], at, tables, basis)
+            sampling.block_basis(parameters, phases[p], at, tables, basis)
             _sum_moving(read, at, start, motion, basis, offset, gain, sums)
 
 
@@ -195,7 +184,7 @@ def gauge_normal_equations(
     motion, slopes = np.zeros(BASIS_SIZE), np.zeros((BASIS_SIZE, len(system)))
     slopes[RESIDUAL, len(free)] = 1.0
     moments, block = np.zeros((BASIS_SIZE, BASIS_SIZE)), np.empty((BASIS_SIZE, BLOCK))
-    tables, last = rotation_tables(parameters, times), first_at(times, parameters[RELEASE])
+    tables, last = sampling.rotation_tables(parameters, times), sampling.first_at(times, parameters[RELEASE])
     _held_slopes(motion, slopes, parameters, rows, which)
     _other_slopes(slopes, motion, free, len(rows), which, gain)
     _add_still(moments, block, values[:last], offset + gain * motion[ONE])
@@ -203,7 +192,7 @@ def gauge_normal_equations(
     for p in range(len(phases)):
         first, last = last, len(times)
         if p + 1 < len(phases):
-            last = first_at(times, phases[p + 1, START] + parameters[RELEASE])
+            last = sampling.first_at(times, phases[p + 1, START] + parameters[RELEASE])
         if first == last:
             continue
         phase, needed = phases[p], basis_size(phases[p, SIGN], which)
@@ -294,7 +283,7 @@ def _add_moving(
     for first in range(0, len(times), BLOCK):
         count = min(BLOCK, len(times) - first)
         at = times[first : first + count]
-        block_basis(parameters, phase, at, tables, block[COS : SIN + 1])
+        sampling.block_basis(parameters, phase, at, tables, block[COS : SIN + 1])
         for k in range(count):
             tau, cosine, sine = at[k] - start, block[COS, k], block[SIN, k]
             block[ONE, k], block[TAU_COS, k], block[TAU_SIN, k] = 1.0, tau * cosine, tau * sine

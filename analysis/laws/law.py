@@ -263,7 +263,6 @@ def _unbounded(_point: Floats) -> None:
 class StandPart:
     """One part of the model."""
 
-    name: str
     free: tuple[Parameter, ...]
     """Parameters that are always fitted. Those of masses and gauges that are fitted only where their
     uncertainty is known are not among them."""
@@ -285,9 +284,7 @@ def _bound_pullback(point: Floats) -> None:
     point[_PULLBACK] = min(max(point[_PULLBACK], -TRAVEL_MAX_M), TRAVEL_MAX_M)
 
 
-LINEAR_SUSPENSION = StandPart(
-    "linear springs, viscous damping", (Parameter.STIFFNESS, Parameter.DAMPING), _bound_oscillator
-)
-SUDDEN_RELEASE = StandPart("sudden release", (Parameter.PULLBACK, Parameter.RELEASE), _bound_pullback)
-LINEAR_GAUGES = StandPart("zero, gain and delay", (Parameter.TABLE_OFFSET, Parameter.RELATIVE_OFFSET))
+LINEAR_SUSPENSION = StandPart((Parameter.STIFFNESS, Parameter.DAMPING), _bound_oscillator)
+SUDDEN_RELEASE = StandPart((Parameter.PULLBACK, Parameter.RELEASE), _bound_pullback)
+LINEAR_GAUGES = StandPart((Parameter.TABLE_OFFSET, Parameter.RELATIVE_OFFSET))
 IDEAL_STAND = (LINEAR_SUSPENSION, SUDDEN_RELEASE, LINEAR_GAUGES)

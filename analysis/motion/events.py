@@ -330,6 +330,15 @@ def table_peak_rates(
 
 
 @compiled_part
+def raise_largest(largest: Floats, table: float, plate: float, table_rate: float, plate_rate: float) -> None:
+    """Raise each of `largest` (4,) to the absolute value of a rate, where that is larger."""
+    largest[0] = max(largest[0], abs(table))
+    largest[1] = max(largest[1], abs(plate))
+    largest[2] = max(largest[2], abs(table_rate))
+    largest[3] = max(largest[3], abs(plate_rate))
+
+
+@compiled_part
 def peak_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
     """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`."""
     table_speed, plate_speed, table_acceleration, plate_acceleration = 0.0, 0.0, 0.0, 0.0

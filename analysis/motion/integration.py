@@ -17,6 +17,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.compiled import compile_with, compiled, compiled_part
+from analysis.motion import events, sampling
 from analysis.motion.events import (
     DAMPING,
     GRAVITY,
@@ -25,34 +26,15 @@ from analysis.motion.events import (
     RELATIVE,
     RELEASE,
     SIGN,
-    SLIP_PHASE_MIN_RAD,
     START,
     STIFFNESS,
     TABLE,
     TABLE_MASS,
     TILT,
     VELOCITY,
-    advance,
-    after_slip,
-    doubled,
-    first_sign,
-    first_zero,
-    oscillation_amplitudes,
-    oscillation_derivative,
-    oscillator,
-    phase_limit,
-    stick_end,
-    table_peak_rates,
 )
 from analysis.motion.events import PARAMETER_COUNT as OWN
-from analysis.motion.sampling import (
-    BLOCK,
-    block_basis,
-    block_displacements,
-    block_rates,
-    phase_blocks,
-    rotation_tables,
-)
+from analysis.motion.sampling import BLOCK
 from analysis.motion.two_mass import MotionKernels
 
 Friction = Callable[[float, Floats], float]
@@ -177,7 +159,7 @@ def _may_have_stopped(sign: float, state: Floats, slopes: Floats, trial: Floats,
 def _append_node(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) -> Floats:
     """Write a node into row `count`; the array is doubled when full."""
     if count == len(nodes):
-        nodes = doubled(nodes)
+        nodes = events.doubled(nodes)
     row = nodes[count]
     row[NODE_TAU], row[NODE_TABLE], row[NODE_VELOCITY], row[NODE_SLIP] = tau, state[0], state[1], state[2]
     row[NODE_RELATIVE], row[NODE_ACCELERATION], row[NODE_SLIP_RATE] = state[3], slope[1], slope[2]
@@ -187,15 +169,15 @@ def _append_node(nodes: Floats, count: int, tau: float, state: Floats, slope: Fl
 @compiled_part
 def _pass_grazing_slip(parameters: Floats, state: Floats) -> float:
     """Carry `state` past the turning point of the joint acceleration that set off a slip without length."""
-    damping, frequency, _, _ = oscillator(parameters, 0.0)
-    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, state[0], state[1])
+    damping, frequency, _, _ = events.oscillator(parameters, 0.0)
+    _, _, cosine, sine = events.oscillation_amplitudes(damping, frequency, state[0], state[1])
     for _ in range(2):
-        cosine, sine = oscillation_derivative(damping, frequency, cosine, sine)
-    turn, _ = first_zero(frequency, cosine, sine)
-    tau = SLIP_PHASE_MIN_RAD / frequency
+        cosine, sine = events.oscillation_derivative(damping, frequency, cosine, sine)
+    turn, _ = events.first_zero(frequency, cosine, sine)
+    tau = events.SLIP_PHASE_MIN_RAD / frequency
     if 3.0 * turn < 1e-3 * math.pi / frequency:
         tau = max(tau, 3.0 * turn)
-    state[0], state[1], _ = advance(parameters, 0.0, state[0], state[1], tau)
+    state[0], state[1], _ = events.advance(parameters, 0.0, state[0], state[1], tau)
     return tau
 
 
@@ -203,8 +185,8 @@ def _slip(
     parameters: Floats, phase: Floats, longest: float, nodes: Floats, count: int, most: float
 ) -> tuple[Floats, int, bool]:
     """Append the nodes of a slip; return also whether it stopped within `longest` and `most` nodes."""
-    sign, frequency = phase[SIGN], oscillator(parameters, 1.0)[1]
-    longest_step, shortest_step = 0.1 / frequency, SLIP_PHASE_MIN_RAD / frequency
+    sign, frequency = phase[SIGN], events.oscillator(parameters, 1.0)[1]
+    longest_step, shortest_step = 0.1 / frequency, events.SLIP_PHASE_MIN_RAD / frequency
     state, trial, slopes = np.empty(4), np.empty(4), np.empty((7, 4))
     state[0], state[1], state[2], state[3] = phase[TABLE], phase[VELOCITY], 0.0, phase[RELATIVE]
     slope_in_slip(parameters, sign, state, slopes[0])
@@ -241,26 +223,26 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     """Phases and nodes of the motion until `duration_s` after release; see `IntegratedKernels`."""
     phases, nodes = np.empty((64, 6)), np.empty((4096, 7))
     count, node = 0, 0
-    time, sign = 0.0, first_sign(parameters)
+    time, sign = 0.0, events.first_sign(parameters)
     table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
-    most = phase_limit(parameters, duration_s)
+    most = events.phase_limit(parameters, duration_s)
     most_nodes = min(_NODES_A_PHASE * most, _MOST_NODES)
     while time < duration_s and not count >= most:
         if count == len(phases):
-            phases = doubled(phases)
+            phases = events.doubled(phases)
         row = phases[count]
         row[START], row[SIGN], row[FIRST_NODE] = time, sign, node
         row[TABLE], row[VELOCITY], row[RELATIVE] = table, velocity, relative
         if sign == 0.0:
-            tau, following = stick_end(parameters, table, velocity)
+            tau, following = events.stick_end(parameters, table, velocity)
             if time + tau < duration_s:
-                table, velocity, _ = advance(parameters, sign, table, velocity, tau)
+                table, velocity, _ = events.advance(parameters, sign, table, velocity, tau)
         else:
             nodes, node, stopped = _slip(parameters, row, duration_s - time, nodes, node, most_nodes)
             end = nodes[node - 1]
             tau, table, velocity = end[NODE_TAU], end[NODE_TABLE], end[NODE_VELOCITY]
             relative = end[NODE_RELATIVE]
-            following = after_slip(parameters, sign, table, velocity) if stopped else sign
+            following = events.after_slip(parameters, sign, table, velocity) if stopped else sign
         if tau != 0.0:  # a stick without length is no phase
             count += 1
         time = time + tau if sign == 0.0 or stopped else duration_s
@@ -325,8 +307,8 @@ def _nodes_end(phases: Floats, nodes: Floats, p: int) -> int:
 def sample(parameters: Floats, phases: Floats, nodes: Floats, times: Floats, channels: int) -> Floats:
     """Channels at sorted `times`, as `sampling.sample` gives them."""
     out = np.zeros((channels, len(times)))
-    tables, basis = rotation_tables(parameters, times), np.empty((2, BLOCK))
-    blocks = phase_blocks(parameters, phases, times)
+    tables, basis = sampling.rotation_tables(parameters, times), np.empty((2, BLOCK))
+    blocks = sampling.phase_blocks(parameters, phases, times)
     held = blocks[0, 0] if len(blocks) > 0 else len(times)
     for k in range(held):
         out[0, k] = parameters[PULLBACK]
@@ -336,11 +318,11 @@ def sample(parameters: Floats, phases: Floats, nodes: Floats, times: Floats, cha
         if phase[SIGN] != 0.0:
             _slip_block(parameters, phase, nodes, _nodes_end(phases, nodes, p), at, out, first)
             continue
-        block_basis(parameters, phase, at, tables, basis)
-        block_displacements(parameters, phase, at, basis, out[0][first:last], out[1][first:last])
+        sampling.block_basis(parameters, phase, at, tables, basis)
+        sampling.block_displacements(parameters, phase, at, basis, out[0][first:last], out[1][first:last])
         if channels == 6:
             rates = (out[2][first:last], out[3][first:last], out[4][first:last], out[5][first:last])
-            block_rates(parameters, phase, at, basis, rates)
+            sampling.block_rates(parameters, phase, at, basis, rates)
     return out
 
 
@@ -353,24 +335,16 @@ def peak_rates(
         if phases[p, SIGN] == 0.0:
             span = (phases[p + 1, START] if p + 1 < len(phases) else duration_s) - phases[p, START]
             table, velocity = phases[p, TABLE], phases[p, VELOCITY]
-            speed, acceleration = table_peak_rates(parameters, 0.0, table, velocity, span)
-            _raise(largest, speed, speed, acceleration, acceleration)
+            speed, acceleration = events.table_peak_rates(parameters, 0.0, table, velocity, span)
+            events.raise_largest(largest, speed, speed, acceleration, acceleration)
             continue
         for k in range(int(phases[p, FIRST_NODE]), _nodes_end(phases, nodes, p) - 1):
             for quarter in range(5):
                 tau = nodes[k, NODE_TAU] + 0.25 * quarter * (nodes[k + 1, NODE_TAU] - nodes[k, NODE_TAU])
                 _between(nodes, k, tau, state)
                 slope_in_slip(parameters, phases[p, SIGN], state, slope)
-                _raise(largest, state[1], state[1] + state[2], slope[1], slope[1] + slope[2])
+                events.raise_largest(largest, state[1], state[1] + state[2], slope[1], slope[1] + slope[2])
     return largest[0], largest[1], largest[2], largest[3]
-
-
-@compiled_part
-def _raise(largest: Floats, table: float, plate: float, table_rate: float, plate_rate: float) -> None:
-    largest[0] = max(largest[0], abs(table))
-    largest[1] = max(largest[1], abs(plate))
-    largest[2] = max(largest[2], abs(table_rate))
-    largest[3] = max(largest[3], abs(plate_rate))
 
 
 @compiled_part

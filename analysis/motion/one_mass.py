@@ -33,19 +33,10 @@ class OneMassDecay:
 
     def __post_init__(self) -> None:
         _check("period_s", self.period_s, self.period_s > 0.0, "above 0")
-        _check("damping_n_per_s", self.damping_n_per_s, self.damping_n_per_s >= 0.0, "0 or above")
-        _check(
-            "coulomb_displacement_m",
-            self.coulomb_displacement_m,
-            self.coulomb_displacement_m >= 0.0,
-            "0 or above",
-        )
+        for name in ("damping_n_per_s", "coulomb_displacement_m"):
+            _check(name, getattr(self, name), getattr(self, name) >= 0.0, "0 or above")
         _check("turning_s", self.turning_s, True, "")
         _check("turning_m", self.turning_m, True, "")
-
-    @property
-    def frequency_rad_per_s(self) -> float:
-        return math.hypot(2.0 * math.pi / self.period_s, self.damping_n_per_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +59,11 @@ def simulate(decay: OneMassDecay, time_s: Floats) -> OneMassMotion:
     which begins there.
     """
     time_s = np.asarray(time_s, dtype=np.float64)
-    omega = 2.0 * math.pi / decay.period_s
-    parameters = (
-        decay.turning_s,
-        decay.turning_m,
-        omega,
-        decay.damping_n_per_s,
-        decay.coulomb_displacement_m,
+    start = decay.turning_s, decay.turning_m, 2.0 * math.pi / decay.period_s
+    losses = decay.damping_n_per_s, decay.coulomb_displacement_m
+    displacement_m, velocity, acceleration = (
+        free_decay(time_s, *start, *losses, order=order) for order in range(3)
     )
-    displacement_m, velocity, acceleration = (free_decay(time_s, *parameters, order=r) for r in (0, 1, 2))
     last_s = float(time_s.max()) if time_s.size else decay.turning_s
     turning_s, turning_m, stopped = _turning_points(decay, last_s)
     stop_s = float(turning_s[-1]) if stopped else None

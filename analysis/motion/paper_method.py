@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-from analysis.motion.events import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
+from analysis.motion.events import (
+    PULLBACK,
+    oscillation_amplitudes,
+    oscillation_derivative,
+    oscillator,
+    raise_largest,
+)
 from analysis.motion.two_mass import Motion, MotionError, TwoMassParameters
 from messages.i18n import N_
 
@@ -152,16 +158,16 @@ def _integrate_steps(parameters: Floats, step: float, count: int) -> tuple[Float
     position, velocity, relative, plate = parameters[PULLBACK], 0.0, 0.0, 0.0
     _, _, load, drive = _mode(parameters, 1.0)
     slip, stick = _propagator(_mode(parameters, 1.0), step), _propagator(_mode(parameters, 0.0), step)
-    for k in range(count):
+    for k in range(count + 1):
         states[k, 0], states[k, 1], states[k, 2], states[k, 3] = position, velocity, relative, plate
+        if k == count:
+            break
         forward = plate + drive * step - (slip[2] * (position - load) + slip[3] * velocity)
         backward = plate - drive * step - (slip[2] * (position + load) + slip[3] * velocity)
         if forward * backward < 0.0:
             signs[k] = 0
-            position, velocity = (
-                stick[0] * position + stick[1] * velocity,
-                stick[2] * position + stick[3] * velocity,
-            )
+            x = position
+            position, velocity = stick[0] * x + stick[1] * velocity, stick[2] * x + stick[3] * velocity
             plate = velocity
             continue
         sign = 1.0 if abs(forward) < abs(backward) else -1.0
@@ -171,12 +177,6 @@ def _integrate_steps(parameters: Floats, step: float, count: int) -> tuple[Float
         relative += (plate + 0.5 * sign * drive * step) * step - (moved - position)
         position, velocity = moved, slip[2] * x + slip[3] * velocity
         plate += sign * drive * step
-    states[count, 0], states[count, 1], states[count, 2], states[count, 3] = (
-        position,
-        velocity,
-        relative,
-        plate,
-    )
     return states, signs
 
 
@@ -191,10 +191,7 @@ def _largest_rates(
         _, velocity, acceleration = _moved(mode, states[k, 0], states[k, 1], 0.0)
         plate = velocity if signs[k] == 0 else states[k, 3]
         plate_acceleration = acceleration if signs[k] == 0 else mode[3]
-        largest[0] = max(largest[0], abs(velocity))
-        largest[1] = max(largest[1], abs(plate))
-        largest[2] = max(largest[2], abs(acceleration))
-        largest[3] = max(largest[3], abs(plate_acceleration))
+        raise_largest(largest, velocity, plate, acceleration, plate_acceleration)
     return largest[0], largest[1], largest[2], largest[3]
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
+from analysis.motion import events
 from analysis.motion.events import (
     DAMPING,
     FRICTION_DYNAMIC,
@@ -23,10 +24,6 @@ from analysis.motion.events import (
     TABLE_MASS,
     TILT,
     VELOCITY,
-    oscillation_amplitudes,
-    oscillation_derivative,
-    oscillator,
-    static_limit,
 )
 
 BLOCK = 256
@@ -110,7 +107,7 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
         return np.empty((0, 2, BLOCK))
     tables = np.empty((2, 2, BLOCK))
     for slips in range(2):
-        damping, frequency, _, _ = oscillator(parameters, float(slips))
+        damping, frequency, _, _ = events.oscillator(parameters, float(slips))
         _fill_rotation(tables[slips], damping, frequency, step)
     return tables
 
@@ -152,7 +149,7 @@ def _uneven_basis(
 @compiled_part
 def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats, basis: Floats) -> None:
     """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau of a block into `basis`, (2, BLOCK)."""
-    damping, frequency, _, _ = oscillator(parameters, phase[SIGN])
+    damping, frequency, _, _ = events.oscillator(parameters, phase[SIGN])
     start = phase[START] + parameters[RELEASE]
     cosines, sines = basis[0], basis[1]
     if len(tables) == 0:
@@ -172,8 +169,8 @@ def block_displacements(
 ) -> None:
     """Write u1 and u2 - u1 of a block."""
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillator(parameters, sign)
-    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = events.oscillator(parameters, sign)
+    cosine, sine, _, _ = events.oscillation_amplitudes(damping, frequency, position - load, velocity)
     cosines, sines = basis[0], basis[1]
     for k in range(len(times)):
         table[k] = load + (cosine * cosines[k] + sine * sines[k])
@@ -193,9 +190,9 @@ def block_rates(
 ) -> None:
     """Write u1', u2', u1'', u2'' of a block."""
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillator(parameters, sign)
-    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
-    second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
+    damping, frequency, load, drive = events.oscillator(parameters, sign)
+    _, _, cosine, sine = events.oscillation_amplitudes(damping, frequency, position - load, velocity)
+    second_cosine, second_sine = events.oscillation_derivative(damping, frequency, cosine, sine)
     start = phase[START] + parameters[RELEASE]
     table, plate, table_second, plate_second = rates
     cosines, sines = basis[0], basis[1]
@@ -246,7 +243,7 @@ Response = tuple[float, float, float, float, float, float]
 @compiled_part
 def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change of what `oscillator` returns: n, w, u_e and the plate's acceleration."""
-    damping, frequency, load, drive = oscillator(parameters, sign)
+    damping, frequency, load, drive = events.oscillator(parameters, sign)
     mass, d_mass = parameters[TABLE_MASS], direction[TABLE_MASS]
     d_load, d_drive = 0.0, 0.0
     if sign == 0.0:
@@ -265,7 +262,8 @@ def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> C
 def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Response:
     damping, frequency, load = mode[0], mode[1], mode[2]
     d_damping, d_frequency, d_load, d_drive = d_mode[0], d_mode[1], d_mode[2], d_mode[3]
-    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, phase[TABLE] - load, phase[VELOCITY])
+    position, velocity = phase[TABLE] - load, phase[VELOCITY]
+    cosine, sine, _, _ = events.oscillation_amplitudes(damping, frequency, position, velocity)
     pc = change[0] - d_load
     ps = (change[1] + d_damping * cosine + damping * pc - sine * d_frequency) / frequency
     qc, qs = d_frequency * sine - d_damping * cosine, -d_frequency * cosine - d_damping * sine
@@ -275,9 +273,9 @@ def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Re
 @compiled_part
 def _released(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change just after a release that comes later by direction[RELEASE]."""
-    damping, frequency, load, drive = oscillator(parameters, sign)
-    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, parameters[PULLBACK] - load, 0.0)
-    acceleration, _ = oscillation_derivative(damping, frequency, cosine, sine)
+    damping, frequency, load, drive = events.oscillator(parameters, sign)
+    _, _, cosine, sine = events.oscillation_amplitudes(damping, frequency, parameters[PULLBACK] - load, 0.0)
+    acceleration, _ = events.oscillation_derivative(damping, frequency, cosine, sine)
     plate = drive if sign != 0.0 else acceleration
     late = direction[RELEASE]
     return direction[PULLBACK], -acceleration * late, -plate * late, 0.0
@@ -291,7 +289,7 @@ def _at_end(
     d_load, d_drive, pc, ps, qc, qs = response
     tau, cos, sin = end
     cosine, sine = pc + qc * tau, ps + qs * tau
-    rate_cosine, rate_sine = oscillation_derivative(mode[0], mode[1], cosine, sine)
+    rate_cosine, rate_sine = events.oscillation_derivative(mode[0], mode[1], cosine, sine)
     table = d_load + (cosine * cos + sine * sin)
     velocity = (rate_cosine + qc) * cos + (rate_sine + qs) * sin
     if joint:
@@ -304,7 +302,7 @@ def _at_end(
 @compiled_part
 def _reversal_delay(parameters: Floats, state: Floats, sign: float, change: Change) -> float:
     """How much later a slip with `sign` ends in `state`."""
-    _, _, _, drive = oscillator(parameters, sign)
+    _, _, _, drive = events.oscillator(parameters, sign)
     force = parameters[PLATE_MASS] * drive + parameters[DAMPING] * state[VELOCITY]
     acceleration = -(force + parameters[STIFFNESS] * state[TABLE]) / parameters[TABLE_MASS]
     gap = drive - acceleration
@@ -340,7 +338,7 @@ def _after_event(
         return change[0], velocity, velocity, change[3]
     dynamic = parameters[GRAVITY] * parameters[FRICTION_DYNAMIC]
     if before[SIGN] == 0.0:
-        drop = after[SIGN] * (static_limit(parameters) - dynamic)
+        drop = after[SIGN] * (events.static_limit(parameters) - dynamic)
         if drop == 0.0:
             return change
         delay = _breakaway_delay(parameters, direction, after, change)
@@ -357,7 +355,7 @@ def _modes(parameters: Floats, directions: Floats) -> tuple[Floats, Floats]:
     """Return `oscillator` for the signs -1, 0, 1, (3, 4), and its changes, (q, 3, 4)."""
     modes, d_modes = np.empty((3, 4)), np.empty((len(directions), 3, 4))
     for k in range(3):
-        modes[k, 0], modes[k, 1], modes[k, 2], modes[k, 3] = oscillator(parameters, k - 1.0)
+        modes[k, 0], modes[k, 1], modes[k, 2], modes[k, 3] = events.oscillator(parameters, k - 1.0)
         for d in range(len(directions)):
             change = _oscillation_change(parameters, directions[d], k - 1.0)
             for column in range(4):

@@ -220,16 +220,9 @@ class TwoMassParameters:
         **others: Any,
     ) -> Self:
         """Parameters with c and mu from the decay of the joint motion (see `stiffness_and_damping`)."""
-        stiffness, damping = stiffness_and_damping(
-            period_s, damping_n1_per_s, table_mass_kg=table_mass_kg, plate_mass_kg=plate_mass_kg
-        )
-        return cls(
-            table_mass_kg=table_mass_kg,
-            plate_mass_kg=plate_mass_kg,
-            stiffness_n_per_m=stiffness,
-            damping_coefficient_kg_per_s=damping,
-            **others,
-        )
+        masses = {"table_mass_kg": table_mass_kg, "plate_mass_kg": plate_mass_kg}
+        stiffness, damping = stiffness_and_damping(period_s, damping_n1_per_s, **masses)
+        return cls(stiffness_n_per_m=stiffness, damping_coefficient_kg_per_s=damping, **masses, **others)
 
     @classmethod
     def from_fit(cls, fitted: Mapping[str, float], **changes: float) -> Self:

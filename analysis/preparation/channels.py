@@ -1,6 +1,7 @@
 """Readings of the gauges: invalid ones left out; noise, drift and mains hum measured."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from analysis.record import Record, RecordError, StandMasses
 from messages.i18n import N_
 from messages.message import Message, message
 
+_Time = TypeVar("_Time", float, Floats)
 DELAY_MAX_S = 0.5  # a gauge later than this is not read in the same test
 SAMPLES_MIN = 50  # with fewer readings a decay cannot be distinguished from noise or drift
 
@@ -51,7 +53,7 @@ class Channels:
         """Time in the base of `Record.time_s`."""
         return self.origin_s + time_s / self.clock_scale
 
-    def from_record_time(self, time_s: Floats) -> Floats:
+    def from_record_time(self, time_s: _Time) -> _Time:
         """True seconds since the first sample, of times in the base of `Record.time_s`."""
         return (time_s - self.origin_s) * self.clock_scale
 

@@ -6,6 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from analysis.averaging import block_means
+from analysis.preparation import oscillation
 from analysis.preparation.channels import (
     NOISE_FLOOR_M,
     Channel,
@@ -23,19 +24,7 @@ from analysis.preparation.channels import (
     remove_invalid_readings,
     third_difference_noise,
 )
-from analysis.preparation.oscillation import (
-    DampedCosine,
-    Release,
-    check_rate,
-    check_span,
-    estimate_period,
-    find_last_slip,
-    find_releases,
-    fit_damped_cosine,
-    local_slopes,
-    median_of_three,
-    white_noise,
-)
+from analysis.preparation.oscillation import DampedCosine, Release
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record
 from messages.i18n import N_
@@ -104,7 +93,7 @@ def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_
     count = max(1, len(t) // _MEANS)
     whole = len(late) // count * count  # means, so that noise does not pass for motion
     left = block_means((late.value_m - columns @ found)[:whole], count)
-    noise = np.hypot(white_noise(table), white_noise(relative)) / np.sqrt(count)
+    noise = np.hypot(oscillation.white_noise(table), oscillation.white_noise(relative)) / np.sqrt(count)
     slope = round(float(found[0]))
     clear = abs(slope) <= 1 and abs(found[0] - slope) < _SURE
     return slope if clear and left.std() < _UNEXPLAINED * u1.std() + _NOISE_SIGMAS * noise else None
@@ -115,11 +104,11 @@ def _leads(table: Channel, relative: Channel, release_s: float, period_s: float)
 
     False, too, where it has no readings in them that would tell.
     """
-    slip = median_of_three(relative.between(release_s, release_s + 3.0 * period_s))
+    slip = oscillation.median_of_three(relative.between(release_s, release_s + 3.0 * period_s))
     if len(slip) < _LINE_READINGS:
         return False
-    v1 = np.interp(slip.time_s, table.time_s, local_slopes(table, period_s / 24.0))
-    w = local_slopes(slip, period_s / 24.0)
+    v1 = np.interp(slip.time_s, table.time_s, oscillation.local_slopes(table, period_s / 24.0))
+    w = oscillation.local_slopes(slip, period_s / 24.0)
     return float(w @ v1) > _AGAINST * float(np.sqrt((w @ w) * (v1 @ v1)))
 
 
@@ -170,12 +159,13 @@ class _Stretch:
     @property
     def hold_end_s(self) -> float:
         """A time shortly before the release."""
-        return _hold_end(self.release, self.channels)
+        return self.release.time_s - max(_RELEASE_MARGIN_S, 2.0 * self.channels.interval_s)
 
     @property
     def plateau(self) -> tuple[float, float] | None:
         """First and last time of the hold, where the record has it."""
-        return _plateau(self.release, self.channels)
+        start_s, end_s = self.release.plateau_start_s, self.hold_end_s
+        return None if start_s is None or start_s >= end_s else (start_s, end_s)
 
     def plateau_of(self, channel: Channel) -> Channel | None:
         """Readings of the hold."""
@@ -223,7 +213,7 @@ def prepare(record: Record) -> FreeDecay:
     """
     warnings: list[ResultWarning] = []
     channels = _valid_channels(record, warnings)
-    release = _choose_release(find_releases(channels.table), warnings)
+    release = _choose_release(oscillation.find_releases(channels.table), warnings)
     stretch, period_s = _oriented_stretch(channels, release, record.gauge_2_measures_plate, warnings)
     if stretch.relative is None:
         slip, drift, table_drift = _slip_by_table_alone(stretch, period_s), 0.0, 0.0
@@ -259,16 +249,7 @@ def fit_tail(table: Channel, start_s: float | None, period_s: float) -> DampedCo
         return None
     tail = table.between(start_s, np.inf)
     length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
-    return fit_damped_cosine(tail, period_s) if length_s >= TAIL_PERIODS_MIN * period_s else None
-
-
-def _hold_end(release: Release, channels: Channels) -> float:
-    return release.time_s - max(_RELEASE_MARGIN_S, 2.0 * channels.interval_s)
-
-
-def _plateau(release: Release, channels: Channels) -> tuple[float, float] | None:
-    start_s, end_s = release.plateau_start_s, _hold_end(release, channels)
-    return None if start_s is None or start_s >= end_s else (start_s, end_s)
+    return oscillation.fit_damped_cosine(tail, period_s) if length_s >= TAIL_PERIODS_MIN * period_s else None
 
 
 def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
@@ -278,8 +259,8 @@ def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
     if record.relative_displacement_m is None:
         template = N_("the record has no gauge 2. The friction comes from the table channel alone.")
         warnings.append(result_warning("gauge-2-absent", template))
-    check_span(channels.table)
-    check_rate(channels.table)
+    oscillation.check_span(channels.table)
+    oscillation.check_rate(channels.table)
     table, relative = remove_invalid_readings(channels.table, 1, warnings), channels.relative
     if relative is not None:
         relative = _if_mostly_valid(relative, remove_invalid_readings(relative, 2, warnings), warnings)
@@ -329,21 +310,25 @@ def _oriented_stretch(
     begin_s = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     end_s = release.end_s + 1e-9
     table = channels.table.between(begin_s, end_s)
-    period_s = estimate_period(table, release)
+    period_s = oscillation.estimate_period(table, release)
     first = table.between(release.time_s, release.time_s + 0.5 * period_s).value_m
-    sign = -1 if _plateau(release, channels) is not None and first[0] < first[-1] else 1
+    stretch = _Stretch(channels, table, None, measures_plate, 1, 1, release)
+    sign = -1 if stretch.plateau is not None and first[0] < first[-1] else 1
     if sign < 0:
         text = message(
             "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
         )
         warnings.append(ResultWarning("pullback-negative", text))
-    table, turned = table.scaled(sign), replace(release, level_m=sign * release.level_m)
+    turned = replace(release, level_m=sign * release.level_m)
+    stretch = replace(stretch, table=table.scaled(sign), sign=sign, relative_sign=sign, release=turned)
     if channels.relative is None:
-        return _Stretch(channels, table, None, measures_plate, sign, sign, turned), period_s
+        return stretch, period_s
     relative = channels.relative.between(begin_s, end_s).scaled(sign)
     timing = release.time_s, period_s
-    absolute, turn = _detect_mounting(table, relative, timing, measures_plate, warnings)
-    return _Stretch(channels, table, relative.scaled(turn), absolute, sign, sign * turn, turned), period_s
+    absolute, turn = _detect_mounting(stretch.table, relative, timing, measures_plate, warnings)
+    relative = relative.scaled(turn)
+    stretch = replace(stretch, relative=relative, gauge_2_absolute=absolute, relative_sign=sign * turn)
+    return stretch, period_s
 
 
 def _slip_by_gauge_2(
@@ -360,7 +345,7 @@ def _slip_by_gauge_2(
     noise = max(noise, NOISE_FLOOR_M)
     end_s, tail = None, None
     for _ in range(2):  # the second time with the period of the tail
-        end_s = find_last_slip(slip, release_s, period_s, noise)
+        end_s = oscillation.find_last_slip(slip, release_s, period_s, noise)
         tail = fit_tail(stretch.table, end_s, period_s)
         period_s = period_s if tail is None else tail.period_s
     occurs = end_s is None or end_s > release_s

@@ -283,11 +283,8 @@ def friction_objective(problem: FitProblem, fit: Fit) -> Callable[[Floats], Floa
     """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted."""
 
     def objective(friction_dynamic: Floats) -> Floats:
-        costs = []
-        for friction in np.asarray(friction_dynamic, dtype=np.float64):
-            first, second = problem.residuals(_with_friction(fit, float(friction)), fit.law)
-            costs.append(first @ first / problem.noise_m[0] ** 2 + second @ second / problem.noise_m[1] ** 2)
-        return np.array(costs)
+        points = [_with_friction(fit, friction) for friction in friction_dynamic.tolist()]
+        return np.array([problem.chi_square(point, fit.law) for point in points])
 
     return objective
 
