@@ -249,8 +249,7 @@ def _bound_friction(point: Floats, has_static_friction: bool, has_tilt: bool) ->
 
 _ANGULAR_MIN, _ANGULAR_MAX = 2.0 * math.pi / (3.0 * PERIOD_MAX_S), 2.0 * math.pi * 3.0 / PERIOD_MIN_S
 """Of the joint motion (rad/s): a fit may pass the limits of plausible stands by three times."""
-_DAMPING_RATIO_MAX = 0.5
-"""A table damped more than half critically hardly oscillates: it is no stand."""
+_DAMPING_RATIO_MAX = 0.5  # a table damped more than half critically hardly oscillates: it is no stand
 _STIFFNESS, _DAMPING, _PULLBACK = int(Parameter.STIFFNESS), int(Parameter.DAMPING), int(Parameter.PULLBACK)
 _TABLE_MASS, _PLATE_MASS = int(Parameter.TABLE_MASS), int(Parameter.PLATE_MASS)
 

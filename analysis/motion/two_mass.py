@@ -262,16 +262,14 @@ def stiffness_and_damping(
 
 
 def _check(parameters: TwoMassParameters) -> None:
-    positive = ("table_mass_kg", "plate_mass_kg", "stiffness_n_per_m", "gravity_m_per_s2")
-    for name in positive:
-        if not 0.0 < getattr(parameters, name) < math.inf:
-            raise MotionError(
-                "{name} is {value:g}: give a positive number", name=name, value=getattr(parameters, name)
-            )
+    for name in ("table_mass_kg", "plate_mass_kg", "stiffness_n_per_m", "gravity_m_per_s2"):
+        value = getattr(parameters, name)
+        if not 0.0 < value < math.inf:
+            raise MotionError("{name} is {value:g}: give a positive number", name=name, value=value)
     for name in ("damping_coefficient_kg_per_s", "friction_dynamic"):
-        if not 0.0 <= getattr(parameters, name) < math.inf:
-            template = N_("{name} is {value:g}: give zero or a positive number")
-            raise MotionError(template, name=name, value=getattr(parameters, name))
+        value = getattr(parameters, name)
+        if not 0.0 <= value < math.inf:
+            raise MotionError("{name} is {value:g}: give zero or a positive number", name=name, value=value)
     if not math.isfinite(parameters.pullback_m):
         raise MotionError(
             "pullback_m is {pullback_m:g}: give a finite number of metres", pullback_m=parameters.pullback_m
