@@ -23,8 +23,8 @@ from analysis.laws.parameters import (
 )
 from analysis.motion.events import DURATION_MIN_S, integrate_events
 from analysis.motion.integration import Friction, IntegratedKernels, integrated_kernels
-from analysis.motion.sampling import phase_responses
-from analysis.motion.two_mass import EXACT, Motion, MotionKernels, TwoMassParameters, simulate_kernels
+from analysis.motion.sampling import EXACT, MotionKernels, phase_responses
+from analysis.motion.two_mass import Motion, TwoMassParameters, simulate_kernels
 
 Gauge = tuple[Floats, Floats, int, float]
 """Times, readings (m), which gauge (see `closed_form`) and standard deviation of the noise (m)."""

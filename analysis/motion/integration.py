@@ -34,8 +34,7 @@ from analysis.motion.events import (
     VELOCITY,
 )
 from analysis.motion.events import PARAMETER_COUNT as OWN
-from analysis.motion.sampling import BLOCK
-from analysis.motion.two_mass import MotionKernels
+from analysis.motion.sampling import BLOCK, MotionKernels
 
 Friction = Callable[[float, Floats], float]
 """Compiled: coefficient of friction at a sliding speed (m/s) with the parameters of `MotionKernels`."""

@@ -1,6 +1,8 @@
 """Displacements of the motion at any times, and their exact derivatives for least squares."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -387,3 +389,32 @@ def phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> F
                 row = out[d, p + 1]
                 row[0], row[1], row[2], row[3] = change
     return out
+
+
+@dataclass(frozen=True)
+class MotionKernels:
+    """Compiled functions of the motion with one friction law; all run without the interpreter lock.
+
+    `parameters` are the ten of `analysis.motion.events`, then those of the law's own.
+    """
+
+    integrate: Callable[[Floats, float], tuple[Floats, ...]]
+    """(parameters, duration_s) -> state: phases (m, 5 at least) as `integrate_events` gives them, and what
+    else tells the motion within them."""
+    sample: Callable[..., Floats]
+    """(parameters, *state, times, channels) -> (channels, n) as `sampling.sample` gives them; times rise."""
+    peak_rates: Callable[..., tuple[float, float, float, float]]
+    """(parameters, *state, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|."""
+
+    def final_relative(self, parameters: Floats, state: tuple[Floats, ...], duration_s: float) -> float:
+        """u2 - u1 at `duration_s` after release (m)."""
+        end_s = np.array([parameters[events.RELEASE] + duration_s])
+        return float(self.sample(parameters, *state, end_s, 2)[1, 0])
+
+
+def _integrate_exactly(parameters: Floats, duration_s: float) -> tuple[Floats]:
+    return (events.integrate_events(parameters, duration_s),)
+
+
+EXACT = MotionKernels(_integrate_exactly, sample, events.peak_rates)
+"""Coulomb friction in closed form: sampled at any time without interpolation."""

@@ -8,7 +8,7 @@ rounding can resolve.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
-from analysis.motion.events import RELEASE, SIGN, START, integrate_events, peak_rates
-from analysis.motion.sampling import out_of_order, sample
+from analysis.motion.events import SIGN, START
+from analysis.motion.sampling import EXACT, MotionKernels, out_of_order
 from analysis.record import AnalysisError
 from messages.i18n import N_
 
@@ -123,35 +123,6 @@ def rising_times(
         template = N_("time {time_s:g} s is after the simulated {duration_s:g} s: simulate longer")
         raise MotionError(template, time_s=times[-1], duration_s=duration_s)
     return times, back
-
-
-@dataclass(frozen=True)
-class MotionKernels:
-    """Compiled functions of the motion with one friction law; all run without the interpreter lock.
-
-    `parameters` are the ten of `analysis.motion.events`, then those of the law's own.
-    """
-
-    integrate: Callable[[Floats, float], tuple[Floats, ...]]
-    """(parameters, duration_s) -> state: phases (m, 5 at least) as `integrate_events` gives them, and what
-    else tells the motion within them."""
-    sample: Callable[..., Floats]
-    """(parameters, *state, times, channels) -> (channels, n) as `sampling.sample` gives them; times rise."""
-    peak_rates: Callable[..., tuple[float, float, float, float]]
-    """(parameters, *state, duration_s) -> largest |u1'|, |u2'|, |u1''|, |u2''|."""
-
-    def final_relative(self, parameters: Floats, state: tuple[Floats, ...], duration_s: float) -> float:
-        """u2 - u1 at `duration_s` after release (m)."""
-        end_s = np.array([parameters[RELEASE] + duration_s])
-        return float(self.sample(parameters, *state, end_s, 2)[1, 0])
-
-
-def _integrate_exactly(parameters: Floats, duration_s: float) -> tuple[Floats]:
-    return (integrate_events(parameters, duration_s),)
-
-
-EXACT = MotionKernels(_integrate_exactly, sample, peak_rates)
-"""Coulomb friction in closed form: sampled at any time without interpolation."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from analysis.averaging import block_means
 from analysis.preparation import oscillation
 from analysis.preparation.channels import (
     NOISE_FLOOR_M,
@@ -92,7 +91,7 @@ def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_
     found = np.linalg.lstsq(columns, late.value_m, rcond=None)[0]
     count = max(1, len(t) // _MEANS)
     whole = len(late) // count * count  # means, so that noise does not pass for motion
-    left = block_means((late.value_m - columns @ found)[:whole], count)
+    left = (late.value_m - columns @ found)[:whole].reshape(-1, count).mean(axis=1)
     noise = np.hypot(oscillation.white_noise(table), oscillation.white_noise(relative)) / np.sqrt(count)
     slope = round(float(found[0]))
     clear = abs(slope) <= 1 and abs(found[0] - slope) < _SURE
