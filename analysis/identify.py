@@ -111,7 +111,7 @@ def identify(
     drawn = None
     if monte_carlo is not None:
         drawn = _check_by_monte_carlo(joint, constants, budget, monte_carlo, report)
-    delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
+    delays_s = record.table_gauge.lateness_s, record.relative_gauge.lateness_s
     report(1.0, "done")
     return Identification(
         "two-mass",

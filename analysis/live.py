@@ -223,7 +223,7 @@ def extend_decay(decay: FreeDecay, record: Record) -> FreeDecay | None:
 
 def _newer(channel: Channel, record: Record, value_m: Floats, gauge: GaugeUncertainty) -> Channel:
     """Readings after the last one of `channel`, on its time."""
-    time_s = (record.time_s - record.time_s[0]) * record.clock_scale - gauge.delay_s
+    time_s = (record.time_s - record.time_s[0]) * record.clock_scale - gauge.lateness_s
     within = np.isfinite(value_m) & (time_s > channel.time_s[-1])
     if gauge.range_m is not None:
         within &= ~(np.abs(value_m) >= gauge.range_m)

@@ -1,7 +1,7 @@
 """What an analysis takes: one pullback test as arrays, with what is known about the stand and gauges."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,43 @@ class RecordError(AnalysisError, ValueError):
     """A record that cannot be analysed as it stands."""
 
 
+_BESSEL_CORNERS = (1.0, 1.36165, 1.75567, 2.11392, 2.42741, 2.70340, 2.95172, 3.17962)
+"""-3 dB frequencies (rad/s) of the Bessel filters of order 1 to 8 whose delay is 1 s; scipy.signal.bessel."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeFilter:
+    """Low-pass filter between a gauge and its readings."""
+
+    kind: Literal["rc", "butterworth", "bessel", "sinc"]
+    """`rc`: `order` equal stages; `sinc`: `order` moving averages, each over the same window."""
+    order: int
+    corner_hz: float  # frequency at which the amplitude has fallen by 3 dB
+    corner_relative_uncertainty: float = 0.0
+
+    @property
+    def delay_s(self) -> float:
+        """Group delay at low frequency (s)."""
+        order, corner = self.order, 2.0 * np.pi * self.corner_hz
+        match self.kind:
+            case "rc":
+                return float(order * np.sqrt(2.0 ** (1.0 / order) - 1.0) / corner)
+            case "butterworth":
+                return float(1.0 / np.sin(0.5 * np.pi / order) / corner)
+            case "bessel":
+                return _BESSEL_CORNERS[order - 1] / corner
+        return float(0.5 * order * _sinc_corner(order) / self.corner_hz)
+
+
+def _sinc_corner(order: int) -> float:
+    """Frequency times window at which sinc^order has fallen by 3 dB, by Newton's method."""
+    share = 2.0 ** (-0.5 / order)
+    x = np.sqrt(6.0 * (1.0 - share))  # of sin(x) / x = 1 - x^2 / 6
+    for _ in range(6):
+        x -= (np.sin(x) / x - share) / ((np.cos(x) - np.sin(x) / x) / x)
+    return float(x / np.pi)
+
+
 @dataclass(frozen=True, slots=True)
 class GaugeUncertainty:
     """What is known of one gauge beyond its readings; None means "not stated"."""
@@ -29,6 +66,19 @@ class GaugeUncertainty:
     standard uncertainty (s)."""
     delay_s_uncertainty: float = 0.0
     range_m: float | None = None  # readings beyond +-range_m are clipped (m)
+    filter: GaugeFilter | None = None  # None where none is stated; its delay comes on top of `delay_s`
+
+    @property
+    def lateness_s(self) -> float:
+        """Stated delay and that of the filter (s)."""
+        return self.delay_s + (self.filter.delay_s if self.filter else 0.0)
+
+    @property
+    def lateness_s_uncertainty(self) -> float:
+        """Standard uncertainty of the lateness (s)."""
+        known = self.filter
+        share_s = known.corner_relative_uncertainty * known.delay_s if known else 0.0
+        return float(np.hypot(self.delay_s_uncertainty, share_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ class Refitter:
     def __init__(self, record: Record) -> None:
         self._decay = prepare(record)
         self._problem = build_problem(record, self._decay)
-        self._delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
+        self._delays_s = record.table_gauge.lateness_s, record.relative_gauge.lateness_s
 
     def refit(
         self, start: Mapping[str, float], *, model: str, hold: str | None = None, steps_max: int = 12

@@ -75,7 +75,7 @@ def save_calibration(
             if value is None or (value == field.default and field.name not in section):
                 section.pop(field.name, None)  # a default needs no line
             else:
-                section[field.name] = list(value) if isinstance(value, tuple) else value
+                section[field.name] = _toml_value(value)
     text = tomlkit.dumps(document)
     if path is None:
         return _write_dated(f"gauges-{day.isoformat()}", text)
@@ -86,6 +86,16 @@ def save_calibration(
             template = N_("{path} exists already and is not overwritten. Choose another name")
             raise ConfigError(template, path=path) from None
     return path
+
+
+def _toml_value(value: Any) -> Any:
+    if isinstance(value, schema.Filter):
+        import tomlkit  # only needed to write
+
+        table = tomlkit.inline_table()
+        table.update({name: part for name, part in msgspec.structs.asdict(value).items() if part is not None})
+        return table
+    return list(value) if isinstance(value, tuple) else value
 
 
 def activate_calibration(path: Path, day: datetime.date) -> Path | None:

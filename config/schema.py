@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import msgspec
 
 from messages.i18n import N_
-from messages.message import MessageError
+from messages.message import Message, MessageError, message
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,8 @@ _MAX_POLYNOMIAL_TERMS = 2  # terms of a gauge's polynomial beyond the line: of d
 _NEWTON_STEPS = 8  # enough for bends of a tenth of the range
 SCALE_MIN, SCALE_MAX = 1.0, 2.0
 """How much larger than the system's scaling the window may be."""
+FILTER_ORDER_MAX = 8  # anti-aliasing filters of amplifiers have 2 to 8
+_FILTER_NAMES = {"rc": "RC", "butterworth": "Butterworth", "bessel": "Bessel", "sinc": "sinc"}
 _MAX_PIXELS = 100_000  # more than any wall of screens has; larger numbers come from a damaged file
 
 
@@ -118,6 +120,36 @@ class Series(_Checked, frozen=True):
     plate_mass_kg: float
 
 
+class Filter(_Checked, frozen=True):
+    """Low-pass filter of an amplifier or converter; `none` states that there is none.
+
+    `rc` is `order` equal stages, `sinc` is `order` moving averages over one window each. The corner is where
+    the amplitude has fallen by 3 dB.
+    """
+
+    kind: Literal["none", "rc", "butterworth", "bessel", "sinc"]
+    order: int = 1
+    corner_hz: float | None = None
+    corner_relative_standard_uncertainty: float = 0.05
+    """The usual components are within 10 %, rectangular."""
+
+    def __post_init__(self) -> None:
+        self._check(_POSITIVE, "corner_hz")
+        self._check(_NOT_NEGATIVE, "corner_relative_standard_uncertainty")
+        if not 1 <= self.order <= FILTER_ORDER_MAX:
+            raise ValueError(f"order = {self.order} must be from 1 to {FILTER_ORDER_MAX}")
+        if (self.kind == "none") != (self.corner_hz is None):
+            raise ValueError(f"corner_hz = {self.corner_hz} and kind = {self.kind!r}: a filter has a corner")
+
+    @property
+    def description(self) -> Message:
+        """Kind, order and corner in words."""
+        if self.corner_hz is None:
+            return message("none")
+        template = N_("{kind}, order {order}, {corner_hz:g} Hz")
+        return message(template, kind=_FILTER_NAMES[self.kind], order=self.order, corner_hz=self.corner_hz)
+
+
 class Gauge(_Checked, frozen=True):
     """Calibration of one strain gauge: displacement = x + p1 x^2 + p2 x^3 with x = gain * (count - zero).
 
@@ -147,6 +179,8 @@ class Gauge(_Checked, frozen=True):
     certificate: str = ""
     """Of the reference."""
     calibrated_by: str = ""
+    filter: Filter | None = None
+    """What `delay_s` does not include."""
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.gain_m_per_count) or self.gain_m_per_count == 0.0:

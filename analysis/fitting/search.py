@@ -396,8 +396,8 @@ def build_problem_from_channels(
         deviation[Parameter.RELATIVE_GAIN] = gain_uncertainty(
             record.relative_gauge, range_m(relative.value_m)
         )
-        delays = record.table_gauge.delay_s_uncertainty, record.relative_gauge.delay_s_uncertainty
-        deviation[Parameter.LAG] = float(np.hypot(*delays))
+        late_u_s = record.table_gauge.lateness_s_uncertainty, record.relative_gauge.lateness_s_uncertainty
+        deviation[Parameter.LAG] = float(np.hypot(*late_u_s))
     earliest_s = float(table.time_s[0]) - 2.0 * EARLIEST_PERIODS * period_s
     return FitProblem(table, relative, noise_m, mean, deviation, absolute, earliest_s)
 

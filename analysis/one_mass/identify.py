@@ -161,7 +161,7 @@ def _identification(
             _COULOMB: parameters.coulomb,
             "offset": parameters.offset,
         },
-        _curves(channels, solution.fit, record.table_gauge.delay_s),
+        _curves(channels, solution.fit, record.table_gauge.lateness_s),
     )
 
 

@@ -73,7 +73,7 @@ def read_channels(record: Record) -> tuple[Channels, list[ResultWarning]]:
         record.table_displacement_m, record.table_overload, record.table_gauge.range_m, gauge=1
     )
     table = Channel(
-        time_s[table_valid] - record.table_gauge.delay_s,
+        time_s[table_valid] - record.table_gauge.lateness_s,
         record.table_displacement_m[table_valid].astype(np.float64),
     )
     relative = None
@@ -192,7 +192,7 @@ def _relative(
         template = N_("{error} The friction comes from the table channel alone.")
         warnings.append(result_warning("gauge-2-absent", template, error=error))
         return None
-    return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))
+    return Channel(time_s[valid] - gauge.lateness_s, value_m[valid].astype(np.float64))
 
 
 _SPIKE_SIGMAS = 9.0

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.record import GaugeUncertainty, Record, StandMasses
+from analysis.record import GaugeFilter, GaugeUncertainty, Record, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.metadata import RunMetadata
-from config.schema import Gauge
+from config.schema import Filter, Gauge
 from drivers.clock import TimeBase
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 from messages.i18n import N_
@@ -99,7 +99,15 @@ def gauge_uncertainty(gauge: Gauge) -> GaugeUncertainty:
         delay_s=gauge.delay_s,
         delay_s_uncertainty=gauge.delay_standard_uncertainty_s,
         range_m=gauge.range_m,
+        filter=_filter(gauge.filter),
     )
+
+
+def _filter(stated: Filter | None) -> GaugeFilter | None:
+    if stated is None or stated.kind == "none" or stated.corner_hz is None:
+        return None
+    share = stated.corner_relative_standard_uncertainty
+    return GaugeFilter(stated.kind, stated.order, stated.corner_hz, share)
 
 
 def _masses(metadata: RunMetadata) -> StandMasses:

@@ -135,7 +135,7 @@ def _write(group: h5py.Group, path: str, kind: Kind, content: Any, unit: str) ->
     elif kind in (Kind.NUMBER, Kind.INTEGER):
         write_number(group, path, content, unit)
     elif kind is Kind.JSON:
-        write_text(group, path, msgspec.json.encode(content).decode())
+        write_text(group, path, "" if content is None else msgspec.json.encode(content).decode())
     elif kind is Kind.PASS_FAIL:
         write_text(group, path, _PASSED if content else _FAILED)
     else:

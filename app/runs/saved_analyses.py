@@ -208,5 +208,5 @@ _ABOUT = (
 
 def _calibration(gauge: Gauge) -> list[object]:
     """What a gauge says of readings; who calibrated it, and until when it holds, changes no number."""
-    about = _ABOUT if gauge.polynomial else (*_ABOUT, "polynomial")
-    return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in about]
+    absent = [name for name in ("polynomial", "filter") if not getattr(gauge, name)]
+    return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in (*_ABOUT, *absent)]

@@ -250,6 +250,10 @@ GAUGE_FIELDS: Final = (
     _text("calibration/certificate", "certificate of the reference", "certificate"),
     _text("calibration/calibrated_by", "who calibrated the gauge", "calibrated_by"),
     Field("calibration/valid_until", "last day on which the calibration holds", "valid_until", Kind.DATE),
+    Field(
+        "calibration/filter", "low-pass filter before the counts: kind, order, corner_hz (-3 dB)", "filter",
+        Kind.JSON,
+    ),
     _text("calibration/measures", "what gauge 2 measures: relative or plate", "measures", required=True),
 )  # fmt: skip
 """Fields of `config.schema.Gauge`, in the group of each gauge."""

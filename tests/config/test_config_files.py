@@ -15,7 +15,7 @@ from config.files import (
     save_calibration,
     settings_file,
 )
-from config.schema import ConfigError, SeriesError
+from config.schema import ConfigError, Filter, SeriesError
 
 GAUGE = "[{name}]\ngain_m_per_count = {gain}\nzero_count = 0\n"
 
@@ -154,6 +154,7 @@ def test_a_new_calibration_keeps_comments_device_and_the_other_gauge(own_folder:
         nonlinearity_m=None,
         calibrated_by="A. Operator",
         valid_until=datetime.date(2027, 1, 12),
+        filter=Filter("bessel", 4, 50.0),
     )
     path = save_calibration({"table": new}, base, DAY)
 
@@ -214,6 +215,27 @@ def test_a_wrong_bend_is_explained(tmp_path: Path, line: str, fault: str) -> Non
     with pytest.raises(ConfigError) as refused:
         load_gauges(write_gauges(tmp_path, extra=line + "\n"))
     assert fault in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("filter = {kind = 'rc'}", "corner_hz = None and kind = 'rc': a filter has a corner"),
+        ("filter = {kind = 'none', corner_hz = 5.0}", "corner_hz = 5.0 and kind = 'none'"),
+        ("filter = {kind = 'bessel', order = 9, corner_hz = 5.0}", "order = 9 must be from 1 to 8"),
+        ("filter = {kind = 'bessel', corner_hz = -5.0}", "corner_hz = -5.0 must be a finite number above 0"),
+        ("filter = {kind = 'notch', corner_hz = 5.0}", "table.filter.kind = 'notch'"),
+    ],
+)
+def test_a_wrong_filter_is_explained(tmp_path: Path, line: str, fault: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        load_gauges(write_gauges(tmp_path, extra=line + "\n"))
+    assert fault in str(refused.value)
+
+
+def test_a_filter_is_described() -> None:
+    assert str(Filter("bessel", 4, 50.0).description) == "Bessel, order 4, 50 Hz"
+    assert str(Filter("none").description) == "none"
 
 
 def test_a_calibration_holds_until_its_last_day() -> None:

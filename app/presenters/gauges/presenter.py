@@ -20,7 +20,7 @@ from app.presenters.number_text import format_in
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
-from messages.i18n import N_, gettext, ngettext
+from messages.i18n import N_, gettext, ngettext, translate
 
 if TYPE_CHECKING:
     from app.presenters.gauge_health import GaugeHealthState
@@ -228,6 +228,7 @@ def _values(gauge: Gauge) -> Iterator[LabelledValue]:
         **({gettext("polynomial"): polynomial} if polynomial else {}),
         gettext("range"): "" if range_m is None else with_unit(f"± {1e3 * range_m:g}", MILLIMETRE.symbol),
         **({gettext("non-linearity"): linearity} if linearity else {}),
+        gettext("filter"): translate(gauge.filter.description) if gauge.filter else "",
         gettext("calibrated"): gauge.date.isoformat() if gauge.date else "",
         gettext("by"): gauge.calibrated_by,
         gettext("reference"): gauge.reference,

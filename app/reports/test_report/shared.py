@@ -130,6 +130,7 @@ _OF_GAUGE: Final = (
     ("hysteresis", lambda gauge: _micrometres(gauge.hysteresis_m)),
     ("repeatability", lambda gauge: _micrometres(gauge.repeatability_m)),
     ("delay", _delay),
+    ("filter", lambda gauge: str(gauge.filter.description) if gauge.filter else ""),
     ("range", lambda gauge: (gauge.range_m and f"± {in_unit(gauge.range_m, MILLIMETRE, 2)}") or ""),
     ("reference", lambda gauge: gauge.reference),
     ("certificate", lambda gauge: gauge.certificate),

@@ -31,6 +31,7 @@ _OF_CALIBRATION = (
     "delay_standard_uncertainty_s",
     "serial_number",
     "date",
+    "filter",
 )
 
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from analysis.record import GaugeUncertainty, StandMasses
+from analysis.record import GaugeFilter, GaugeUncertainty, StandMasses
 from app.runs.analysis_input import combine_clock_scale, to_record
 from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import UnsuitableRunError
 from app.runs.reader import open_run
 from app.runs.writer import write_run
-from config.schema import Gauge, Gauges
+from config.schema import Filter, Gauge, Gauges
 from drivers.clock import TimeBase
 
 
@@ -48,6 +48,19 @@ def test_what_is_not_stated_stays_not_stated(tmp_path, metadata):
     record = to_record(_stored(tmp_path / "run.h5", metadata.replace(gauges=gauges), block(0, 6)))
     assert record.table_gauge == GaugeUncertainty(None, 0.0, 0.0, 0.0, None)
     assert record.gauge_2_measures_plate
+
+
+def test_a_stated_filter_adds_its_delay(tmp_path, metadata):
+    table = metadata.gauges.table.replace(filter=Filter("none"))
+    relative = metadata.gauges.relative.replace(delay_s=1e-3, filter=Filter("bessel", 4, 50.0))
+    gauges = metadata.gauges.replace(table=table, relative=relative)
+    record = to_record(_stored(tmp_path / "run.h5", metadata.replace(gauges=gauges), block(0, 6)))
+    assert record.table_gauge.filter is None
+    assert record.relative_gauge.filter == GaugeFilter("bessel", 4, 50.0, 0.05)
+    delay_s = 2.11392 / (2 * np.pi * 50.0)  # -3 dB frequency of the Bessel filter of order 4 with delay 1 s
+    assert record.relative_gauge.lateness_s == pytest.approx(delay_s + 1e-3, rel=1e-5)
+    uncertainty_s = np.hypot(2e-5, 0.05 * delay_s)
+    assert record.relative_gauge.lateness_s_uncertainty == pytest.approx(uncertainty_s, rel=1e-4)
 
 
 def test_one_gauge_alone(tmp_path, metadata):

@@ -18,7 +18,7 @@ from app.runs.saved_analyses import metadata_hash
 from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges
-from config.schema import Gauge
+from config.schema import Filter, Gauge
 from drivers.samples import SampleBlock
 
 DAY = datetime.date(2026, 1, 12)
@@ -69,6 +69,7 @@ def test_a_bent_simulated_gauge_shows_what_it_is_given() -> None:
         ({"certificate": "DKD 123", "calibrated_by": "Ada", "valid_until": DAY, "hysteresis_m": 1e-6}, False),
         ({"polynomial": (1.0,)}, True),
         ({"zero_count": 3.0}, True),
+        ({"filter": Filter("bessel", 4, 50.0)}, True),
     ],
 )
 def test_only_what_changes_a_number_makes_an_analysis_stale(

@@ -15,7 +15,7 @@ from app.runs.metadata import Conditions, create_metadata
 from app.runs.reader import load_counts, open_run
 from app.runs.writer import write_run
 from config.files import load_gauges, load_stand
-from config.schema import Gauge, GaugeCheck, Gauges
+from config.schema import Filter, Gauge, GaugeCheck, Gauges
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=60)
 LINE = st.text(st.characters(categories=["L", "M", "N", "P", "S"], include_characters=" "), max_size=60)
@@ -62,6 +62,12 @@ def test_other_layouts(tmp_path, metadata, layout):
 
 
 @st.composite
+def filters(draw):
+    kind = draw(st.sampled_from(["none", "rc", "butterworth", "bessel", "sinc"]))
+    return Filter(kind, draw(st.integers(1, 8)), None if kind == "none" else draw(POSITIVE))
+
+
+@st.composite
 def gauges(draw):
     return Gauge(
         gain_m_per_count=draw(NUMBER.filter(bool)),
@@ -82,6 +88,7 @@ def gauges(draw):
         repeatability_m=draw(UNCERTAINTY),
         certificate=draw(TEXT),
         calibrated_by=draw(TEXT),
+        filter=draw(st.none() | filters()),
     )
 
 
