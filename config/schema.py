@@ -4,7 +4,7 @@ import datetime
 import itertools
 import math
 import re
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import msgspec
 
@@ -120,6 +120,11 @@ class Series(_Checked, frozen=True):
     plate_mass_kg: float
 
 
+FilterKind = Literal["none", "rc", "butterworth", "bessel", "sinc"]
+
+FILTER_KINDS: tuple[FilterKind, ...] = get_args(FilterKind)
+
+
 class Filter(_Checked, frozen=True):
     """Low-pass filter of an amplifier or converter; `none` states that there is none.
 
@@ -127,7 +132,7 @@ class Filter(_Checked, frozen=True):
     the amplitude has fallen by 3 dB.
     """
 
-    kind: Literal["none", "rc", "butterworth", "bessel", "sinc"]
+    kind: FilterKind
     order: int = 1
     corner_hz: float | None = None
     corner_relative_standard_uncertainty: float = 0.05

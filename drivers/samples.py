@@ -79,6 +79,14 @@ _counts = operator.attrgetter(*(one.name for one in fields(Losses)))  # `astuple
 
 
 @dataclass(frozen=True, slots=True)
+class ChannelFilter:
+    """Low-pass filter of a channel: `order` moving averages over one window each."""
+
+    order: int
+    corner_hz: float  # where the amplitude has fallen by 3 dB
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceIdentity:
     """What a device reports of itself."""
 

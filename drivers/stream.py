@@ -16,7 +16,7 @@ from drivers.clock import Skew
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFullError, SettingsError
 from drivers.host_time import host_ns
 from drivers.recognition import describe_unreadable
-from drivers.samples import DeviceIdentity, Losses, SampleBlock
+from drivers.samples import ChannelFilter, DeviceIdentity, Losses, SampleBlock
 from drivers.source import Decoder, Link
 from messages.i18n import N_
 from messages.message import EMPTY, Message, MessageError, message, message_of
@@ -83,6 +83,11 @@ class SampleSource(ABC):
     @property
     def losses(self) -> Losses:
         return self._decoder.losses if self._decoder else Losses()
+
+    @property
+    def filters(self) -> tuple[ChannelFilter | None, ChannelFilter | None]:
+        """Filter of each gauge's channel, where the device is known to have one; known after `start`."""
+        return None, None
 
     @property
     def run_note(self) -> Message:

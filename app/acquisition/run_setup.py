@@ -22,7 +22,8 @@ from app.runs.metadata import RunMetadata, create_metadata
 from app.runs.paths import journal_fallback_folders
 from app.version import __version__
 from config.files import load_checks
-from config.schema import Device, Gauges, Stand
+from config.schema import Device, Filter, Gauges, Stand
+from drivers.samples import ChannelFilter
 from messages.i18n import N_
 
 TRIGGERS = ("pullback", "none")
@@ -72,7 +73,7 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
     """Metadata of a run when it is armed. Raises ConfigError, MetadataError."""
     return create_metadata(
         stand,
-        gauges,
+        with_device_filters(gauges, stream.filters),
         datetime.datetime.now().astimezone(),
         series=settings.series,
         pullback_m=settings.pullback_m,
@@ -87,6 +88,17 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
         host=platform.node(),
         gauge_checks=load_checks().latest_checks(gauges),
     )
+
+
+def with_device_filters(gauges: Gauges, filters: tuple[ChannelFilter | None, ChannelFilter | None]) -> Gauges:
+    """Calibrations with the filters of the device where none is stated."""
+    pairs = zip(("table", "relative"), (gauges.table, gauges.relative), filters, strict=True)
+    filled = {
+        name: gauge.replace(filter=Filter("sinc", own.order, own.corner_hz, 0.0))
+        for name, gauge, own in pairs
+        if own is not None and gauge.filter is None
+    }
+    return gauges.replace(**filled)
 
 
 def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:

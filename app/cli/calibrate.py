@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 import numpy as np
 import typer
 
@@ -22,12 +23,12 @@ from app.acquisition.stream.live_stream import LiveStream, open_stream
 from app.cli import output as out
 from app.cli.device_options import CalibrateOptions, CertificateOptions, ReadingOptions
 from app.cli.errors import CommandError
-from app.cli.option_values import calibration_file, figure_file, port_settings
+from app.cli.option_values import calibration_file, checked, figure_file, port_settings
 from app.cli.shared_options import LinkOptions
 from app.runs.analysis_json import budget_documents, quantity_document, warning_documents
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, read_points, write_points
 from config.files import activate_calibration, config_directory, load_gauges, save_calibration
-from config.schema import Gauges
+from config.schema import Filter, Gauge, Gauges
 
 GAUGES: Final = ("table", "relative")
 _MAX_WINDOWS = 5
@@ -60,9 +61,9 @@ def calibrate(options: CalibrateOptions) -> None:
 
         save_calibration_figure(figure, found, f"calibration of the {options.gauge} gauge")
     if options.as_json:
-        out.print_json(calibration_document(options.gauge, found, file, replaced, options.use))
+        out.print_json(calibration_document(options.gauge, found, gauge, file, replaced, options.use))
     else:
-        _print_calibration(found, file, replaced, use=options.use)
+        _print_calibration(found, gauge, file, replaced, use=options.use)
 
 
 def _details(certificate: CertificateOptions) -> CalibrationDetails:
@@ -80,7 +81,17 @@ def _details(certificate: CertificateOptions) -> CalibrationDetails:
         certificate.by,
         certificate.serial_number,
         _from_mm(certificate.gauge_range),
+        _stated_filter(certificate),
     )
+
+
+def _stated_filter(options: CertificateOptions) -> Filter | None:
+    """Return the filter that is stated. Raises CommandError."""
+    if options.filter is None:
+        if options.filter_corner is not None:
+            raise CommandError("--filter-corner needs --filter. Give its kind")
+        return None
+    return checked(Filter, kind=options.filter, order=options.filter_order, corner_hz=options.filter_corner)
 
 
 def _device(source: ReadingOptions, link: LinkOptions) -> PortSettings:
@@ -193,7 +204,9 @@ _MERITS = (
 )
 
 
-def _print_calibration(found: Calibration, file: Path, replaced: Path | None, *, use: bool) -> None:
+def _print_calibration(
+    found: Calibration, gauge: Gauge, file: Path, replaced: Path | None, *, use: bool
+) -> None:
     _print_readings(found)
     gain, zero = found.gain_m_per_count, found.zero_count
     relative = found.gain_relative_standard_uncertainty
@@ -208,6 +221,8 @@ def _print_calibration(found: Calibration, file: Path, replaced: Path | None, *,
         rows.append((label, "not known" if value_m is None else MICROMETRE.text(value_m, 1)))
     whole = MICROMETRE.text(found.displacement_standard_uncertainty_m, 1)
     rows.append(("displacement", f"standard uncertainty {whole} within the readings"))
+    stated = str(gauge.filter.description) if gauge.filter else "not stated: give --filter, or none"
+    rows.append(("filter", stated))
     out.print_fields(rows, 15)
     for warning in found.warnings:
         out.print_line(f"warning {warning.code}: {warning.message}")
@@ -221,14 +236,14 @@ def _print_calibration(found: Calibration, file: Path, replaced: Path | None, *,
 
 
 def calibration_document(
-    gauge: str, found: Calibration, file: Path, kept: Path | None, used: bool
+    name: str, found: Calibration, gauge: Gauge, file: Path, kept: Path | None, used: bool
 ) -> dict[str, Any]:
     """JSON object of a calibration."""
     points = found.points
     columns = (points.counts, points.dial_m, points.direction, points.round_number, found.residual_m)
     return {
         "schema": "slipstand-calibration/1",
-        "gauge": gauge,
+        "gauge": name,
         "file": str(file),
         "in_use": used,
         "kept": None if kept is None else str(kept),
@@ -239,7 +254,8 @@ def calibration_document(
         "polynomial": list(found.polynomial),
         "displacement_standard_uncertainty_m": found.displacement_standard_uncertainty_m,
         "scatter_m": found.scatter_m,
-        **{name: getattr(found.characteristics, name) for name, _ in _MERITS},
+        **{merit: getattr(found.characteristics, merit) for merit, _ in _MERITS},
+        "filter": gauge.filter and msgspec.to_builtins(gauge.filter),
         "budget": budget_documents(found.budget),
         "readings": [
             {

@@ -7,6 +7,7 @@ from pathlib import Path
 from app.cli import shared_options as shared
 from app.cli.options import REQUIRED, argument, choice, flag, number, option
 from app.cli.shared_options import DeviceOptions, LinkOptions
+from config.schema import FILTER_KINDS
 from drivers.registry import AVAILABLE
 
 
@@ -142,6 +143,11 @@ class CertificateOptions:
     certificate: str = option("--certificate", "Its certificate.", "")
     serial_number: str | None = option("--serial-number", "Of the gauge calibrated.")
     gauge_range: float | None = number("--range", "Range of the gauge (mm).", above=0.0)
+    filter: str | None = choice(
+        "--filter", FILTER_KINDS, "Low-pass filter of the amplifier; as it was if absent."
+    )
+    filter_order: int = option("--filter-order", "Its order.", 1)
+    filter_corner: float | None = option("--filter-corner", "Its corner, where it has fallen by 3 dB (Hz).")
     by: str = option("--by", "Who calibrates.", "")
     valid_until: datetime.datetime | None = option(
         "--valid-until", "Last day on which it holds.", formats=["%Y-%m-%d"]

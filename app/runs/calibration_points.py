@@ -11,7 +11,7 @@ import numpy as np
 from analysis.calibration.calibrate import Calibration
 from analysis.calibration.points import CalibrationPoints
 from app.runs.errors import RunError
-from config.schema import Gauge
+from config.schema import Filter, Gauge
 from messages.i18n import N_
 
 _COLUMNS = ("counts", "dial_mm")
@@ -35,11 +35,13 @@ class CalibrationDetails:
     serial_number: str | None = None
     """None keeps that of the gauge as it was."""
     range_m: float | None = None
+    filter: Filter | None = None
+    """None keeps that of the gauge as it was."""
 
 
 def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetails) -> Gauge:
     """The gauge with its new calibration; delay and what it measures stay as they were."""
-    kept = {name for name in ("serial_number", "range_m") if getattr(about, name) is None}
+    kept = {name for name in ("serial_number", "range_m", "filter") if getattr(about, name) is None}
     return before.replace(
         gain_m_per_count=found.gain_m_per_count.value,
         zero_count=found.zero_count.value,

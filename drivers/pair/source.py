@@ -7,7 +7,7 @@ from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.host_time import ActiveTimer
 from drivers.pair.decoder import PairDecoder, PairedChannel, choose_base_gauge
-from drivers.samples import DeviceIdentity
+from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import Link
 from drivers.stream import SampleSource
 from messages.i18n import N_
@@ -55,6 +55,11 @@ class PairSource(SampleSource):
     def rate_hz(self) -> float:
         first, second = (channel.source.rate_hz for channel in self.channel_sources)
         return (first, second)[choose_base_gauge((first, second))]
+
+    @property
+    def filters(self) -> tuple[ChannelFilter | None, ChannelFilter | None]:
+        first, second = (channel.source.filters[channel.column] for channel in self.channel_sources)
+        return first, second
 
     @property
     def run_note(self) -> Message:

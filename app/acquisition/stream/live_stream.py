@@ -26,7 +26,7 @@ from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostMonitor
 from drivers.packets import MAX_BLOCK_ROWS
 from drivers.port import OpenPort
-from drivers.samples import DeviceIdentity, Losses
+from drivers.samples import ChannelFilter, DeviceIdentity, Losses
 from drivers.stream import ReaderEndReason, SampleSource
 from messages.message import EMPTY, Message, as_message, message, message_of
 
@@ -150,6 +150,11 @@ class LiveStream:
     @property
     def identity(self) -> DeviceIdentity:
         return self._source.identity
+
+    @property
+    def filters(self) -> tuple[ChannelFilter | None, ChannelFilter | None]:
+        """Filter of each gauge's channel, where the device is known to have one."""
+        return self._source.filters
 
     @property
     def port_identity(self) -> str:

@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+import msgspec
+
 from analysis.formatting import typeset, with_unit
 from app.acquisition.averaged_counts import (
     AveragedCounts,
@@ -26,9 +28,10 @@ from app.presenters.gauges.state import (
     CalibrationPoint,
     CalibrationState,
 )
-from app.presenters.number_text import FormError, format_fixed, parse_number
+from app.presenters.number_text import FormError, format_fixed, normalize_number, parse_number
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
+from config.schema import Filter
 from messages.i18n import N_, gettext
 from messages.message import MessageError
 
@@ -135,12 +138,14 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         form, today = self.state.form, self._now().date()
         try:
             data, valid_until = self._data(), _last_day(form.valid_until, today)
+            stated = _stated_filter(form)
         except FormError as error:
             self._show_error(error)
             return
         self._update(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         done, failed = self._on_saved, partial(self._show_error, can_save=True)
-        self._worker.submit(tasks.save_calibration, form, data, today, valid_until, done=done, failed=failed)
+        given = form, data, today, valid_until, stated
+        self._worker.submit(tasks.save_calibration, *given, done=done, failed=failed)
 
     def set_connected(self, is_connected: bool) -> None:
         """Live samples come from now on, or no longer."""
@@ -243,6 +248,23 @@ def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
         limit = gettext(", 0 or above") if least == 0.0 else ""
         raise FormError(template, name=name, text=text.strip(), limit=limit)
     return value_mm
+
+
+def _stated_filter(form: CalibrationForm) -> Filter | None:
+    """Read the filter, None to keep it as it was. Raises FormError."""
+    kind = form.filter_kind
+    if kind is None or kind == "none":
+        return kind and Filter(kind)
+    given = {
+        "kind": kind,
+        "order": form.filter_order.strip(),
+        "corner_hz": normalize_number(form.filter_corner_hz),
+    }
+    try:
+        return msgspec.convert({name: text for name, text in given.items() if text}, Filter, strict=False)
+    except msgspec.ValidationError as fault:
+        template = N_("The filter cannot be: {fault}. Write its order and corner as its data sheet does")
+        raise FormError(template, fault=fault) from None
 
 
 def _last_day(text: str, today: datetime.date) -> datetime.date | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue
 from app.presenters.navigator import ConnectForm
-from config.schema import GaugeChecks, Gauges
+from config.schema import FilterKind, GaugeChecks, Gauges
 from messages.i18n import N_
 
 if TYPE_CHECKING:  # its import loads `analysis`, which the window does without until it has started
@@ -97,6 +97,9 @@ class CalibrationForm:
     certificate: str = ""
     calibrated_by: str = ""
     valid_until: str = ""
+    filter_kind: FilterKind | None = None  # None keeps the filter as it was
+    filter_order: str = ""
+    filter_corner_hz: str = ""
     use: bool = True
 
 

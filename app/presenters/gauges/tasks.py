@@ -33,7 +33,7 @@ from app.presenters.number_text import format_in
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, write_points
 from config import files
 from config.files import load_checks, load_gauges, settings_file
-from config.schema import ConfigError, GaugeChecks, Gauges
+from config.schema import ConfigError, Filter, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, translate
 
 _GAUGES: Final[tuple[Literal["table"], Literal["relative"]]] = ("table", "relative")
@@ -61,14 +61,18 @@ def fit_calibration(data: CalibrationData) -> CalibrationFit:
 
 
 def save_calibration(
-    form: CalibrationForm, data: CalibrationData, today: datetime.date, valid_until: datetime.date | None
+    form: CalibrationForm,
+    data: CalibrationData,
+    today: datetime.date,
+    valid_until: datetime.date | None,
+    stated: Filter | None,
 ) -> tuple[str, str]:
     """Write a calibration to a new file; return it, and that of the previous one if it was replaced."""
     found = _fit(data)
     base, name = settings_file("gauges.toml"), _GAUGES[form.gauge]
     reference = form.reference.strip() or f"dial gauge {form.resolution_mm.strip()} mm"
     details = CalibrationDetails(
-        today, valid_until, reference, form.certificate.strip(), form.calibrated_by.strip()
+        today, valid_until, reference, form.certificate.strip(), form.calibrated_by.strip(), filter=stated
     )
     gauge = calibrated_gauge(getattr(load_gauges(base), name), found, details)
     file = files.save_calibration({name: gauge}, Path(base), today)

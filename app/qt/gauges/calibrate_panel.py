@@ -46,7 +46,14 @@ _FIELDS = {
     "certificate": (N_("Certificate"), N_("of the dial gauge")),
     "calibrated_by": (N_("Calibrated by"), N_("your name")),
     "valid_until": (N_("Valid until"), N_("YYYY-MM-DD")),
+    "filter_order": (N_("Order of the filter"), "1"),
+    "filter_corner_hz": (N_("Its corner (−3 dB), Hz"), ""),
 }
+_FILTERS = {
+    None: N_("as it was"), "none": N_("none"), "rc": "RC", "butterworth": "Butterworth", "bessel": "Bessel",
+    "sinc": "sinc",
+}  # fmt: skip
+_OF_FILTER = ("filter_order", "filter_corner_hz")
 
 
 class CalibratePanel(QWidget):
@@ -62,6 +69,8 @@ class CalibratePanel(QWidget):
         self._cautions = label(muted=True, wrap=True)
         self._degree = make_choice(_DEGREES)
         self._degree.activated.connect(lambda _: self._fill(degree=self._degree.currentData()))
+        self._filter = make_choice(_FILTERS)
+        self._filter.activated.connect(lambda _: self._fill(filter_kind=self._filter.currentData()))
         self._fields = make_fields(_FIELDS, self._fill)
         self._use = CheckBox(gettext("Take it for all runs from now on"))
         self._use.clicked.connect(lambda is_used: self._fill(use=is_used))
@@ -69,8 +78,10 @@ class CalibratePanel(QWidget):
         hint = gettext("The device is still read by the calibration before")
         self._again = make_button(gettext("Connect again"), reconnect, hint)
         self._shown: CalibrationFit | None = None
-        fields = ((gettext(_FIELDS[name][0]), field) for name, field in self._fields.items())
-        form = make_form_grid(((gettext("Curve"), self._degree), *fields))
+        rows: list[tuple[str, QWidget]] = [(gettext("Curve"), self._degree)]
+        rows += [(gettext(_FIELDS[name][0]), field) for name, field in self._fields.items()]
+        rows.insert(-len(_OF_FILTER), (gettext("Amplifier's filter"), self._filter))
+        form = make_form_grid(rows)
         buttons = make_row(self._save, self._again, STRETCH, spacing=8)
         parts = (self._plot, self._merits, self._cautions, form, self._use, buttons, STRETCH)
         inside = QWidget()
@@ -81,6 +92,9 @@ class CalibratePanel(QWidget):
         self._form = state.form
         self._readings.show_state(state)
         self._degree.setCurrentIndex(self._degree.findData(state.form.degree))
+        self._filter.setCurrentIndex(self._filter.findData(state.form.filter_kind))
+        for name in _OF_FILTER:
+            self._fields[name].setEnabled(state.form.filter_kind not in (None, "none"))
         self._use.setChecked(state.form.use)
         show_texts(self._fields, state.form)
         self._save.setEnabled(state.can_save)

@@ -31,7 +31,6 @@ _OF_CALIBRATION = (
     "delay_standard_uncertainty_s",
     "serial_number",
     "date",
-    "filter",
 )
 
 

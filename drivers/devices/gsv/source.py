@@ -10,13 +10,16 @@ from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.devices.gsv.commands import Code, InputType, Response
 from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
-from drivers.samples import DeviceIdentity
+from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
 _TRIES = 2
+_CORNER_PER_RATE = 0.4
+"""Corner by the data rate of the decimating filter, a weighted mean (kb.me-systeme.de, "Grenzfrequenz des
+GSV-8")."""
 _INPUTS = dict(zip(("bridge-8.75v", "bridge-5v", "bridge-2.5v", "single-ended"), InputType, strict=True))
 
 
@@ -44,6 +47,12 @@ class GsvSource(SampleSource):
         super().__init__(DeviceIdentity(DRIVER.name, "ME-Systeme GSV"), DRIVER.default_baud, rate_hz)
         self._settings = settings
         self._layout: FrameLayout | None = None
+
+    @property
+    def filters(self) -> tuple[ChannelFilter, ChannelFilter]:
+        """Decimation filter of the GSV-8; nothing is published of the GSV-6, which has the same commands."""
+        own = ChannelFilter(1, _CORNER_PER_RATE * self.rate_hz)
+        return own, own
 
     def prepare(self) -> None:
         layout = FrameLayout(2)

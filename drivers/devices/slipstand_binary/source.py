@@ -7,9 +7,10 @@ import numpy as np
 
 from drivers.devices.slipstand_binary import DRIVER, codec
 from drivers.devices.slipstand_binary.codec import FirmwareIdentity, FrameDecoder
+from drivers.devices.slipstand_binary.converters import converter_filter
 from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
-from drivers.samples import DeviceIdentity
+from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, parse_settings
 from messages.i18n import N_
@@ -33,6 +34,11 @@ class SlipstandBinarySource(SampleSource):
 
     def __init__(self, rate_hz: float | None = None) -> None:
         super().__init__(DeviceIdentity(DRIVER.name, "Slipstand binary"), DRIVER.default_baud, rate_hz)
+
+    @property
+    def filters(self) -> tuple[ChannelFilter | None, ChannelFilter | None]:
+        own = converter_filter(self._identity.firmware, self.rate_hz)
+        return own, own
 
     def prepare(self) -> None:
         frame = codec.encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))

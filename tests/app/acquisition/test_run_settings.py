@@ -6,8 +6,10 @@ import pytest
 
 from app.acquisition.errors import RunSettingsError
 from app.acquisition.messages import PortSettings, RunSettings
-from app.acquisition.run_setup import check_run_settings, complete_port_settings
-from config.schema import Device
+from app.acquisition.run_setup import check_run_settings, complete_port_settings, with_device_filters
+from config.files import load_gauges
+from config.schema import Device, Filter
+from drivers.samples import ChannelFilter
 
 
 @pytest.mark.parametrize(
@@ -41,6 +43,15 @@ def test_the_calibration_file_says_what_the_port_leaves_open():
     assert complete_port_settings(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
     other = PortSettings("/dev/x", "slipstand-binary")
     assert complete_port_settings(other, device) == other
+
+
+def test_a_device_fills_in_the_filters_that_are_not_stated():
+    gauges = load_gauges()
+    stated = gauges.replace(table=gauges.table.replace(filter=Filter("none")))
+    run = with_device_filters(stated, (ChannelFilter(4, 18.2), ChannelFilter(4, 18.2)))
+    assert run.table == stated.table
+    assert run.relative == gauges.relative.replace(filter=Filter("sinc", 4, 18.2, 0.0))
+    assert with_device_filters(gauges, (None, None)) == gauges
 
 
 def test_the_calibration_file_may_say_what_is_of_gauge_2s_device_alone():

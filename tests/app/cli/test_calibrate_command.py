@@ -13,6 +13,7 @@ from cli_kit import assert_one_error_line
 from app.acquisition.messages import RunSettings
 from app.cli.record import check_recording
 from config.files import load_gauges, save_calibration, settings_file
+from config.schema import Filter
 
 MARKS_MM = [0.0, 3.0, 6.0, 9.0, 12.0]
 ROUND_MM = MARKS_MM + MARKS_MM[-2::-1]
@@ -88,6 +89,30 @@ def test_both_gauges_one_after_the_other_end_up_in_use(
     assert gauges.table.gain_m_per_count == pytest.approx(GAIN, rel=1e-3)
     assert gauges.relative.gain_m_per_count == pytest.approx(GAIN, rel=1e-3)
     assert len(list(config_folder.glob("*.toml"))) == 4
+
+
+def test_a_stated_filter_is_kept_until_another_is_stated(slipstand: Any, points: Path) -> None:
+    calibrate = ("calibrate", "--gauge", "relative", "--points", points, "--use")
+    stated = slipstand(*calibrate, "--filter", "bessel", "--filter-order", 4, "--filter-corner", 50, "--json")
+    assert stated.json["filter"] == {
+        "kind": "bessel", "order": 4, "corner_hz": 50.0, "corner_relative_standard_uncertainty": 0.05
+    }  # fmt: skip
+    assert "filter         Bessel, order 4, 50 Hz" in slipstand(*calibrate).out
+    assert slipstand(*calibrate, "--filter", "none", "--json").json["filter"]["kind"] == "none"
+    assert load_gauges().relative.filter == Filter("none")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--filter", "notch"), "--filter 'notch' is not known. Use none, rc, butterworth, bessel or sinc"),
+        (("--filter", "rc"), "corner_hz = None and kind = 'rc': a filter has a corner"),
+        (("--filter-corner", 50), "--filter-corner needs --filter"),
+    ],
+)
+def test_a_filter_that_cannot_be_is_refused(slipstand: Any, points: Path, given: Any, said: str) -> None:
+    outcome = slipstand("calibrate", "--gauge", "table", "--points", points, *given)
+    assert_one_error_line(outcome, said)
 
 
 def test_people_read_residuals_uncertainty_and_what_to_do_next(slipstand: Any, points: Path) -> None:

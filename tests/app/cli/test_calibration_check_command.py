@@ -73,7 +73,7 @@ def test_a_gauge_that_changed_by_2_percent_fails_and_later_runs_say_so(
 
     gauges = load_gauges(gauges_file)
     stream = SimpleNamespace(
-        identity=DeviceIdentity("csv", ""), port_identity="", rate_hz=400.0, host_notes=(), pairing=None
+        identity=DeviceIdentity("csv", ""), port_identity="", rate_hz=400.0, filters=(None, None)
     )
     run = build_metadata(RunSettings("/runs", series="1FFM0"), load_stand(), gauges, stream)  # type: ignore[arg-type]
     (check,) = run.gauge_checks

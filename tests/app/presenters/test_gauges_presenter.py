@@ -13,7 +13,7 @@ from stage import Call, FakeWorker
 from app.acquisition.averaged_counts import MAX_WINDOWS, NoAverageError, RecentSamples, average_counts
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
-from app.presenters.base import Progress, Tone
+from app.presenters.base import LabelledValue, Progress, Tone
 from app.presenters.gauges.presenter import GaugesPresenter, gauge_cards
 from app.presenters.gauges.state import (
     NO_DEVICE,
@@ -25,7 +25,7 @@ from app.presenters.gauges.state import (
 )
 from app.presenters.navigator import ConnectForm
 from config.files import load_checks, load_gauges
-from config.schema import GaugeCheck, GaugeChecks, Gauges
+from config.schema import Filter, GaugeCheck, GaugeChecks, Gauges
 from drivers.samples import SampleStatus
 
 RATE_HZ = 500.0
@@ -296,17 +296,23 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
     desk.presenter.calibration.set_form(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
     desk.presenter.calibration.save()
     assert "is past" in desk.presenter.calibration.state.message.text
-    desk.presenter.calibration.set_form(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
+    form = replace(form, calibrated_by="A. Berger", valid_until="2027-01-31", filter_kind="bessel")
+    desk.presenter.calibration.set_form(replace(form, filter_order="4.5", filter_corner_hz="50"))
+    desk.presenter.calibration.save()
+    assert "The filter cannot be: Expected `int`" in desk.presenter.calibration.state.message.text
+    desk.presenter.calibration.set_form(replace(form, filter_order="4", filter_corner_hz="50"))
     desk.presenter.calibration.save()
     assert desk.asked[-1] == "save_calibration"
     desk.work()
     used = load_gauges(settings / "gauges.toml")
     assert used.table.gain_m_per_count == pytest.approx(GAUGES.table.gain_m_per_count / 1.01, rel=1e-4)
     assert (used.table.calibrated_by, used.table.valid_until) == ("A. Berger", datetime.date(2027, 1, 31))
+    assert used.table.filter == Filter("bessel", 4, 50.0)
     assert used.relative == GAUGES.relative
     assert desk.presenter.calibration.state.offers_reconnect
     desk.work()
     assert desk.state.cards[0].validity.tone is Tone.OK
+    assert LabelledValue("filter", "Bessel, order 4, 50 Hz") in desk.state.cards[0].values
     desk.presenter.navigator.reconnect()
     assert desk.went == [used, "again"]
 

@@ -216,6 +216,13 @@ def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
     stage.qtbot.keyClicks(stage.field("Its uncertainty, mm"), "0.002")
     form = stage.presenter.calibration.state.form
     assert (form.calibrated_by, form.uncertainty_mm) == ("A. Berger", "0.002")
+    corner = stage.field("Its corner (−3 dB), Hz")
+    assert not corner.isEnabled(), "no filter is stated yet"
+    choice = stage.screen._calibrate._filter
+    choice.setCurrentIndex(choice.findData("rc"))
+    choice.activated.emit(choice.currentIndex())
+    assert corner.isEnabled()
+    assert stage.presenter.calibration.state.form.filter_kind == "rc"
     assert "fit_calibration" not in [call.name for call in stage.worker.calls]
 
 

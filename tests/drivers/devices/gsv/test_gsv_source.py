@@ -17,7 +17,7 @@ from drivers.devices.gsv.commands import (
 )
 from drivers.devices.gsv.source import GsvSource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.samples import DeviceIdentity
+from drivers.samples import ChannelFilter, DeviceIdentity
 
 FRAMES = 300
 
@@ -74,6 +74,7 @@ def test_the_conversation_of_a_start():
     ]
     assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV", "1.45", "15060001")
     assert source.rate_hz == 500.0
+    assert source.filters == (ChannelFilter(1, 200.0),) * 2
     block = read_out(source, link, first)
     np.testing.assert_array_equal(block.counts, readings(FRAMES - 1))
     assert source.losses.discarded_bytes == 0
