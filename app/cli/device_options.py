@@ -147,7 +147,7 @@ class CertificateOptions:
         "--filter", FILTER_KINDS, "Low-pass filter of the amplifier; as it was if absent."
     )
     filter_order: int = option("--filter-order", "Its order.", 1)
-    filter_corner: float | None = option("--filter-corner", "Its corner, where it has fallen by 3 dB (Hz).")
+    filter_corner: float | None = option("--filter-corner", "Its corner, at -3 dB (Hz).")
     by: str = option("--by", "Who calibrates.", "")
     valid_until: datetime.datetime | None = option(
         "--valid-until", "Last day on which it holds.", formats=["%Y-%m-%d"]

@@ -19,7 +19,7 @@ COMMANDS = (
     "device ports", "device probe", "device simulate", "device health",
 )  # fmt: skip
 UNIT = re.compile(
-    r"\((m|m/s|mm|kg|s|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"
+    r"\((m|m/s|mm|kg|s|Hz|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"
     r"|\b[Ss]econds\b|[Ss]amples a second|in counts|\bMetres\b"
 )
 PURE = re.compile(r"f_[ds]\b|friction coefficient|[Ff]raction|share|by this fraction|[Rr]elative standard")
