@@ -95,7 +95,7 @@ class IntegratedSolver(MotionSolver):
     kernels: IntegratedKernels
 
     def __init__(self, friction: Friction, name: str) -> None:
-        self.kernels = integrated_kernels(friction, name)
+        self.friction, self.kernels = friction, integrated_kernels(friction, name)
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
@@ -235,7 +235,7 @@ class FrictionLaw:
     def apply_bounds(self, point: Floats) -> None:
         """Move a point of the fit (p,) in place to the nearest that the law allows."""
         _bound_friction(point, self.has_static_friction, self.has_tilt)
-        for place, parameter in enumerate(self.own, start=self.own_start):
+        for place, parameter in zip(self.own_places.tolist(), self.own, strict=True):
             point[place] = min(max(point[place], parameter.lower), parameter.upper)
 
 

@@ -250,7 +250,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
 
 
 @compiled_part
-def _quintic(x: float, h: float, ends: tuple[float, float, float, float, float, float]) -> float:
+def hermite_quintic(x: float, h: float, ends: tuple[float, float, float, float, float, float]) -> float:
     """Value at x in [0, 1] from value, slope and curvature at 0 and at 1, which are `h` apart."""
     v0, s0, c0, v1, s1, c1 = ends
     y = 1.0 - x
@@ -260,7 +260,7 @@ def _quintic(x: float, h: float, ends: tuple[float, float, float, float, float, 
 
 
 @compiled_part
-def _cubic(x: float, h: float, v0: float, s0: float, v1: float, s1: float) -> float:
+def hermite_cubic(x: float, h: float, v0: float, s0: float, v1: float, s1: float) -> float:
     """Value at x in [0, 1] from value and slope at 0 and at 1, which are `h` apart."""
     y = 1.0 - x
     return y * y * (v0 * (1.0 + 2.0 * x) + h * x * s0) + x * x * (v1 * (1.0 + 2.0 * y) - h * y * s1)
@@ -275,9 +275,9 @@ def _between(nodes: Floats, k: int, tau: float, state: Floats) -> None:
     velocity, slip, acceleration, rate = NODE_VELOCITY, NODE_SLIP, NODE_ACCELERATION, NODE_SLIP_RATE
     table = a[NODE_TABLE], a[velocity], a[acceleration], b[NODE_TABLE], b[velocity], b[acceleration]
     relative = a[NODE_RELATIVE], a[slip], a[rate], b[NODE_RELATIVE], b[slip], b[rate]
-    state[0], state[3] = _quintic(x, h, table), _quintic(x, h, relative)
-    state[1] = _cubic(x, h, a[velocity], a[acceleration], b[velocity], b[acceleration])
-    state[2] = _cubic(x, h, a[slip], a[rate], b[slip], b[rate])
+    state[0], state[3] = hermite_quintic(x, h, table), hermite_quintic(x, h, relative)
+    state[1] = hermite_cubic(x, h, a[velocity], a[acceleration], b[velocity], b[acceleration])
+    state[2] = hermite_cubic(x, h, a[slip], a[rate], b[slip], b[rate])
 
 
 def _slip_block(

@@ -1,0 +1,264 @@
+"""Search for deviations from the ideal stand that explain what no friction law alone explains.
+
+Effects are added one at a time, each by its evidence. A score test about the present fit tells how much
+chi-square each could take; the first few are fitted; the best stays if the BIC falls clearly. The motion is
+followed in time as in `analysis.fitting.search`: a short window after the release first, then to the end of
+slip, then the whole record.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.fitting.problem import FitProblem, GaussNewton, Minimum, covariance
+from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.law import FrictionLaw
+from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import EFFECTS, StandEffect, StandModel, compose, extended_point
+from analysis.motion.stand_motion import STAND_PARAMETER_COUNT, StandParameter
+from analysis.preparation.channels import Channel
+
+_WINDOWS_PERIODS = (2.5, 6.0)  # after the release; then the whole record
+_READINGS = 500  # a channel in a window: as many as searches for friction laws take
+_READINGS_WHOLE = 1500  # a channel of the whole record
+_EFFECTS_MOST = 4  # that explain one record: more would explain anything
+_TRIED = 4  # effects that are fitted of those that promise most
+_ALWAYS_TRIED = ("release-ramp",)  # chi-square is far from a parabola about a sudden release
+_PROMISE_MIN = 10.0
+"""Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
+_EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
+_STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
+_EXPLAINED = 1.15  # chi-square a reading below which a window asks for no further effect
+_FOLLOWED = 3  # sets of effects that are followed from one window to the next
+_STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
+"""f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
+_STATIC_STARTS = 2  # of them that are refined
+_PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
+"""Places in a point of a `StandModel`."""
+_FUNDAMENTAL = 0.2  # a second mode differs from the first by this share of its frequency at the least
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Trial:
+    model: StandModel
+    minimum: Minimum
+    bic: float
+
+    @property
+    def point(self) -> Floats:
+        return self.minimum.parameters
+
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset(effect.name for effect in self.model.effects)
+
+
+class StandSearch:
+    """Fits of one friction law with effects of the stand to one record.
+
+    Several sets of effects are followed at a time, since the first effect that explains most is not always
+    one of those that explain all.
+    """
+
+    def __init__(self, search: Search, law: FrictionLaw, ideal: Fit) -> None:
+        self._law, self._period_s, self._slip_end_s = law, search.period_s, search.slip_end_s
+        self._release_s = ideal.value(Parameter.RELEASE)
+        self.problem = extended_problem(search.problem)
+        self._informed = _with_wide_priors(extended_problem(search.informed_problem))
+        residual = Channel(search.problem.table.time_s, ideal.table_residual_m)
+        self._second_frequency_hz = _strongest_frequency(residual, self._release_s, self._period_s)
+
+    def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> Fit:
+        """Fit the law with the effects that the record shows, from points (p,) of an ideal stand."""
+        points = [extended_point(start) for start in starts]
+        first = self._window(_WINDOWS_PERIODS[0])
+        trials = [min((self._trial(first, (), point) for point in points), key=_bic_of)]
+        for periods in _WINDOWS_PERIODS:
+            window = self._window(periods)
+            trials = [self._trial(window, trial.model.effects, trial.point) for trial in trials]
+            trials = self._extend_while(
+                window, trials, lambda best: best.minimum.cost > _EXPLAINED * window.sample_count
+            )
+        window = self.problem.decimated(_READINGS_WHOLE, self._slip_end_s)
+        trials = [self._trial(window, trial.model.effects, trial.point) for trial in trials]
+        trials = self._extend_while(window, trials, lambda best: not is_adequate(self._finish(best)))
+        return self._finish(self._without_needless(window, min(trials, key=_bic_of)))
+
+    def _extend_while(
+        self, window: FitProblem, trials: list[_Trial], is_wanting: Callable[[_Trial], bool]
+    ) -> list[_Trial]:
+        """Add effects to the best of `trials` while the best of all is wanting and they lower the BIC."""
+        trials, extended = sorted(trials, key=_bic_of), set[frozenset[str]]()
+        while is_wanting(trials[0]):
+            best_bic = trials[0].bic
+            for trial in trials[:]:
+                if trial.names not in extended and len(trial.model.effects) < _EFFECTS_MOST:
+                    extended.add(trial.names)
+                    trials += self._extensions(window, trial)
+            lowest: dict[frozenset[str], _Trial] = {}
+            for trial in sorted(trials, key=_bic_of):
+                lowest.setdefault(trial.names, trial)
+            trials = list(lowest.values())[:_FOLLOWED]
+            if trials[0].bic > best_bic - _EVIDENCE_MIN:
+                break
+        return trials
+
+    def _trial(
+        self, window: FitProblem, effects: tuple[StandEffect, ...], point: Floats, steps: int = _STEPS_WINDOW
+    ) -> _Trial:
+        model = compose(self._law, effects)
+        opened = _open_shared(window, model)
+        minimum = opened.minimise(point, model, steps)
+        parameter_count = len(opened.model_parameters(model))
+        return _Trial(model, minimum, minimum.cost + parameter_count * float(np.log(opened.sample_count)))
+
+    def _extensions(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
+        """The trial with one effect more, of those that promise most."""
+        present = trial.names
+        candidates = [
+            effect
+            for effect in EFFECTS
+            if effect.name not in present
+            and (not effect.needs or effect.needs in present)
+            and not set(effect.shared) & set(self._law.extra)
+        ]
+        promises = self._promises(window, trial, candidates)
+        tried = sorted(candidates, key=lambda effect: -promises[effect.name])[:_TRIED]
+        tried = [effect for effect in tried if promises[effect.name] > _PROMISE_MIN]
+        tried += [effect for effect in candidates if effect.name in _ALWAYS_TRIED and effect not in tried]
+        found = []
+        for effect in tried:
+            effects = (*trial.model.effects, effect)
+            starts = self._starts(window, effect, trial)
+            tries = [self._trial(window, effects, start, _STEPS_TRIAL) for start in starts]
+            best = min(tries, key=_bic_of)
+            if best.bic < trial.bic - _EVIDENCE_MIN:
+                found.append(self._trial(window, effects, best.point))
+        return found
+
+    def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
+        """Points from which the fit of one effect more begins."""
+        point = trial.point.copy()
+        if StandParameter.MODE_FREQUENCY in effect.own:
+            point[_PLACES[StandParameter.MODE_FREQUENCY]] = self._second_frequency_hz
+            point[[_PLACES[StandParameter.MODE_MASS], _PLACES[StandParameter.MODE_DAMPING]]] = 0.01
+            return [point]
+        if Parameter.FRICTION_STATIC in effect.shared:
+            model = compose(self._law, (*trial.model.effects, effect))
+            points = np.tile(point, (len(_STATIC_RATIOS), 1))
+            points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * point[Parameter.FRICTION_DYNAMIC]
+            costs = [window.chi_square(one, model) for one in points]
+            return [points[index] for index in np.argsort(costs)[:_STATIC_STARTS]]
+        starts = []
+        for probe in effect.probes or ((0.0,) * len(effect.own),):
+            starts.append(point.copy())
+            starts[-1][[_PLACES[place] for place in effect.own]] = probe
+        return starts
+
+    def _without_needless(self, window: FitProblem, trial: _Trial) -> _Trial:
+        """The trial without the effects that the others make needless."""
+        for effect in trial.model.effects:
+            if any(other.needs == effect.name for other in trial.model.effects):
+                continue
+            effects = tuple(other for other in trial.model.effects if other is not effect)
+            point = trial.point.copy()
+            point[[_PLACES[place] for place in effect.own]] = 0.0
+            point[[place for place in effect.shared if place != Parameter.FRICTION_STATIC]] = 0.0
+            without = self._trial(window, effects, point)
+            if without.bic < trial.bic + _EVIDENCE_MIN:
+                trial = without
+        return trial
+
+    def _promises(self, window: FitProblem, trial: _Trial, candidates: list[StandEffect]) -> dict[str, float]:
+        """Fall of the BIC that a linear motion about the trial would give each of the effects."""
+        point = trial.point.copy()
+        modes = [effect for effect in candidates if StandParameter.MODE_FREQUENCY in effect.own]
+        if modes:
+            point[_PLACES[StandParameter.MODE_FREQUENCY]] = self._second_frequency_hz
+            point[_PLACES[StandParameter.MODE_DAMPING]] = 0.01
+        model = compose(self._law, (*trial.model.effects, *candidates))
+        opened = _open_shared(window, model)
+        free = opened.free_parameters(model)
+        fixed = {StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING} if modes else set()
+        free = free[~np.isin(free, [_PLACES[place] for place in fixed])]
+        base = set(trial.model.free_parameters) | set(window.free_parameters(trial.model).tolist())
+        quadratic = GaussNewton(opened, model, free).evaluate(point)
+        own = np.array([place in base for place in free.tolist()])
+        inverse, _ = covariance(quadratic.normal[np.ix_(own, own)])
+        found = {}
+        for effect in candidates:
+            places = [_PLACES[place] for place in effect.own if place not in fixed]
+            places += [int(place) for place in effect.shared]
+            mine = np.isin(free, places)
+            cross = quadratic.normal[np.ix_(mine, own)]
+            left = quadratic.normal[np.ix_(mine, mine)] - cross @ inverse @ cross.T
+            pull = quadratic.descent[mine] - cross @ inverse @ quadratic.descent[own]
+            gain = float(pull @ np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull)
+            found[effect.name] = gain - len(effect.own + effect.shared) * float(np.log(window.sample_count))
+        return found
+
+    def _finish(self, trial: _Trial) -> Fit:
+        problem = _open_shared(self.problem, trial.model)
+        last = problem.minimise(trial.point, trial.model, _STEPS_LAST)
+        return fit_at_minimum(problem, trial.model, last)
+
+    def _window(self, periods: float) -> FitProblem:
+        end_s = self._release_s + periods * self._period_s
+        return self._informed.before(end_s).decimated(_READINGS, np.inf)
+
+
+def extended_problem(problem: FitProblem) -> FitProblem:
+    """The problem with the parameters of the stand, of which nothing is known."""
+    return replace(
+        problem,
+        prior_mean=extended_point(problem.prior_mean),
+        prior_deviation=np.concatenate((problem.prior_deviation, np.full(STAND_PARAMETER_COUNT, np.inf))),
+    )
+
+
+def _open_shared(problem: FitProblem, model: StandModel) -> FitProblem:
+    """The problem without what is stated of lag and gain of gauge 2, where the model frees them."""
+    for effect in model.effects:
+        for place in effect.shared:
+            if place in (Parameter.LAG, Parameter.RELATIVE_GAIN):
+                problem = problem.with_prior(place, 0.0, np.inf)
+    return problem
+
+
+def _with_wide_priors(problem: FitProblem) -> FitProblem:
+    """First estimates guide the first periods only roughly, as they hold for an ideal stand."""
+    mean = problem.prior_mean
+    for place, share, least in _WIDE_PRIORS:
+        if np.isfinite(problem.prior_deviation[place]):
+            problem = problem.with_prior(place, float(mean[place]), share * abs(float(mean[place])) + least)
+    return problem
+
+
+_WIDE_PRIORS = (
+    (Parameter.FRICTION_DYNAMIC, 0.3, 0.0),
+    (Parameter.TILT, 0.0, 0.01),
+    (Parameter.STIFFNESS, 0.03, 0.0),
+    (Parameter.DAMPING, 3.0, 10.0),
+    (Parameter.TABLE_OFFSET, 0.0, 2e-4),
+)
+"""Standard deviation as a share of the value, and at the least (rad, kg/s, m)."""
+
+
+def _bic_of(trial: _Trial) -> float:
+    return trial.bic
+
+
+def _strongest_frequency(channel: Channel, release_s: float, period_s: float) -> float:
+    """Frequency (Hz) of the strongest line of a Lomb-Scargle spectrum away from the fundamental."""
+    after = channel.between(release_s, np.inf)
+    span_s = float(after.time_s[-1] - after.time_s[0])
+    rate_hz = 1.0 / float(np.median(np.diff(after.time_s)))
+    first = 1.0 / period_s
+    frequencies = np.arange(0.3 * first, min(0.4 * rate_hz, 30.0 * first), 0.25 / span_s)
+    frequencies = frequencies[np.abs(frequencies / first - 1.0) > _FUNDAMENTAL]
+    phases = np.exp(-2j * np.pi * frequencies[:, None] * (after.time_s - after.time_s[0])[None, :])
+    power = np.abs(phases @ (after.value_m - after.value_m.mean()))
+    return float(frequencies[np.argmax(power)])

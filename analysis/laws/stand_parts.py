@@ -1,0 +1,274 @@
+"""Deviations from the ideal stand that a fit can add to a friction law, one part at a time."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from analysis.arrays import Floats, Indices
+from analysis.compiled import compiled_part
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.closed_form import GAUGE_1, GAUGE_2_BASE
+from analysis.laws.coulomb import COULOMB
+from analysis.laws.law import FrictionLaw, Gauge, IntegratedSolver, MotionSolver
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Parameter
+from analysis.motion.events import (
+    DURATION_MIN_S,
+    FRICTION_DYNAMIC,
+    FRICTION_STATIC,
+    PULLBACK,
+    RELEASE,
+    TILT,
+)
+from analysis.motion.stand_motion import (
+    STAND_PARAMETER_COUNT,
+    StandParameter,
+    gauge_readings,
+    stand_kernels,
+)
+
+STAND_PARAMETERS = {
+    StandParameter.RELEASE_RAMP: OwnParameter("release_ramp_s", "s", 0.0, 0.0, 0.06),
+    StandParameter.RELEASE_STEP: OwnParameter("release_step", "1", 0.0, 0.0, 0.95),
+    StandParameter.RELEASE_SHAPE: OwnParameter("release_shape", "1", 0.0, -1.5, 3.0),
+    StandParameter.RELEASE_VELOCITY: OwnParameter("release_velocity_m_per_s", "m/s", 0.0, -0.3, 0.3),
+    StandParameter.SPRING_HARDENING: OwnParameter("spring_hardening", "1", 0.0, -0.3, 0.5),
+    StandParameter.SPRING_ASYMMETRY: OwnParameter("spring_asymmetry", "1", 0.0, -0.3, 0.3),
+    StandParameter.STAND_FRICTION: OwnParameter("stand_friction_m", "m", 0.0, 0.0, 2e-3),
+    StandParameter.DRAG: OwnParameter("drag_per_m", "1/m", 0.0, 0.0, 10.0),
+    StandParameter.LOSS_FACTOR: OwnParameter("loss_factor", "1", 0.0, 0.0, 0.2),
+    StandParameter.ARC: OwnParameter("arc_per_m", "1/m", 0.0, -10.0, 10.0),
+    StandParameter.MODE_MASS: OwnParameter("second_mode_mass_share", "1", 0.0, 0.0, 0.3),
+    StandParameter.MODE_FREQUENCY: OwnParameter("second_mode_frequency_hz", "Hz", 0.0, 0.5, 100.0),
+    StandParameter.MODE_DAMPING: OwnParameter("second_mode_damping", "1", 0.0, 0.0, 0.3),
+    StandParameter.FILM: OwnParameter("film_s_per_m", "s/m", 0.0, -5.0, 20.0),
+    StandParameter.LOGARITHMIC: OwnParameter("friction_per_log_velocity", "1", 0.0, -0.2, 0.3),
+    StandParameter.GRADIENT: OwnParameter("friction_gradient_per_m", "1/m", 0.0, -40.0, 40.0),
+    StandParameter.WEAR: OwnParameter("friction_wear_per_m", "1/m", 0.0, -5.0, 5.0),
+    StandParameter.ASYMMETRY: OwnParameter("friction_asymmetry", "1", 0.0, -0.5, 0.5),
+    StandParameter.DWELL: OwnParameter("friction_per_log_dwell", "1", 0.0, 0.0, 0.5),
+    StandParameter.FILTER: OwnParameter("filter_s2", "s2", 0.0, 0.0, 2.5e-3),
+    StandParameter.FILTER_2: OwnParameter("gauge_2_filter_s2", "s2", 0.0, 0.0, 2.5e-3),
+    StandParameter.BEND_1: OwnParameter("gauge_1_bend", "1", 0.0, -0.2, 0.2),
+    StandParameter.BEND_2: OwnParameter("gauge_2_bend", "1", 0.0, -0.2, 0.2),
+    StandParameter.CROSS_TALK: OwnParameter("cross_talk", "1", 0.0, -0.2, 0.2),
+}
+"""Names, units and bounds; at zero the stand is ideal. The bounds are beyond what a stand that still serves
+its purpose shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class StandEffect:
+    """One deviation from the ideal stand.
+
+    `probes` are values of its own parameters from which its fit begins where a small value may not lead to
+    the right ones.
+    """
+
+    name: str
+    own: tuple[StandParameter, ...] = ()
+    shared: tuple[Parameter, ...] = ()
+    probes: tuple[tuple[float, ...], ...] = ()
+    needs: str = ""  # name of the effect that this one refines
+
+
+EFFECTS = (
+    StandEffect("static-friction", shared=(Parameter.FRICTION_STATIC,)),
+    StandEffect("release-ramp", (StandParameter.RELEASE_RAMP,), probes=((0.002,), (0.01,))),
+    StandEffect("release-shape", (StandParameter.RELEASE_SHAPE,), needs="release-ramp"),
+    StandEffect("release-step", (StandParameter.RELEASE_STEP,), needs="release-ramp"),
+    StandEffect("release-velocity", (StandParameter.RELEASE_VELOCITY,)),
+    StandEffect("gauge-lag", shared=(Parameter.LAG,)),
+    StandEffect("gauge-ratio", shared=(Parameter.RELATIVE_GAIN,)),
+    StandEffect("stand-friction", (StandParameter.STAND_FRICTION,), probes=((3e-5,),)),
+    StandEffect("film", (StandParameter.FILM,)),
+    StandEffect("spring-hardening", (StandParameter.SPRING_HARDENING,)),
+    StandEffect("spring-asymmetry", (StandParameter.SPRING_ASYMMETRY,)),
+    StandEffect("drag", (StandParameter.DRAG,)),
+    StandEffect("loss-factor", (StandParameter.LOSS_FACTOR,)),
+    StandEffect("arc", (StandParameter.ARC,)),
+    StandEffect(
+        "second-mode",
+        (StandParameter.MODE_MASS, StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING),
+    ),
+    StandEffect("log-velocity", (StandParameter.LOGARITHMIC,)),
+    StandEffect("gradient", (StandParameter.GRADIENT,)),
+    StandEffect("wear", (StandParameter.WEAR,)),
+    StandEffect("asymmetry", (StandParameter.ASYMMETRY,)),
+    StandEffect("filter", (StandParameter.FILTER,)),
+    StandEffect("gauge-2-filter", (StandParameter.FILTER_2,)),
+    StandEffect("gauge-1-bend", (StandParameter.BEND_1,)),
+    StandEffect("gauge-2-bend", (StandParameter.BEND_2,)),
+    StandEffect("cross-talk", (StandParameter.CROSS_TALK,)),
+)
+
+
+class StandSolver(MotionSolver):
+    """Motion on a stand that is not ideal: integrated as a whole, derivatives are differences.
+
+    A vector holds the ten parameters of the motion, those of the friction law, and all of the stand.
+    """
+
+    is_closed_form = False
+
+    def __init__(self, law: FrictionLaw) -> None:
+        if isinstance(law.solver, IntegratedSolver):
+            self.kernels = stand_kernels(law.solver.friction, law.name.replace("+", "_"))
+        else:
+            self.kernels = stand_kernels(_constant_friction, "coulomb")
+
+    def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
+        return gauge_readings(self.kernels, vector, self.kernels.integrate(vector, duration_s), time_s)
+
+    def normal_equations(
+        self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
+    ) -> list[Floats]:
+        lag_s, moving = float(point[Parameter.LAG]), len(directions)
+        ideal = self._readings(vector, lag_s, gauges)
+        rows = [np.zeros((len(free) + 1, len(gauge[0]))) for gauge in gauges]
+        for k, direction in enumerate(directions):
+            up, down, step = _differences(vector, direction)
+            sides = zip(self._readings(up, lag_s, gauges), self._readings(down, lag_s, gauges), strict=True)
+            for row, (above, below) in zip(rows, sides, strict=True):
+                row[k] = (above - below) / step
+        later = earlier = ideal
+        if Parameter.LAG in free:
+            later = self._readings(vector, lag_s + _LAG_STEP_S, gauges)
+            earlier = self._readings(vector, lag_s - _LAG_STEP_S, gauges)
+        for number, (_, readings, which, noise) in enumerate(gauges):
+            row, slopes, read = rows[number], rows[number][:-1], ideal[number]
+            second = which != GAUGE_1
+            gain_place = Parameter.RELATIVE_GAIN if second else Parameter.TABLE_GAIN
+            offset_place = Parameter.RELATIVE_OFFSET if second else Parameter.TABLE_OFFSET
+            gain = 1.0 + point[gain_place]
+            slopes[:moving] *= gain
+            slopes[free == offset_place], slopes[free == gain_place] = 1.0, read
+            if second:
+                slopes[free == Parameter.LAG] = gain * (later[number] - earlier[number]) / (2.0 * _LAG_STEP_S)
+            row[-1] = readings - point[offset_place] - gain * read
+            row /= noise
+        return [row @ row.T for row in rows]
+
+    def _readings(self, vector: Floats, lag_s: float, gauges: list[Gauge]) -> list[Floats]:
+        """What ideal gauges of these kinds read at their times, gauge 2 later by `lag_s`."""
+        end_s = max(float(times[-1]) for times, *_ in gauges) + abs(lag_s)
+        state = self.kernels.integrate(vector, max(DURATION_MIN_S, end_s - float(vector[RELEASE])))
+        found = []
+        for times, _, which, _ in gauges:
+            late_s = 0.0 if which == GAUGE_1 else lag_s
+            table, relative = gauge_readings(self.kernels, vector, state, times - late_s)
+            found.append(table if which == GAUGE_1 else relative + table * (which == GAUGE_2_BASE))
+        return found
+
+
+@compiled_part
+def _constant_friction(_speed: float, parameters: Floats) -> float:
+    coefficient: float = parameters[FRICTION_DYNAMIC]
+    return coefficient
+
+
+_LAG_STEP_S = 1e-6
+_STEP_SHARE = 1e-5
+"""Step of differences over the range of a parameter of the stand, or over the value of one of the motion."""
+_ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
+_ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
+
+
+def _differences(vector: Floats, direction: Floats) -> tuple[Floats, Floats, float]:
+    """Two vectors about `vector` along `direction`, and their distance.
+
+    Parameters of the stand keep their lower bounds.
+    """
+    first = len(vector) - STAND_PARAMETER_COUNT
+    places = np.flatnonzero(direction)
+    steps = []
+    for place in places.tolist():
+        if place >= first:
+            own = STAND_PARAMETERS[StandParameter(place - first)]
+            steps.append(_STEP_SHARE * (own.upper - own.lower))
+        elif place in _ADDITIVE:
+            steps.append(_ADDITIVE_STEP)
+        else:
+            steps.append(_STEP_SHARE * abs(float(vector[place])) or _ADDITIVE_STEP)
+    step = min(steps)
+    up, down = vector + step * direction, vector - step * direction
+    for place in places[places >= first].tolist():
+        lower = STAND_PARAMETERS[StandParameter(place - first)].lower
+        if down[place] < lower:
+            down[place] = lower
+            return up, down, float(up[place] - lower)
+    return up, down, 2.0 * step
+
+
+@cache
+def _solver(law: FrictionLaw) -> StandSolver:
+    return StandSolver(law)
+
+
+@dataclass(frozen=True, eq=False)
+class StandModel(FrictionLaw):
+    """A friction law with deviations from the ideal stand.
+
+    Its points are those of an ideal stand, followed by the `StandParameter` values.
+    """
+
+    effects: tuple[StandEffect, ...] = ()
+    stand_places: tuple[int, ...] = ()  # places of their own parameters in a point
+
+    @property
+    def own_places(self) -> Indices:
+        count = len(self.own) - len(self.stand_places)
+        return np.array([*range(self.own_start, self.own_start + count), *self.stand_places], dtype=np.int64)
+
+    def vector(self, point: Floats) -> Floats:
+        own = self.own_places[: len(self.own) - len(self.stand_places)]
+        return np.concatenate((point[:MOTION_PARAMETER_COUNT], point[own], point[PARAMETER_COUNT:]))
+
+    def directions(self, moving: Indices) -> Floats:
+        count = MOTION_PARAMETER_COUNT + len(self.own) - len(self.stand_places)
+        directions = np.zeros((len(moving), count + STAND_PARAMETER_COUNT))
+        for row, place in zip(directions, moving.tolist(), strict=True):
+            if place < MOTION_PARAMETER_COUNT:
+                row[place] = 1.0
+            elif place >= PARAMETER_COUNT:
+                row[count + place - PARAMETER_COUNT] = 1.0
+            else:
+                row[MOTION_PARAMETER_COUNT + place - self.own_start] = 1.0
+            if place == Parameter.FRICTION_DYNAMIC and not self.has_static_friction:
+                row[FRICTION_STATIC] = 1.0
+        return directions
+
+    def apply_bounds(self, point: Floats) -> None:
+        super().apply_bounds(point)
+        for place, bound in _SHARED_BOUNDS.items():
+            if place in self.extra:
+                point[place] = min(max(point[place], -bound), bound)
+
+
+_SHARED_BOUNDS = {Parameter.LAG: 0.06, Parameter.RELATIVE_GAIN: 0.3}
+"""Lags are those of filters above 5 Hz; gauges that differ by more measure something else."""
+
+
+def compose(law: FrictionLaw, effects: Iterable[StandEffect]) -> StandModel:
+    """The law with these effects."""
+    base = {field.name: getattr(law, field.name) for field in fields(FrictionLaw)}
+    effects = tuple(effects)
+    places = [place for effect in effects for place in effect.own]
+    shared = [place for effect in effects for place in effect.shared]
+    changed: dict[str, Any] = {
+        "extra": (*law.extra, *shared),
+        "own": (*law.own, *(STAND_PARAMETERS[place] for place in places)),
+        "solver": _solver(law if law.own else COULOMB),
+    }
+    return StandModel(
+        **{**base, **changed},
+        effects=effects,
+        stand_places=tuple(PARAMETER_COUNT + place for place in places),
+    )
+
+
+def extended_point(point: Floats) -> Floats:
+    """A point of an ideal stand (p,) as one of a `StandModel`."""
+    return np.concatenate((point, np.zeros(STAND_PARAMETER_COUNT)))

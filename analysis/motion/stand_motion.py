@@ -1,0 +1,492 @@
+"""Motion of two masses on a stand that is not ideal, integrated numerically.
+
+Beside the ten parameters of `analysis.motion.events` and those of a friction law a motion takes the
+`StandParameter` values, all zero on an ideal stand; those of gauges act in `gauge_readings`. Steps of the
+classical Runge-Kutta method are a tenth of 1/w long; phases begin and end at the times at which their
+conditions change sign. Against DOP853 displacements agree to 1e-6 m.
+"""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.compiled import compile_with, compiled, compiled_part
+from analysis.motion.events import (
+    DAMPING,
+    FRICTION_DYNAMIC,
+    FRICTION_STATIC,
+    GRAVITY,
+    PLATE_MASS,
+    PULLBACK,
+    RELEASE,
+    STIFFNESS,
+    TABLE_MASS,
+    TILT,
+)
+from analysis.motion.integration import Friction, friction_coefficient, hermite_cubic, hermite_quintic
+from analysis.motion.sampling import MotionKernels
+
+
+class StandParameter(IntEnum):
+    """Places of the deviations from the ideal stand, after the parameters of motion and friction law."""
+
+    RELEASE_RAMP = 0  # time over which the hook lets go (s)
+    RELEASE_STEP = 1  # share of its force that the hook loses at once, when it begins to let go
+    RELEASE_SHAPE = 2  # the rest falls as 1 - (t / ramp) ** exp(shape): evenly at 0, late at large values
+    RELEASE_VELOCITY = 3  # of the table at the release (m/s)
+    SPRING_HARDENING = 4  # relative rise of the secant stiffness at the pullback, even in the displacement
+    SPRING_ASYMMETRY = 5  # the same, odd in the displacement
+    STAND_FRICTION = 6  # Coulomb friction of the stand over its stiffness: x_k (m)
+    DRAG = 7  # deceleration over the square of the table's velocity (1/m)
+    LOSS_FACTOR = 8  # of the springs: a force against the velocity, proportional to the displacement
+    ARC = 9  # curvature of the table's path on its leaf springs (1/m)
+    MODE_MASS = 10  # mass on a spring on the table, as a share of the table's
+    MODE_FREQUENCY = 11  # its own frequency (Hz)
+    MODE_DAMPING = 12  # its damping ratio
+    FILM = 13  # relative rise of friction with the sliding velocity (s/m)
+    LOGARITHMIC = 14  # relative rise of friction with ln(1 + velocity / 1 mm/s)
+    GRADIENT = 15  # relative rise of friction along the track (1/m)
+    WEAR = 16  # relative rise of friction with the slid path (1/m)
+    ASYMMETRY = 17  # relative rise of friction in forward slip, and fall in backward slip
+    DWELL = 18  # relative rise of static friction with ln(1 + time of stick / 0.1 s)
+    FILTER = (
+        19  # 1 / (2 pi corner frequency) of a low-pass filter before both gauges, its delay taken off (s)
+    )
+    FILTER_2 = 20  # the same of a filter before gauge 2 alone
+    BEND_1 = 21  # relative deviation of gauge 1 from a line at the pullback, odd in the displacement
+    BEND_2 = 22  # the same of gauge 2
+    CROSS_TALK = 23  # share of u1 in the readings of gauge 2
+
+
+STAND_PARAMETER_COUNT = len(StandParameter)
+(
+    RAMP,
+    RELEASE_STEP,
+    SHAPE,
+    START_VELOCITY,
+    HARDENING,
+    SPRING_ASYMMETRY,
+    STAND_FRICTION,
+    DRAG,
+    LOSS_FACTOR,
+    ARC,
+    MODE_MASS,
+    MODE_FREQUENCY,
+    MODE_DAMPING,
+    FILM,
+    LOGARITHMIC,
+    GRADIENT,
+    WEAR,
+    ASYMMETRY,
+    DWELL,
+    FILTER,
+    FILTER_2,
+    BEND_1,
+    BEND_2,
+    CROSS_TALK,
+) = range(STAND_PARAMETER_COUNT)
+"""The same places for compiled functions, which take no enumerations."""
+
+_LOGARITHMIC_VELOCITY_M_PER_S = 1e-3  # unit of the logarithm: slips of the stands reach some 100 mm/s
+_DWELL_S = 0.1  # unit of the logarithm: sticks last some tenths of a second
+_STEP_RAD = 0.1  # of the slipping table's motion: local errors of 1e-7 of the swing
+_MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
+_REVERSAL_SHARE = 1e-3
+"""Speed below which friction of the stand is proportional to speed, over the largest speed of the table."""
+_STIFF = 0.5  # largest share of that speed by which friction of the stand changes it in one step
+_NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
+_EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halved at the least every other
+_GRAZING_DIVISIONS = 4  # of a first step of a slip that seems to end within it, each to a quarter
+TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE = range(7)
+"""Columns of a node: time since release, u1 with its derivatives, and u2 - u1 with its derivatives."""
+FIRST_NODE = 5  # column of a phase beside those of `events`: row of its first node
+_STATE = 6  # u1, u1', u2' - u1', u2 - u1, and the second mode's displacement on the table and its velocity
+
+
+@compiled_part
+def hold_share(parts: Floats, time: float) -> float:
+    """Share of the hook's first force that it still has."""
+    if time >= parts[RAMP]:
+        return 0.0
+    share: float = (1.0 - parts[RELEASE_STEP]) * (1.0 - (time / parts[RAMP]) ** math.exp(parts[SHAPE]))
+    return share
+
+
+@compiled_part
+def spring_force(parameters: Floats, parts: Floats, displacement: float) -> float:
+    """Force that bends the springs by `displacement` (N)."""
+    share = displacement / max(abs(parameters[PULLBACK]), 1e-9)
+    rise = (parts[SPRING_ASYMMETRY] + parts[HARDENING] * share) * share
+    force: float = parameters[STIFFNESS] * displacement * (1.0 + rise)
+    return force
+
+
+@compiled_part
+def track_factor(parts: Floats, direction: float, relative: float, path: float) -> float:
+    """Friction here and now over that at the start of the track."""
+    factor: float = 1.0 + parts[GRADIENT] * relative
+    factor *= (1.0 + parts[WEAR] * path) * (1.0 + parts[ASYMMETRY] * direction)
+    return factor if factor > 0.0 else 0.0
+
+
+@compiled_part
+def table_force(parameters: Floats, parts: Floats, time: float, state: Floats, reversal: float) -> float:
+    """Force of springs, damping, hook and second mode on the table (N)."""
+    u, v, c = state[0], state[1], parameters[STIFFNESS]
+    mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
+    dry = c * (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * abs(u)) * math.tanh(v / reversal)
+    force = (
+        -spring_force(parameters, parts, u) - parameters[DAMPING] * v - mass * parts[DRAG] * abs(v) * v - dry
+    )
+    if time < parts[RAMP]:
+        force += hold_share(parts, time) * spring_force(parameters, parts, parameters[PULLBACK])
+    if parts[MODE_MASS] != 0.0:
+        w = 2.0 * math.pi * parts[MODE_FREQUENCY]
+        mode = w * w * state[4] + 2.0 * parts[MODE_DAMPING] * w * state[5]
+        force += parts[MODE_MASS] * parameters[TABLE_MASS] * mode
+    return force
+
+
+def slope(
+    parameters: Floats,
+    parts: Floats,
+    sign: float,
+    time: float,
+    path: float,
+    reversal: float,
+    state: Floats,
+    out: Floats,
+) -> float:
+    """Write the derivative of `state` in a phase into `out`; return the plate's vertical acceleration.
+
+    `path` is the slid path before the phase, less `sign` times u2 - u1 at its start.
+    """
+    u, v, slip, relative = state[0], state[1], state[2], state[3]
+    gravity, plate, table = parameters[GRAVITY], parameters[PLATE_MASS], parameters[TABLE_MASS]
+    arc, both = parts[ARC], parameters[PLATE_MASS] + parameters[TABLE_MASS]
+    force = table_force(parameters, parts, time, state, reversal) - both * arc * arc * u * v * v
+    if sign == 0.0:
+        acceleration = force / (both * (1.0 + arc * arc * u * u))
+        rate = 0.0
+    else:
+        speed = abs(slip)
+        friction = friction_coefficient(speed, parameters) * (1.0 + parts[FILM] * speed)
+        if parts[LOGARITHMIC] != 0.0:
+            friction *= 1.0 + parts[LOGARITHMIC] * math.log(1.0 + speed / _LOGARITHMIC_VELOCITY_M_PER_S)
+        friction *= sign * track_factor(parts, sign, relative, path + sign * relative)
+        load = gravity * (friction - parameters[TILT]) + friction * arc * v * v
+        inertia = table + both * arc * arc * u * u - plate * friction * arc * u
+        acceleration = (force + plate * load) / inertia
+        rate = -load - friction * arc * u * acceleration - acceleration
+    out[0], out[1], out[2], out[3] = v, acceleration, rate, slip
+    if parts[MODE_MASS] != 0.0:
+        w = 2.0 * math.pi * parts[MODE_FREQUENCY]
+        out[4] = state[5]
+        out[5] = -acceleration - w * w * state[4] - 2.0 * parts[MODE_DAMPING] * w * state[5]
+    else:
+        out[4], out[5] = 0.0, 0.0
+    vertical: float = arc * (v * v + u * acceleration)
+    return vertical
+
+
+def _step(
+    parameters: Floats,
+    parts: Floats,
+    sign: float,
+    time: float,
+    path: float,
+    reversal: float,
+    state: Floats,
+    trial: Floats,
+    slopes: Floats,
+    step: float,
+) -> None:
+    """Write the state after `step` into `trial`; `slopes` (5, n) holds the first slope in row 0."""
+    for i in range(_STATE):
+        trial[i] = state[i] + 0.5 * step * slopes[0, i]
+    slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[1])
+    for i in range(_STATE):
+        trial[i] = state[i] + 0.5 * step * slopes[1, i]
+    slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[2])
+    for i in range(_STATE):
+        trial[i] = state[i] + step * slopes[2, i]
+    slope(parameters, parts, sign, time + step, path, reversal, trial, slopes[3])
+    for i in range(_STATE):
+        rise = slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]
+        trial[i] = state[i] + step / 6.0 * rise
+
+
+def demand(
+    parameters: Floats,
+    parts: Floats,
+    time: float,
+    stuck_s: float,
+    path: float,
+    reversal: float,
+    state: Floats,
+    rates: Floats,
+) -> tuple[float, float]:
+    """By how much the joint acceleration exceeds what static friction holds, and the sign of a slip then.
+
+    Overwrites `rates`.
+    """
+    vertical = slope(parameters, parts, 0.0, time, 0.0, reversal, state, rates)
+    wanted = rates[1] - parameters[GRAVITY] * parameters[TILT]
+    direction = -1.0 if wanted > 0.0 else 1.0
+    static = max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
+    if parts[DWELL] != 0.0:
+        static *= 1.0 + parts[DWELL] * math.log(1.0 + stuck_s / _DWELL_S)
+    static *= track_factor(parts, direction, state[3], path)
+    return abs(wanted) - static * (parameters[GRAVITY] + vertical), direction
+
+
+def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
+    """Phases (m, 6) and nodes (k, 7) from the release to `duration_s`.
+
+    Phases are as `integrate_events` gives them, with the row of their first node.
+    """
+    parts = parameters[len(parameters) - STAND_PARAMETER_COUNT :]
+    frequency = math.sqrt(parameters[STIFFNESS] / parameters[TABLE_MASS])
+    longest = _STEP_RAD / frequency
+    if parts[MODE_MASS] != 0.0:
+        longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[MODE_FREQUENCY]))
+    pull = abs(parameters[PULLBACK])
+    dry = (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * pull) * frequency * frequency
+    reversal = max(_REVERSAL_SHARE * frequency * pull, longest * abs(dry) / _STIFF, 1e-9)
+    phases, nodes = np.empty((64, 6)), np.empty((2 * int(duration_s / longest) + 256, 7))
+    state, trial, slopes = np.zeros(_STATE), np.empty(_STATE), np.empty((5, _STATE))
+    state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
+    time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
+    excess, direction = demand(parameters, parts, 0.0, 1e3, 0.0, reversal, state, slopes[4])
+    sign = direction if excess > 0.0 else 0.0
+    new_phase, unchecked = True, False
+    while time < duration_s and node < _NODES_MOST:
+        along = path - sign * state[3]
+        if new_phase:
+            if count == len(phases):
+                phases = _doubled(phases)
+            row = phases[count]
+            row[0], row[1], row[2], row[3], row[4], row[5] = time, sign, state[0], state[1], state[3], node
+            slope(parameters, parts, sign, time, along, reversal, state, slopes[0])
+            nodes = _append_node(nodes, node, time, state, slopes[0])
+            count, node, new_phase, began = count + 1, node + 1, False, time
+        step = min(longest, duration_s - time)
+        if time < parts[RAMP]:
+            step = min(step, max(parts[RAMP] - time, 1e-9))
+        _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+        last = _event(
+            parameters, parts, sign, time + step, time + step - began, path, reversal, trial, slopes[4]
+        )
+        if last > 0.0 and not unchecked:
+            if sign != 0.0 and state[2] * sign <= 0.0:
+                for _ in range(_GRAZING_DIVISIONS):
+                    step *= 0.25
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                    last = -sign * trial[2]
+                    if last < 0.0:
+                        break
+                if last >= 0.0:  # the joint acceleration only grazes its limit
+                    sign, new_phase, unchecked = 0.0, True, True
+                    state[2] = 0.0
+                    continue
+            else:
+                first = _event(parameters, parts, sign, time, time - began, path, reversal, state, slopes[4])
+                low, high, low_value, high_value = 0.0, step, min(first, 0.0), last
+                for _ in range(_EVENT_STEPS):
+                    step = high - (high - low) * high_value / (high_value - low_value)
+                    if not low < step < high:
+                        step = 0.5 * (low + high)
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                    value = _event(
+                        parameters,
+                        parts,
+                        sign,
+                        time + step,
+                        time + step - began,
+                        path,
+                        reversal,
+                        trial,
+                        slopes[4],
+                    )
+                    if value > 0.0:
+                        high, high_value, low_value = step, value, 0.5 * low_value
+                    else:
+                        low, low_value, high_value = step, value, 0.5 * high_value
+                    if high - low <= 1e-14 or abs(value) <= 1e-15:
+                        break
+                if high - step > 0.0 and step == low:
+                    step = high
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                new_phase = True
+        unchecked = False
+        time += step
+        if sign != 0.0:
+            path += sign * (trial[3] - state[3])
+        for i in range(_STATE):
+            state[i] = trial[i]
+        slope(parameters, parts, sign, time, path - sign * state[3], reversal, state, slopes[0])
+        nodes = _append_node(nodes, node, time, state, slopes[0])
+        node += 1
+        if new_phase:
+            stuck_s = time - began if sign == 0.0 else 0.0
+            excess, direction = demand(parameters, parts, time, stuck_s, path, reversal, state, slopes[4])
+            if sign != 0.0:
+                state[2] = 0.0
+                sign = direction if excess > 0.0 else 0.0
+            else:
+                sign = direction
+    return phases[:count], nodes[:node]
+
+
+def _event(
+    parameters: Floats,
+    parts: Floats,
+    sign: float,
+    time: float,
+    since_s: float,
+    path: float,
+    reversal: float,
+    state: Floats,
+    rates: Floats,
+) -> float:
+    """Positive where a phase has ended: a slip has stopped, or a stick cannot hold."""
+    if sign != 0.0:
+        overrun: float = -sign * state[2]
+        return overrun
+    excess, _ = demand(parameters, parts, time, since_s, path, reversal, state, rates)
+    return excess
+
+
+@compiled
+def _doubled(rows: Floats) -> Floats:
+    larger = np.empty((2 * len(rows), rows.shape[1]))
+    for k in range(len(rows)):
+        for column in range(rows.shape[1]):
+            larger[k, column] = rows[k, column]
+    return larger
+
+
+@compiled
+def _append_node(nodes: Floats, count: int, time: float, state: Floats, rates: Floats) -> Floats:
+    """Write a node into row `count`; the array is doubled when full."""
+    if count == len(nodes):
+        nodes = _doubled(nodes)
+    row = nodes[count]
+    row[TIME], row[TABLE], row[VELOCITY], row[ACCELERATION] = time, state[0], state[1], rates[1]
+    row[RELATIVE], row[SLIP], row[SLIP_RATE] = state[3], state[2], rates[2]
+    return nodes
+
+
+@compiled_part
+def _between(nodes: Floats, k: int, time: float, out: Floats) -> None:
+    """Write u1, u2 - u1, u1', u2' and both accelerations at `time` between the nodes k and k + 1."""
+    a, b = nodes[k], nodes[k + 1]
+    h = b[TIME] - a[TIME]
+    x = (time - a[TIME]) / h if h > 0.0 else 0.0
+    table = a[TABLE], a[VELOCITY], a[ACCELERATION], b[TABLE], b[VELOCITY], b[ACCELERATION]
+    out[0] = hermite_quintic(x, h, table)
+    relative = a[RELATIVE], a[SLIP], a[SLIP_RATE], b[RELATIVE], b[SLIP], b[SLIP_RATE]
+    out[1] = hermite_quintic(x, h, relative)
+    if len(out) == 6:
+        out[2] = hermite_cubic(x, h, a[VELOCITY], a[ACCELERATION], b[VELOCITY], b[ACCELERATION])
+        out[3] = out[2] + hermite_cubic(x, h, a[SLIP], a[SLIP_RATE], b[SLIP], b[SLIP_RATE])
+        out[4] = (1.0 - x) * a[ACCELERATION] + x * b[ACCELERATION]
+        out[5] = out[4] + (1.0 - x) * a[SLIP_RATE] + x * b[SLIP_RATE]
+
+
+@compiled
+def sample(parameters: Floats, _phases: Floats, nodes: Floats, times: Floats, channels: int) -> Floats:
+    """Channels at sorted `times`, as `sampling.sample` gives them."""
+    out, row, k = np.zeros((channels, len(times))), np.empty(channels), 0
+    for j in range(len(times)):
+        since = times[j] - parameters[RELEASE]
+        if since < 0.0:
+            out[0, j] = parameters[PULLBACK]
+            continue
+        while k + 2 < len(nodes) and nodes[k + 1, TIME] <= since:
+            k += 1
+        _between(nodes, k, min(since, nodes[k + 1, TIME]), row)
+        for i in range(channels):
+            out[i, j] = row[i]
+    return out
+
+
+@compiled
+def peak_rates(
+    _parameters: Floats, _phases: Floats, nodes: Floats, _duration_s: float
+) -> tuple[float, float, float, float]:
+    """Largest |u1'|, |u2'|, |u1''|, |u2''|, from four points in each step."""
+    largest, row = np.zeros(4), np.empty(6)
+    for k in range(len(nodes) - 1):
+        for point in range(4):
+            _between(nodes, k, nodes[k, TIME] + 0.25 * point * (nodes[k + 1, TIME] - nodes[k, TIME]), row)
+            for i in range(4):
+                largest[i] = max(largest[i], abs(row[2 + i]))
+    return largest[0], largest[1], largest[2], largest[3]
+
+
+_TEMPLATES = (
+    (compiled_part, slope),
+    (compiled_part, _step),
+    (compiled_part, demand),
+    (compiled_part, _event),
+    (compiled, integrate),
+)
+"""Functions that depend on friction, each before its callers."""
+
+
+def stand_kernels(friction: Friction, name: str) -> MotionKernels:
+    """Kernels of a compiled `friction`; `name` is an identifier that no other law has.
+
+    Their parameters are the ten of `analysis.motion.events`, the law's own, and the `StandParameter` values.
+    """
+    functions = compile_with(_TEMPLATES, f"stand_{name}", friction_coefficient=friction)
+    return MotionKernels(functions["integrate"], sample, peak_rates)
+
+
+_FILTER_STEPS = 4.0  # of the filtered motion in one time constant: its transfer function errs by 0.5 %
+_FILTER_STEP_MIN_S, _FILTER_STEP_MAX_S = 2e-4, 2e-3
+_NEGLIGIBLE_S = 1e-5  # a filter of 16 kHz
+
+
+def gauge_readings(
+    kernels: MotionKernels, vector: Floats, state: tuple[Floats, ...], times_s: Floats
+) -> Floats:
+    """u1 and u2 - u1 (2, n) as gauges with these filters, bends and cross-talk show them; times rise."""
+    parts, pull = vector[-STAND_PARAMETER_COUNT:], max(abs(float(vector[PULLBACK])), 1e-9)
+    constants = math.sqrt(parts[FILTER]), math.sqrt(parts[FILTER_2])
+    if max(constants) < _NEGLIGIBLE_S:
+        read = kernels.sample(vector, *state, times_s, 2)
+    else:
+        shortest_s = min(constant for constant in constants if constant >= _NEGLIGIBLE_S)
+        step_s = min(max(shortest_s / _FILTER_STEPS, _FILTER_STEP_MIN_S), _FILTER_STEP_MAX_S)
+        begin_s = min(float(times_s[0]), float(vector[RELEASE]))
+        end_s = float(times_s[-1]) + 2.0 * sum(constants)
+        grid = begin_s + step_s * np.arange(int((end_s - begin_s) / step_s) + 3)
+        duration_s = float(state[1][-1, TIME])
+        moved = kernels.sample(vector, *state, np.minimum(grid, vector[RELEASE] + duration_s), 2)
+        table, relative = (_low_pass(row, constants[0], step_s) for row in moved)
+        relative = _low_pass(relative, constants[1], step_s)
+        read = np.stack([np.interp(times_s, grid, row) for row in (table, relative)])
+    read[1] += parts[CROSS_TALK] * (read[0] - vector[PULLBACK])
+    bends = parts[BEND_1 : BEND_2 + 1, None]
+    return read if not bends.any() else read + bends * read**3 / pull**2
+
+
+@compiled
+def _low_pass(row: Floats, constant_s: float, step_s: float) -> Floats:
+    """The row (n,) behind a Butterworth filter of order 2, shifted back by its delay at low frequencies."""
+    if constant_s < _NEGLIGIBLE_S:
+        return row
+    k = math.tan(0.5 * step_s / constant_s)
+    norm = 1.0 / (1.0 + math.sqrt(2.0) * k + k * k)
+    gain, a1, a2 = k * k * norm, 2.0 * (k * k - 1.0) * norm, (1.0 - math.sqrt(2.0) * k + k * k) * norm
+    filtered, x1, x2, y1, y2 = np.empty(len(row)), row[0], row[0], row[0], row[0]
+    for j in range(len(row)):
+        y = gain * (row[j] + 2.0 * x1 + x2) - a1 * y1 - a2 * y2
+        x2, x1, y2, y1 = x1, row[j], y1, y
+        filtered[j] = y
+    places = np.arange(len(row)).astype(np.float64)
+    return np.interp(places + math.sqrt(2.0) * constant_s / step_s, places, filtered)
