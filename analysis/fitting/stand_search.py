@@ -17,11 +17,18 @@ from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.laws.stand_parts import EFFECTS, StandEffect, StandModel, compose, extended_point
+from analysis.laws.stand_parts import (
+    EFFECTS,
+    STATIC_FRICTION,
+    StandEffect,
+    StandModel,
+    compose,
+    extended_point,
+)
 from analysis.motion.stand_motion import STAND_PARAMETER_COUNT, StandParameter
 from analysis.preparation.channels import Channel
 
-_WINDOWS_PERIODS = (2.5, 6.0)  # after the release; then the whole record
+_WINDOWS_PERIODS = (2.5, 6.0, 12.0)  # after the release; then the whole record
 _READINGS = 500  # a channel in a window: as many as searches for friction laws take
 _READINGS_WHOLE = 1500  # a channel of the whole record
 _EFFECTS_MOST = 4  # that explain one record: more would explain anything
@@ -32,12 +39,14 @@ _PROMISE_MIN = 10.0
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
 _STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
 _EXPLAINED = 1.15  # chi-square a reading below which a window asks for no further effect
+_FOLLOWED_BIC = 2000.0  # above the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
 _STATIC_STARTS = 2  # of them that are refined
 _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 """Places in a point of a `StandModel`."""
+_LOWEST_MODE, _HIGHEST_MODE = 0.3, 30.0  # of second modes that are looked for, over the first frequency
 _FUNDAMENTAL = 0.2  # a second mode differs from the first by this share of its frequency at the least
 
 
@@ -78,30 +87,36 @@ class StandSearch:
         trials = [min((self._trial(first, (), point) for point in points), key=_bic_of)]
         for periods in _WINDOWS_PERIODS:
             window = self._window(periods)
-            trials = [self._trial(window, trial.model.effects, trial.point) for trial in trials]
-            trials = self._extend_while(
-                window, trials, lambda best: best.minimum.cost > _EXPLAINED * window.sample_count
-            )
+            trials = self._continue(window, trials)
+            trials = self._extend_while(window, trials, _explains)
         window = self.problem.decimated(_READINGS_WHOLE, self._slip_end_s)
-        trials = [self._trial(window, trial.model.effects, trial.point) for trial in trials]
-        trials = self._extend_while(window, trials, lambda best: not is_adequate(self._finish(best)))
-        return self._finish(self._without_needless(window, min(trials, key=_bic_of)))
+        trials = self._continue(window, trials)[:1]
+        trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
+        return self._finish(self._without_needless(window, trials[0]))
+
+    def _continue(self, window: FitProblem, trials: list[_Trial]) -> list[_Trial]:
+        """Refit trials of a shorter window, also with an f_s, which matters only once a stick has ended."""
+        found = []
+        for trial in trials:
+            found.append(self._trial(window, trial.model.effects, trial.point))
+            if STATIC_FRICTION not in trial.model.effects and not _explains(window, found[-1]):
+                effects = (*trial.model.effects, STATIC_FRICTION)
+                starts = self._starts(window, STATIC_FRICTION, trial)
+                found += [self._trial(window, effects, start) for start in starts]
+        return _lowest(found)
 
     def _extend_while(
-        self, window: FitProblem, trials: list[_Trial], is_wanting: Callable[[_Trial], bool]
+        self, window: FitProblem, trials: list[_Trial], is_enough: Callable[[FitProblem, _Trial], bool]
     ) -> list[_Trial]:
-        """Add effects to the best of `trials` while the best of all is wanting and they lower the BIC."""
-        trials, extended = sorted(trials, key=_bic_of), set[frozenset[str]]()
-        while is_wanting(trials[0]):
+        """Add effects to the best of `trials` until the best is enough, or no lower BIC is found."""
+        extended = set[frozenset[str]]()
+        while not is_enough(window, trials[0]):
             best_bic = trials[0].bic
             for trial in trials[:]:
                 if trial.names not in extended and len(trial.model.effects) < _EFFECTS_MOST:
                     extended.add(trial.names)
                     trials += self._extensions(window, trial)
-            lowest: dict[frozenset[str], _Trial] = {}
-            for trial in sorted(trials, key=_bic_of):
-                lowest.setdefault(trial.names, trial)
-            trials = list(lowest.values())[:_FOLLOWED]
+            trials = _lowest(trials)
             if trials[0].bic > best_bic - _EVIDENCE_MIN:
                 break
         return trials
@@ -113,7 +128,8 @@ class StandSearch:
         opened = _open_shared(window, model)
         minimum = opened.minimise(point, model, steps)
         parameter_count = len(opened.model_parameters(model))
-        return _Trial(model, minimum, minimum.cost + parameter_count * float(np.log(opened.sample_count)))
+        bic = minimum.cost + parameter_count * float(np.log(opened.sample_count))
+        return _Trial(model, minimum, bic + sum(effect.rarity for effect in effects))
 
     def _extensions(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
         """The trial with one effect more, of those that promise most."""
@@ -146,7 +162,7 @@ class StandSearch:
             point[_PLACES[StandParameter.MODE_FREQUENCY]] = self._second_frequency_hz
             point[[_PLACES[StandParameter.MODE_MASS], _PLACES[StandParameter.MODE_DAMPING]]] = 0.01
             return [point]
-        if Parameter.FRICTION_STATIC in effect.shared:
+        if effect is STATIC_FRICTION:
             model = compose(self._law, (*trial.model.effects, effect))
             points = np.tile(point, (len(_STATIC_RATIOS), 1))
             points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * point[Parameter.FRICTION_DYNAMIC]
@@ -247,18 +263,32 @@ _WIDE_PRIORS = (
 """Standard deviation as a share of the value, and at the least (rad, kg/s, m)."""
 
 
+def _lowest(trials: list[_Trial]) -> list[_Trial]:
+    """The few sets of effects of lowest BIC, the best of each, without those far from the best of all."""
+    found: dict[frozenset[str], _Trial] = {}
+    for trial in sorted(trials, key=_bic_of):
+        found.setdefault(trial.names, trial)
+    best, *others = found.values()
+    return [best, *(trial for trial in others if trial.bic < best.bic + _FOLLOWED_BIC)][:_FOLLOWED]
+
+
+def _explains(window: FitProblem, trial: _Trial) -> bool:
+    return trial.minimum.cost < _EXPLAINED * window.sample_count
+
+
 def _bic_of(trial: _Trial) -> float:
     return trial.bic
 
 
 def _strongest_frequency(channel: Channel, release_s: float, period_s: float) -> float:
-    """Frequency (Hz) of the strongest line of a Lomb-Scargle spectrum away from the fundamental."""
+    """Frequency (Hz) of the strongest line in the spectrum of `channel` away from the fundamental."""
     after = channel.between(release_s, np.inf)
-    span_s = float(after.time_s[-1] - after.time_s[0])
-    rate_hz = 1.0 / float(np.median(np.diff(after.time_s)))
-    first = 1.0 / period_s
-    frequencies = np.arange(0.3 * first, min(0.4 * rate_hz, 30.0 * first), 0.25 / span_s)
-    frequencies = frequencies[np.abs(frequencies / first - 1.0) > _FUNDAMENTAL]
-    phases = np.exp(-2j * np.pi * frequencies[:, None] * (after.time_s - after.time_s[0])[None, :])
-    power = np.abs(phases @ (after.value_m - after.value_m.mean()))
+    count = len(after)
+    time_s, step_s = np.linspace(after.time_s[0], after.time_s[-1], count, retstep=True)
+    value_m = np.interp(time_s, after.time_s, after.value_m)
+    frequencies = np.fft.rfftfreq(4 * count, step_s)
+    power = np.abs(np.fft.rfft((value_m - value_m.mean()) * np.hanning(count), 4 * count))
+    harmonics = frequencies * period_s
+    power[(np.abs(harmonics - 1.0) < _FUNDAMENTAL) | (harmonics < _LOWEST_MODE)] = 0.0
+    power[harmonics > _HIGHEST_MODE] = 0.0
     return float(frequencies[np.argmax(power)])

@@ -1,6 +1,6 @@
 """Deviations from the ideal stand that a fit can add to a friction law, one part at a time."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
@@ -28,6 +28,7 @@ from analysis.motion.stand_motion import (
     gauge_readings,
     stand_kernels,
 )
+from analysis.motion.two_mass import TwoMassParameters
 
 STAND_PARAMETERS = {
     StandParameter.RELEASE_RAMP: OwnParameter("release_ramp_s", "s", 0.0, 0.0, 0.06),
@@ -72,37 +73,44 @@ class StandEffect:
     shared: tuple[Parameter, ...] = ()
     probes: tuple[tuple[float, ...], ...] = ()
     needs: str = ""  # name of the effect that this one refines
+    rarity: float = 0.0
+    """Added to the BIC: what stands rarely show must explain more than what they often show."""
 
 
+_RARE = 6.0  # odds of 20 to 1 (Kass and Raftery: the border of strong evidence)
+STATIC_FRICTION = StandEffect("static-friction", shared=(Parameter.FRICTION_STATIC,))
 EFFECTS = (
-    StandEffect("static-friction", shared=(Parameter.FRICTION_STATIC,)),
+    STATIC_FRICTION,
     StandEffect("release-ramp", (StandParameter.RELEASE_RAMP,), probes=((0.002,), (0.01,))),
-    StandEffect("release-shape", (StandParameter.RELEASE_SHAPE,), needs="release-ramp"),
-    StandEffect("release-step", (StandParameter.RELEASE_STEP,), needs="release-ramp"),
-    StandEffect("release-velocity", (StandParameter.RELEASE_VELOCITY,)),
+    StandEffect("release-shape", (StandParameter.RELEASE_SHAPE,), needs="release-ramp", rarity=_RARE),
+    StandEffect("release-step", (StandParameter.RELEASE_STEP,), needs="release-ramp", rarity=_RARE),
+    StandEffect("release-velocity", (StandParameter.RELEASE_VELOCITY,), rarity=_RARE),
     StandEffect("gauge-lag", shared=(Parameter.LAG,)),
-    StandEffect("gauge-ratio", shared=(Parameter.RELATIVE_GAIN,)),
+    StandEffect("gauge-ratio", shared=(Parameter.RELATIVE_GAIN,), rarity=_RARE),
     StandEffect("stand-friction", (StandParameter.STAND_FRICTION,), probes=((3e-5,),)),
     StandEffect("film", (StandParameter.FILM,)),
     StandEffect("spring-hardening", (StandParameter.SPRING_HARDENING,)),
-    StandEffect("spring-asymmetry", (StandParameter.SPRING_ASYMMETRY,)),
+    StandEffect("spring-asymmetry", (StandParameter.SPRING_ASYMMETRY,), rarity=_RARE),
     StandEffect("drag", (StandParameter.DRAG,)),
-    StandEffect("loss-factor", (StandParameter.LOSS_FACTOR,)),
+    StandEffect("loss-factor", (StandParameter.LOSS_FACTOR,), rarity=_RARE),
     StandEffect("arc", (StandParameter.ARC,)),
     StandEffect(
         "second-mode",
         (StandParameter.MODE_MASS, StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING),
     ),
-    StandEffect("log-velocity", (StandParameter.LOGARITHMIC,)),
+    StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE),
     StandEffect("gradient", (StandParameter.GRADIENT,)),
     StandEffect("wear", (StandParameter.WEAR,)),
-    StandEffect("asymmetry", (StandParameter.ASYMMETRY,)),
+    StandEffect("asymmetry", (StandParameter.ASYMMETRY,), rarity=_RARE),
     StandEffect("filter", (StandParameter.FILTER,)),
-    StandEffect("gauge-2-filter", (StandParameter.FILTER_2,)),
-    StandEffect("gauge-1-bend", (StandParameter.BEND_1,)),
-    StandEffect("gauge-2-bend", (StandParameter.BEND_2,)),
-    StandEffect("cross-talk", (StandParameter.CROSS_TALK,)),
+    StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE),
+    StandEffect("gauge-1-bend", (StandParameter.BEND_1,), rarity=_RARE),
+    StandEffect("gauge-2-bend", (StandParameter.BEND_2,), rarity=_RARE),
+    StandEffect("cross-talk", (StandParameter.CROSS_TALK,), rarity=_RARE),
 )
+
+
+STAND_PLACES = {own.name: place for place, own in STAND_PARAMETERS.items()}
 
 
 class StandSolver(MotionSolver):
@@ -172,6 +180,7 @@ def _constant_friction(_speed: float, parameters: Floats) -> float:
 _LAG_STEP_S = 1e-6
 _STEP_SHARE = 1e-5
 """Step of differences over the range of a parameter of the stand, or over the value of one of the motion."""
+_FILTER_STEP_S2 = 2.5e-5  # a time constant of 5 ms: less is lost in the interpolation of filtered readings
 _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
 
@@ -187,7 +196,7 @@ def _differences(vector: Floats, direction: Floats) -> tuple[Floats, Floats, flo
     for place in places.tolist():
         if place >= first:
             own = STAND_PARAMETERS[StandParameter(place - first)]
-            steps.append(_STEP_SHARE * (own.upper - own.lower))
+            steps.append(_FILTER_STEP_S2 if own.unit == "s2" else _STEP_SHARE * (own.upper - own.lower))
         elif place in _ADDITIVE:
             steps.append(_ADDITIVE_STEP)
         else:
@@ -272,3 +281,24 @@ def compose(law: FrictionLaw, effects: Iterable[StandEffect]) -> StandModel:
 def extended_point(point: Floats) -> Floats:
     """A point of an ideal stand (p,) as one of a `StandModel`."""
     return np.concatenate((point, np.zeros(STAND_PARAMETER_COUNT)))
+
+
+def stand_displacements(
+    parameters: TwoMassParameters, values: Mapping[str, float], duration_s: float
+) -> Callable[[Floats], tuple[Floats, Floats]]:
+    """u1 and u2 - u1 (n,) as the gauges show them, at rising times (n,) from release, negative before it.
+
+    `values` are those of `STAND_PARAMETERS` by name; what is not named is as on an ideal stand. Friction is
+    that of Coulomb, with f_s.
+    """
+    vector = np.concatenate((parameters.vector(), np.zeros(STAND_PARAMETER_COUNT)))
+    for name, value in values.items():
+        vector[MOTION_PARAMETER_COUNT + STAND_PLACES[name]] = value
+    kernels = _solver(COULOMB).kernels
+    state = kernels.integrate(vector, duration_s)
+
+    def displacements(time_s: Floats) -> tuple[Floats, Floats]:
+        table, relative = gauge_readings(kernels, vector, state, time_s)
+        return table, relative
+
+    return displacements

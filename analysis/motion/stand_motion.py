@@ -90,6 +90,7 @@ STAND_PARAMETER_COUNT = len(StandParameter)
 """The same places for compiled functions, which take no enumerations."""
 
 _LOGARITHMIC_VELOCITY_M_PER_S = 1e-3  # unit of the logarithm: slips of the stands reach some 100 mm/s
+_HELD_S = 60.0  # before the release: the time in which an operator pulls and waits
 _DWELL_S = 0.1  # unit of the logarithm: sticks last some tenths of a second
 _STEP_RAD = 0.1  # of the slipping table's motion: local errors of 1e-7 of the swing
 _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
@@ -99,6 +100,8 @@ _STIFF = 0.5  # largest share of that speed by which friction of the stand chang
 _NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
 _EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halved at the least every other
 _GRAZING_DIVISIONS = 4  # of a first step of a slip that seems to end within it, each to a quarter
+_ESCAPE, _ESCAPE_M = 10.0, 0.1
+"""A table farther off than this, in pullbacks and metres, does not come back: its springs pull no more."""
 TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE = range(7)
 """Columns of a node: time since release, u1 with its derivatives, and u2 - u1 with its derivatives."""
 FIRST_NODE = 5  # column of a phase beside those of `events`: row of its first node
@@ -136,10 +139,10 @@ def table_force(parameters: Floats, parts: Floats, time: float, state: Floats, r
     """Force of springs, damping, hook and second mode on the table (N)."""
     u, v, c = state[0], state[1], parameters[STIFFNESS]
     mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
-    dry = c * (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * abs(u)) * math.tanh(v / reversal)
-    force = (
-        -spring_force(parameters, parts, u) - parameters[DAMPING] * v - mass * parts[DRAG] * abs(v) * v - dry
-    )
+    force: float = -spring_force(parameters, parts, u) - parameters[DAMPING] * v
+    force -= mass * parts[DRAG] * abs(v) * v
+    if parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0:
+        force -= c * (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * abs(u)) * math.tanh(v / reversal)
     if time < parts[RAMP]:
         force += hold_share(parts, time) * spring_force(parameters, parts, parameters[PULLBACK])
     if parts[MODE_MASS] != 0.0:
@@ -259,10 +262,10 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     state, trial, slopes = np.zeros(_STATE), np.empty(_STATE), np.empty((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
-    excess, direction = demand(parameters, parts, 0.0, 1e3, 0.0, reversal, state, slopes[4])
+    excess, direction = demand(parameters, parts, 0.0, _HELD_S, 0.0, reversal, state, slopes[4])
     sign = direction if excess > 0.0 else 0.0
     new_phase, unchecked = True, False
-    while time < duration_s and node < _NODES_MOST:
+    while time < duration_s and node < _NODES_MOST and abs(state[0]) < _ESCAPE * pull + _ESCAPE_M:
         along = path - sign * state[3]
         if new_phase:
             if count == len(phases):
