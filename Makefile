@@ -21,7 +21,7 @@ help:
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
 	@echo "make bench-recording   recording, release detection, library and recovery, a quarter of an hour"
 	@echo "make bench-desktop     repaint, wire to screen, start, the handle of f_d; a minute"
-	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
+	@echo "make study   statistics on simulated records of known truth (docs/validation.md); an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
@@ -115,7 +115,7 @@ screenshots: setup
 	$(BIN)/python -m tools.screenshots docs/screenshots
 
 study: setup
-	@for study in coverage wrong_models garbage one_mass campaign plan; do \
+	@for study in coverage wrong_models garbage one_mass campaign plan real_stand; do \
 		echo "== benchmarks.study_$$study"; $(BIN)/python -m benchmarks.study_$$study || exit 1; done
 
 lock: setup

@@ -320,7 +320,7 @@ def series_of_study(count: int = 8) -> list[str]:
     return sorted(np.random.default_rng(15).choice(list(published_table()), count, replace=False).tolist())
 
 
-def draw_scene(effect: Effect, seed: int) -> tuple[Scene, float, list[str]]:
+def draw_scene(effect: Effect, seed: int) -> tuple[Scene, float, list[Effect]]:
     """A random scene under that effect, its strength, and milder effects beside it.
 
     Half of the records have one or two of the other groups in their weakest strengths. A third of the stands
@@ -329,7 +329,7 @@ def draw_scene(effect: Effect, seed: int) -> tuple[Scene, float, list[str]]:
     rng = np.random.default_rng((seed, 15))
     name = str(rng.choice(series_of_study()))
     row, pullback_m = published_table()[name], load_stand().series(name).pullback_m
-    noise_m, rates = NOISES_AND_RATES[seed % len(NOISES_AND_RATES)]
+    noise_m, rates = NOISES_AND_RATES[rng.integers(len(NOISES_AND_RATES))]
     stated = rng.random() < 0.5
     stand = RealStand(
         period_s=row.period_s * rng.uniform(0.97, 1.03),
@@ -360,7 +360,7 @@ def draw_scene(effect: Effect, seed: int) -> tuple[Scene, float, list[str]]:
         chosen = other[rng.integers(len(other))]
         scene = chosen.change(scene, chosen.strength(rng, mild=True), rng)
         groups.add(chosen.group)
-        others.append(chosen.name)
+        others.append(chosen)
     return scene, strength, others
 
 
@@ -376,8 +376,8 @@ def _may_join(effect: Effect, scene: Scene) -> bool:
 
 
 def simulate(scene: Scene, cache: Path | None = None) -> Simulated:
-    """Simulate the record of a scene; in the folder `cache` what is without noise is kept."""
-    kept = cache / f"{sha256(repr(scene).encode()).hexdigest()[:20]}.npz" if cache else None
+    """Simulate the record of a scene; what is without noise is kept in the folder `cache`."""
+    kept = cache / f"{_fingerprint(scene)}.npz" if cache else None
     if kept and kept.exists():
         with np.load(kept) as file:
             readings, mean, slips_m = file["readings"], float(file["mean"]), file["slips_m"]
@@ -395,6 +395,12 @@ def simulate(scene: Scene, cache: Path | None = None) -> Simulated:
         table_gauge=gauge, relative_gauge=gauge,
     )  # fmt: skip
     return Simulated(record, mean, slips_m)
+
+
+def _fingerprint(scene: Scene) -> str:
+    """Of the scene and the simulator."""
+    sources = (Path(__file__).with_name(f"real_{name}.py") for name in ("stand", "gauges", "effects"))
+    return sha256(b"".join([repr(scene).encode(), *(path.read_bytes() for path in sources)])).hexdigest()[:20]
 
 
 def _readings(scene: Scene) -> tuple[Floats, float, Floats]:

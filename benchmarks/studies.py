@@ -5,27 +5,41 @@ import math
 import multiprocessing
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 Outcome = TypeVar("Outcome")
 
 
-def options(description: str, records: int) -> argparse.Namespace:
-    """Options that every study understands."""
+def option_parser(description: str, records: int) -> argparse.ArgumentParser:
+    """Parser of the options that every study understands."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument(
         "--records", type=int, default=records, metavar="N", help="records a table (%(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the first record (%(default)s)")
-    parser.add_argument("--workers", type=int, default=2, metavar="W", help="processes (%(default)s)")
-    return parser.parse_args()
+    parser.add_argument(
+        "--workers", "--processes", type=int, default=2, metavar="W", help="processes (%(default)s)"
+    )
+    return parser
+
+
+def options(description: str, records: int) -> argparse.Namespace:
+    """Options that every study understands."""
+    return option_parser(description, records).parse_args()
 
 
 def spread_out(
     work: Callable[[int], Outcome], seeds: Iterable[int], workers: int, label: str
 ) -> list[Outcome]:
-    """`work` on every seed, in order; progress goes to stderr.
+    """`work` on every seed, in order, by `each_outcome`."""
+    return list(each_outcome(work, seeds, workers, label))
+
+
+def each_outcome(
+    work: Callable[[int], Outcome], seeds: Iterable[int], workers: int, label: str
+) -> Iterator[Outcome]:
+    """`work` on every seed, in order, one by one; progress goes to stderr.
 
     Workers do their linear algebra in one thread: at these sizes more threads only wait for each other,
     and take three times the processor time.
@@ -35,7 +49,8 @@ def spread_out(
         os.environ.setdefault(threads, "1")
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
         outcomes = pool.imap(work, seeds, chunksize=4)
-        return [_counted(outcome, done, len(seeds), label) for done, outcome in enumerate(outcomes, 1)]
+        for done, outcome in enumerate(outcomes, 1):
+            yield _counted(outcome, done, len(seeds), label)
 
 
 def _counted(outcome: Outcome, done: int, total: int, label: str) -> Outcome:

@@ -1,5 +1,6 @@
 """The independent simulator of real stands against closed forms, energy, and the exact solver."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy import signal
 from scipy.linalg import expm
 
 from analysis.motion.two_mass import TwoMassParameters
+from benchmarks import study_real_stand
 from benchmarks.real_effects import EFFECTS, draw_scene, simulate
 from benchmarks.real_gauges import GRID_HZ, RealGauge
 from benchmarks.real_stand import BASE, BASE_V, BRISTLE, REL, WORK, RealStand, U, V, W
@@ -198,3 +200,34 @@ def test_there_are_sixty_effects_and_the_cache_keeps_records(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
     np.testing.assert_array_equal(first.record.table_displacement_m, again.record.table_displacement_m)
     assert first.friction_dynamic == again.friction_dynamic
+
+
+def test_the_study_counts_what_it_claims(tmp_path):
+    ideal = study_real_stand.run(62 * 3, (0,), tmp_path)
+    wrong = replace(ideal, friction=1.02 * ideal.truth, parts="drag_per_m", is_misnamed=True)
+    doubted = replace(wrong, adequate=False, number=7, slips=2)
+    holding = replace(wrong, adequate=False, degree="friction")
+
+    assert ideal.adequate
+    assert ideal.is_covered
+    assert not ideal.is_silently_wrong
+    assert (wrong.is_silently_wrong, doubted.is_silently_wrong, holding.is_silently_wrong) == (
+        True,
+        False,
+        True,
+    )
+    row = study_real_stand._row("all", [ideal, wrong, doubted])
+    assert row[:4] == ("all", "3 (2)", "1 of 2", "1 of 2")
+    assert row[6:10] == ("2 of 3", "1 of 3", "0 of 0", "2 of 3")
+
+
+def test_a_study_is_summarized_from_its_file_as_when_it_ran(tmp_path, monkeypatch, capsys):
+    arguments = ["study", "--records", "2", "--workers", "1", "--effect", "ideal"]
+    monkeypatch.setattr(sys, "argv", [*arguments, "--csv", str(tmp_path / "outcomes.csv")])
+    study_real_stand.main()
+    ran = capsys.readouterr().out
+    monkeypatch.setattr(sys, "argv", ["study", "--read", str(tmp_path / "outcomes.csv")])
+
+    study_real_stand.main()
+
+    assert capsys.readouterr().out == ran
