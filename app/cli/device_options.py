@@ -49,6 +49,7 @@ class StandOptions:
     friction: float | None = option("--friction", "True f_d; the series' if absent.")
     static_friction: float | None = option("--static-friction", "True f_s; f_d if absent.")
     tilt_rad: float = option("--tilt", "Tilt of the sliding plane (rad).", 0.0)
+    effects: list[str] | None = shared.effects()
     pullback_m: float | None = option(
         "--pullback", "Pullback (m), negative to the other side; the series' if absent."
     )

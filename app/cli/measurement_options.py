@@ -93,6 +93,7 @@ class SimulateOptions:
     """
 
     motion: MotionOptions
+    effects: list[str] | None = shared.effects()
     duration: float = number("--duration", "Seconds after release.", 10.0, above=0.0)
     rate: float = number("--rate", "Samples a second.", 1000.0, above=0.0)
     method: str = choice(

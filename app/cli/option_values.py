@@ -81,7 +81,7 @@ def executor_options(options: JobOptions) -> ExecutorOptions:
     return ExecutorOptions(options.jobs, options.dask)
 
 
-_EXAMPLES = {"--set": "separator=;", "--condition": "temperature_c=21.5"}
+_EXAMPLES = {"--set": "separator=;", "--condition": "temperature_c=21.5", "--effect": "release-ramp=0.01"}
 
 
 def key_values(pairs: list[str] | None, option: str = "--set") -> dict[str, str]:

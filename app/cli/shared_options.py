@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from app.cli.options import REQUIRED, argument, choice, flag, number, option
+from app.simulated_stand.effects import EFFECTS
 
 run_files = partial(argument, "Run files.", metavar="RUN...")
 runs_or_folders = partial(argument, "Run files, or folders of runs.", metavar="RUN|DIR...")
@@ -18,6 +19,13 @@ figure = partial(option, "--figure", "Figure to draw: PNG, SVG or PDF.")
 table_mass = partial(number, "--table-mass", "Table mass (kg), if not the stand's.", above=0.0)
 plate_mass = partial(number, "--plate-mass", "Plate mass (kg), if not the series'.", above=0.0)
 device_settings = partial(option, "--set", "A setting of the device; repeatable.", metavar="KEY=VALUE")
+effects = partial(
+    option,
+    "--effect",
+    "What is not ideal, repeatable (docs/how-to/simulate-a-real-stand.md): "
+    + ", ".join(name + f" ({effect.unit})" * (effect.unit != "1") for name, effect in EFFECTS.items()),
+    metavar="NAME=VALUE",
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,29 +15,45 @@ from app.cli.analysis_text import largest_rates
 from app.cli.errors import CommandError
 from app.cli.measurement_options import SimulateOptions
 from app.cli.motion_parameters import check_samples, motion_parameters
+from app.cli.option_values import key_values
 from app.runs.disk import atomic_write
 from app.runs.simulated import write_simulated_run
+from app.simulated_stand.effects import GAUGE_EFFECTS, gauge_values, motion_values, parse_effects
+from app.simulated_stand.gauge_chain import GaugeChain
+from app.simulated_stand.motion import simulate_stand
 
 
 def simulate(options: SimulateOptions) -> None:
     check_samples(options.duration, options.rate)
     target = out.output_file(options.output, options.force, (".csv", ".h5")) if options.output else None
     parameters = motion_parameters(options.motion)
+    effects = parse_effects(key_values(options.effects, "--effect"))
     if target is not None and target.suffix.lower() == ".h5" and parameters.pullback_m == 0.0:
         raise CommandError("--pullback 0 makes no run: nothing moves. Give another pullback, or -o FILE.csv")
+    is_run = target is not None and target.suffix.lower() == ".h5"
+    if (unread := [name for name in effects if name in GAUGE_EFFECTS]) and not is_run:
+        raise CommandError(f"--effect {unread[0]} changes readings, which only a run holds. Give -o FILE.h5")
     if options.method == "paper":
+        if effects:
+            raise CommandError("--effect needs --method exact: the paper knows the ideal stand only")
         _check_step(options.step, parameters)
         motion: Motion = simulate_by_paper(parameters, duration_s=options.duration, step_s=options.step)
     else:
-        motion = parameters.simulate(options.duration)
+        motion = simulate_stand(parameters, motion_values(effects), options.duration)
     if target is not None and target.suffix.lower() == ".csv":
         _write_csv(target, motion, options.rate, replace=options.force)
     elif target is not None:
-        series, rate_hz = options.motion.series, options.rate
-        write_simulated_run(target, motion, parameters, series=series, rate_hz=rate_hz, replace=options.force)
+        values = motion_values(effects), gauge_values(effects)
+        chain = GaugeChain(values[1], parameters.pullback_m, options.rate)
+        write_simulated_run(
+            target, motion, parameters,
+            series=options.motion.series, rate_hz=options.rate, replace=options.force,
+            effects=values[0] | values[1], read=chain.read,
+        )  # fmt: skip
     if target is not None:
         out.print_status(f"wrote {target}")
     document = _document(motion, parameters, options.method, options.step)
+    document["parameters"] |= motion_values(effects) | gauge_values(effects)
     if options.as_json:
         out.print_json(document)
     elif target is None:

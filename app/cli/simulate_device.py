@@ -10,6 +10,7 @@ from app.cli import output as out
 from app.cli.device_options import SimulateDeviceOptions, StandOptions
 from app.cli.option_values import checked, key_values
 from app.simulated_stand.client import Ready
+from app.simulated_stand.effects import parse_effects
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.process import read_disturbances, serve, stop_on_signal_or_orphaned
 
@@ -43,5 +44,6 @@ def _stand_options(options: StandOptions, settings: dict[str, str]) -> Simulated
         values["truth_file"] = str(out.output_file(options.truth_file, force=True))
     if options.gauges_file:
         values["gauges_file"] = str(options.gauges_file.expanduser().resolve())
+    values["effects"] = parse_effects(key_values(options.effects, "--effect"))
     values["disturbances"] = tuple(options.disturbances or ())
     return checked(SimulatedStandOptions, **values, device=settings)

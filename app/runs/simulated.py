@@ -1,6 +1,7 @@
 """Simulated tests as run files, with their truth."""
 
 import datetime
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from analysis.motion.two_mass import Motion, TwoMassParameters
 
 Floats = NDArray[np.float64]
+Displacements = Callable[[Floats], tuple[Floats, Floats]]
+Read = Callable[[Displacements, Floats], tuple[Floats, Floats]]
 PLATEAU_S = 1.0
 _EXACT = Gauge(
     gain_m_per_count=1.0,
@@ -38,11 +41,19 @@ def write_simulated_run(
     rate_hz: float = 1000.0,
     plateau_s: float = PLATEAU_S,
     replace: bool = False,
+    effects: Mapping[str, float] = {},
+    read: Read | None = None,
 ) -> StoredRun:
-    """Store a simulated motion, held at the pullback for `plateau_s` first. Raises RunError, ConfigError."""
+    """Store a simulated motion, held at the pullback for `plateau_s` first. Raises RunError, ConfigError.
+
+    `effects` are true deviations from the ideal stand, by their parameters; `read` is what gauges make of
+    the motion.
+    """
     held = round(plateau_s * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
-    table, relative = motion.sample_displacements((np.arange(count) - held) / rate_hz)
+    times_s = (np.arange(count) - held) / rate_hz
+    show = motion.sample_displacements
+    table, relative = show(times_s) if read is None else read(show, times_s)
     metadata = create_metadata(
         load_stand(),
         Gauges(table=_EXACT, relative=_EXACT),
@@ -56,7 +67,7 @@ def write_simulated_run(
         rate_hz=rate_hz,
         source="simulated",
         truth={name: value for name, value in asdict(parameters).items() if value is not None}
-        | {"friction_static": parameters.static_or_dynamic},
+        | {"friction_static": parameters.static_or_dynamic, **effects},
     )
     metadata = metadata.replace(stand=metadata.stand.replace(gravity_m_per_s2=parameters.gravity_m_per_s2))
     readings = np.column_stack([table, relative])

@@ -1,10 +1,16 @@
 """Motion of the simulated stand: repeated pullback tests, and the parameters of the chosen series."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from analysis.motion.two_mass import Motion, TwoMassParameters, stiffness_and_damping
+from analysis.laws.coulomb import COULOMB
+from analysis.laws.stand_parts import STAND_PLACES, StandSolver
+from analysis.laws.stribeck import STRIBECK_TILT
+from analysis.motion.stand_motion import STAND_PARAMETER_COUNT
+from analysis.motion.two_mass import Motion, TwoMassParameters, simulate_kernels, stiffness_and_damping
+from app.simulated_stand.effects import STRIBECK, motion_values
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.truth import StandTruth
 from config.files import published_row
@@ -17,7 +23,7 @@ class RepeatedPullback:
     """Pullback tests one after another, with the same release each time.
 
     Each test leaves the plate where it came to rest, and the next one begins there unless the operator
-    re-centres it. Friction does not depend on the position of the plate, so the motion is the same.
+    re-centres it. Friction along the track and wear begin anew with each test, so the motion is the same.
     """
 
     pullback_m: float
@@ -71,10 +77,26 @@ class RepeatedPullback:
         return 1.0 - _smooth((since_release_s - self.timetable.decay_s) / self.timetable.recentre_s)
 
 
-def released_motion(true: StandTruth, timetable: Timetable) -> Motion:
-    """Exact motion after each release. Raises MotionError for parameters that no stand can have."""
+def released_motion(true: StandTruth, timetable: Timetable, effects: Mapping[str, float] = {}) -> Motion:
+    """Motion after each release. Raises MotionError for parameters that no stand can have."""
     of_motion = {each.name: getattr(true, each.name) for each in fields(TwoMassParameters)}
-    return TwoMassParameters(**of_motion).simulate(timetable.decay_s + timetable.recentre_s)
+    duration_s = timetable.decay_s + timetable.recentre_s
+    return simulate_stand(TwoMassParameters(**of_motion), motion_values(effects), duration_s)
+
+
+def simulate_stand(parameters: TwoMassParameters, values: Mapping[str, float], duration_s: float) -> Motion:
+    """Motion with these values of the stand and of Stribeck's friction; the exact one without any.
+
+    Raises MotionError.
+    """
+    if not values:
+        return parameters.simulate(duration_s)
+    stand = np.zeros(STAND_PARAMETER_COUNT)
+    for name in values.keys() - {STRIBECK}:
+        stand[STAND_PLACES[name]] = values[name]
+    own = [values[STRIBECK]] if STRIBECK in values else []
+    kernels = StandSolver(STRIBECK_TILT if own else COULOMB).kernels
+    return simulate_kernels(kernels, np.concatenate((parameters.vector(), own, stand)), duration_s)
 
 
 def _smooth(x: Floats) -> Floats:

@@ -6,6 +6,7 @@ from typing import Literal
 
 import msgspec
 
+from app.simulated_stand.effects import check_effects
 from drivers.errors import DriverError
 from drivers.registry import find_driver
 from drivers.simulated.faults import parse_disturbance
@@ -83,6 +84,8 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     relative_drift_m_per_s: float = 0.0
     """Drifts begin again with each pullback test."""
     nonlinearity_m: float = 0.0  # largest deviation of both gauges from their calibration line
+    effects: dict[str, float] = {}
+    """Deviations from the ideal stand, by their names in `effects.EFFECTS`."""
     table_clip_m: float | None = None
     relative_clip_m: float | None = None
     """Readings beyond are clipped, and flagged where the protocol can."""
@@ -128,6 +131,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         check_within("every_s", self.every_s, self.timetable().parts_s, 86400.0)
         for name in ("drop", "flip", "truncate", "drop + flip + truncate"):
             check_within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
+        check_effects(self.effects)
         for text in self.disturbances:
             parse_disturbance(text)
 

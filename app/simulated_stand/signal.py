@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.simulated_stand.effects import gauge_values
+from app.simulated_stand.gauge_chain import GaugeChain
 from app.simulated_stand.motion import RepeatedPullback
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauge, Gauges
@@ -54,7 +56,10 @@ class StandSignal:
         relative = GaugeFaults(noise_m, options.relative_drift_m_per_s, bend_m, options.relative_clip_m)
         self._table = SimulatedGauge(gauges.table, table, random)
         self._relative = SimulatedGauge(gauges.relative, relative, random)
-        self._plate_is_absolute = gauges.relative.measures == "plate"
+        self._chain = GaugeChain(
+            gauge_values(options.effects), motion.pullback_m, rate_hz,
+            is_absolute=gauges.relative.measures == "plate",
+        )  # fmt: skip
         self._motion = motion
         self._rate_hz = rate_hz
         self._started_s = started_s
@@ -71,17 +76,18 @@ class StandSignal:
 
     def _make(self, count: int) -> None:
         time_s = self._started_s + np.arange(self._next, self._next + count) / self._rate_hz
-        time_s = np.maximum(time_s, 0.0)  # before a start that lies ahead it rests
         self._next += count
-        table_m, relative_m = self._motion.displacements(time_s)
-        drifting_s = self._motion.drift_time_s(time_s)
+        table_m, relative_m = self._chain.read(self._displacements, time_s)
+        drifting_s = self._motion.drift_time_s(np.maximum(time_s, 0.0))
         table, table_overload = self._table.read(table_m, drifting_s)
-        seen_m = relative_m + table_m if self._plate_is_absolute else relative_m
-        relative, relative_overload = self._relative.read(seen_m, drifting_s)
+        relative, relative_overload = self._relative.read(relative_m, drifting_s)
         status = np.where(table_overload, _TABLE, np.uint8(0))
         status[relative_overload] |= _RELATIVE
         self._counts = np.concatenate([self._counts, np.column_stack([table, relative])])
         self._status = np.concatenate([self._status, status])
+
+    def _displacements(self, time_s: Floats) -> tuple[Floats, Floats]:
+        return self._motion.displacements(np.maximum(time_s, 0.0))  # before a start that lies ahead it rests
 
 
 ADC_MAX_COUNT = 2**23 - 1  # largest count of a 24-bit converter

@@ -34,7 +34,7 @@ class SimulatedStandDevice:
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
         self._timetable = options.timetable()
-        released = released_motion(self._true, self._timetable)
+        released = released_motion(self._true, self._timetable, options.effects)
         self._motion = RepeatedPullback(
             self._true.pullback_m, released, self._timetable, options.plate_offset_m
         )

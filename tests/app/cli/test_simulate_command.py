@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from cli_kit import assert_one_error_line
 
@@ -186,3 +187,29 @@ def test_a_folder_is_no_output_file(slipstand: Any, tmp_path: Path) -> None:
     (tmp_path / "out.csv").mkdir()
     said = slipstand("simulate", "--series", "1FFM0", "-o", tmp_path / "out.csv", "--force")
     assert_one_error_line(said, "is a folder")
+
+
+def test_a_stand_that_is_not_ideal_is_stored_with_its_truth(slipstand: Any, tmp_path: Path) -> None:
+    path = tmp_path / "real.h5"
+    effects = ("--effect", "release-ramp=0.01", "--effect", "gauge-2-lag=0.002")
+    outcome = slipstand("simulate", "--series", "1FFM0", "--duration", 3, *effects, "-o", path, "--json")
+    assert outcome.json["parameters"]["release_ramp_s"] == 0.01
+    run = open_run(path)
+    assert run.metadata.truth["release_ramp_s"] == 0.01
+    assert run.metadata.truth["gauge_2_lag_s"] == 0.002
+    ideal = tmp_path / "ideal.h5"
+    slipstand("simulate", "--series", "1FFM0", "--duration", 3, *effects[:2], "-o", ideal)
+    np.testing.assert_allclose(run.relative_reading[2:], open_run(ideal).relative_reading[:-2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--effect", "film"), "--effect 'film' must be KEY=VALUE, for example --effect release-ramp=0.01"),
+        (("--effect", "film=1", "--method", "paper"), "--effect needs --method exact"),
+        (("--effect", "cross-talk=0.01"), "--effect cross-talk changes readings, which only a run holds"),
+        (("--effect", "film=99"), "effect film = 99 s/m is out of range: give -5 to 20"),
+    ],
+)
+def test_an_effect_that_cannot_be_is_refused(slipstand: Any, given: Any, said: str) -> None:
+    assert_one_error_line(slipstand("simulate", "--series", "1FFM0", *given), said)

@@ -1,0 +1,70 @@
+"""What gauges that are not ideal make of a motion: lag, filter, bend, cross-talk and gain."""
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from analysis.arrays import Floats
+
+Displacements = Callable[[Floats], tuple[Floats, Floats]]
+"""u1 and u2 - u1 (n,) at times (n,)."""
+
+
+class GaugeChain:
+    """Both gauges behind their amplifiers, sample by sample at an even rate.
+
+    `values` are those of `effects.gauge_values`. With `is_absolute` gauge 2 measures the plate against the
+    base.
+    """
+
+    def __init__(
+        self, values: Mapping[str, float], pullback_m: float, rate_hz: float, *, is_absolute: bool = False
+    ) -> None:
+        self._lag_s = values.get("gauge_2_lag_s", 0.0)
+        self._cross_talk = values.get("cross_talk", 0.0)
+        self._gain = 1.0 + values.get("relative_gain", 0.0)
+        square = max(abs(pullback_m), 1e-9) ** 2
+        self._bends = [values.get(f"gauge_{number}_bend", 0.0) / square for number in (1, 2)]
+        corners = [values.get(f"gauge_{number}_filter_hz") for number in (1, 2)]
+        self._filters = [None if corner is None else ButterworthFilter(corner, rate_hz) for corner in corners]
+        self._is_absolute = is_absolute
+
+    def read(self, displacements: Displacements, time_s: Floats) -> tuple[Floats, Floats]:
+        """Readings (m), (n,), at even times (n,) that follow those of the last call."""
+        table, relative = moved = displacements(time_s)
+        if self._lag_s:
+            moved = displacements(time_s - self._lag_s)
+            relative = moved[1]
+        if self._is_absolute:
+            relative = relative + moved[0]
+        relative = self._gain * (relative + self._cross_talk * moved[0])
+        shown = []
+        for row, bend, low_pass in zip((table, relative), self._bends, self._filters, strict=True):
+            bent = row + bend * row**3 if bend else row
+            shown.append(bent if low_pass is None else low_pass.filter(bent))
+        return shown[0], shown[1]
+
+
+class ButterworthFilter:
+    """Analogue low-pass filter of order 2, of a signal that is straight between its samples."""
+
+    def __init__(self, corner_hz: float, rate_hz: float) -> None:
+        from scipy import signal  # takes a third of a second
+
+        w = 2.0 * math.pi * corner_hz
+        system = np.array([w * w]), np.array([1.0, math.sqrt(2.0) * w, w * w])
+        numerator, self._denominator, _ = signal.cont2discrete(system, 1.0 / rate_hz, "foh")
+        self._numerator = np.ravel(numerator)
+        self._signal = signal
+        self._state: Floats | None = None
+
+    def filter(self, values: Floats) -> Floats:
+        """Filtered values (n,) that follow those of the last call; before, the first one held for ever."""
+        if self._state is None:
+            self._state = self._signal.lfilter_zi(self._numerator, self._denominator) * values[0]
+        filtered: Floats
+        filtered, self._state = self._signal.lfilter(
+            self._numerator, self._denominator, values, zi=self._state
+        )
+        return filtered
