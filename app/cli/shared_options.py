@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from app.cli.options import REQUIRED, argument, choice, flag, number, option
-from app.simulated_stand.effects import EFFECTS
+from app.simulated_stand.effects import LISTED
 
 run_files = partial(argument, "Run files.", metavar="RUN...")
 runs_or_folders = partial(argument, "Run files, or folders of runs.", metavar="RUN|DIR...")
@@ -22,8 +22,7 @@ device_settings = partial(option, "--set", "A setting of the device; repeatable.
 effects = partial(
     option,
     "--effect",
-    "What is not ideal, repeatable (docs/how-to/simulate-a-real-stand.md): "
-    + ", ".join(name + f" ({effect.unit})" * (effect.unit != "1") for name, effect in EFFECTS.items()),
+    f"What is not ideal, repeatable (docs/how-to/simulate-a-real-stand.md): {', '.join(LISTED)}.",
     metavar="NAME=VALUE",
 )
 

@@ -1,17 +1,18 @@
 """The Simulated stand screen: state and presenter. Options before the start, faults and truth after it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
 from analysis.catalogue import KILOGRAM, MILLIMETRE, MILLIRADIAN, MILLISECOND, PER_SECOND
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
-from app.presenters.number_text import format_in, parse_field
+from app.presenters.number_text import format_in, normalize_number, parse_field
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.effects import parse_effects
 from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
@@ -31,6 +32,7 @@ class StandForm:
     rate_hz: str = ""
     drop_percent: str = ""
     flip_percent: str = ""
+    effects: str = ""  # name=value, with blanks between them
 
 
 _FIELDS: Final = {
@@ -127,12 +129,24 @@ class StandPresenter(Presenter[StandState]):
 
 def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """Options of a form. Raises ValueError that names field, value and remedy."""
-    filled = {}
+    filled: dict[str, Any] = {}
     for name, (option, title, scale) in _FIELDS.items():
         value = parse_field(getattr(form, name), gettext(title), scale)
         if value is not None:
             filled[option] = value
+    if form.effects.strip():
+        filled["effects"] = _effects(form.effects)
     return msgspec.structs.replace(base, series=form.series, **filled)
+
+
+def _effects(text: str) -> dict[str, float]:
+    """Read `name=value` pairs. Raises EffectError."""
+    pairs = (part.rstrip(",").partition("=") for part in text.replace(";", " ").split())
+    return parse_effects({name: normalize_number(value) for name, _, value in pairs})
+
+
+def _effects_text(effects: Mapping[str, float]) -> str:
+    return " ".join(f"{name}={value:g}" for name, value in effects.items())
 
 
 def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
@@ -151,6 +165,7 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
         "T": format_in(MILLISECOND, stand.period_s, 2),
         "n<sub>1</sub>": with_unit(f"{stand.damping_n1_per_s:.4g}", PER_SECOND.symbol),
         gettext("table, plate"): with_unit(masses, KILOGRAM.symbol),
+        **({gettext("effects"): _effects_text(effects)} if (effects := truth.options.effects) else {}),
         gettext("slip of a release"): format_in(MILLIMETRE, truth.residual_displacement_m, 3),
         gettext("releases"): releases,
         gettext("frames sent"): f"{wire.frames}",
@@ -173,4 +188,4 @@ def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
     if options.friction is None:
         values["friction"] = published_row(form.series).friction_dynamic
     texts = {name: f"{value * _FIELDS[name][2]:g}" for name, value in values.items()}
-    return StandForm(form.series, **texts)
+    return StandForm(form.series, **texts, effects=_effects_text(options.effects))

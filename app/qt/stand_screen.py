@@ -10,6 +10,7 @@ from app.qt.widgets.inputs import ComboBox, make_button, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
+from app.simulated_stand.effects import LISTED
 from messages.i18n import N_, gettext
 
 _FIELDS = {
@@ -22,6 +23,7 @@ _FIELDS = {
     "rate_hz": (N_("Rate, Hz"), N_("Samples a second")),
     "drop_percent": (N_("Lost bytes, %"), N_("Of the frames, as many lose a byte")),
     "flip_percent": (N_("Wrong bits, %"), N_("Of the frames, as many have a bit flipped")),
+    "effects": (N_("Effects"), N_("What is not ideal, for example release-ramp=0.01 film=0.5. There are:")),
 }
 _FAULTS = {
     "stall": (N_("Stall"), N_("The device sends nothing, and goes on afterwards")),
@@ -96,6 +98,8 @@ class StandScreen(QWidget):
         _add(grid, 0, gettext("Series"), self._series, gettext("Brings pullback, masses, period and damping"))
         for line, (name, field) in enumerate(self._fields.items(), start=1):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
+        effects = self._fields["effects"]
+        effects.setToolTip("\n".join((effects.toolTip(), *LISTED)))
         hint = gettext("An empty field means the value in grey.")
         return _card(gettext("Set up the stand"), hint, grid, self._start, self._message)
 

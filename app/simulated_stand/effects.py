@@ -58,6 +58,8 @@ GAUGE_EFFECTS = {
 }
 """They change readings, not the motion."""
 EFFECTS = MOTION_EFFECTS | GAUGE_EFFECTS
+LISTED = [name if effect.unit == "1" else f"{name} ({effect.unit})" for name, effect in EFFECTS.items()]
+"""Names with their units, for help texts."""
 _COMPLETED_BY = {
     "second-mode": {"second-mode-frequency": 8.0, "second-mode-damping": 0.01},
 }

@@ -39,7 +39,7 @@ def test_empty_fields_take_what_is_usual_and_say_what_that_is(desk: Desk) -> Non
 
 
 def test_what_is_filled_in_becomes_the_stand() -> None:
-    form = StandForm("1FFM0", "0,12", "-1.5", "5", "1000", "1", "0.5")
+    form = StandForm("1FFM0", "0,12", "-1.5", "5", "1000", "1", "0.5", "release-ramp=0,01, film=0.5")
     assert stand_options(form, BASE) == SimulatedStandOptions(
         decay_s=30.0,
         seed=1,
@@ -49,6 +49,7 @@ def test_what_is_filled_in_becomes_the_stand() -> None:
         rate_hz=1000.0,
         drop=0.01,
         flip=0.005,
+        effects={"release-ramp": 0.01, "film": 0.5},
     )
 
 
@@ -58,6 +59,8 @@ def test_what_is_filled_in_becomes_the_stand() -> None:
         (StandForm("1FFM0", friction="much"), "Friction 'much' is not a number"),
         (StandForm("1FFM0", friction="3"), "out of range"),
         (StandForm("1FFM0", drop_percent="101"), "out of range"),
+        (StandForm("1FFM0", effects="ramp=0.01"), "'ramp' is not known: choose from release-ramp"),
+        (StandForm("1FFM0", effects="film"), "Effect film '' is not a number"),
     ],
 )
 def test_what_cannot_be_is_said_and_nothing_starts(desk: Desk, form: StandForm, words: str) -> None:
@@ -65,7 +68,7 @@ def test_what_cannot_be_is_said_and_nothing_starts(desk: Desk, form: StandForm, 
     desk.presenter.start()
     assert words in desk.presenter.state.message.text
     assert desk.opened == []
-    desk.presenter.set_form(replace(form, friction="0.1", drop_percent=""))
+    desk.presenter.set_form(replace(form, friction="0.1", drop_percent="", effects=""))
     assert desk.presenter.state.message == EMPTY_CHIP
 
 
