@@ -17,7 +17,7 @@ from app.cli.analysis_text import print_analysis
 from app.cli.analyze import save_figure
 from app.cli.errors import CommandError
 from app.cli.measurement_options import DemoOptions
-from app.cli.option_values import calibration_file, checked, executor_options, recordings_folder
+from app.cli.option_values import calibration_file, checked, executor_options, key_values, recordings_folder
 from app.cli.record import record_with_progress
 from app.runs.analysis_json import read_quantity
 from app.runs.analyze import AnalysisRequest, analyze_run
@@ -25,6 +25,7 @@ from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_run
 from app.runs.listing import find_run_files
 from app.runs.paths import recordings_directory
 from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.effects import EFFECTS, gauge_values, motion_values, parse_effects
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.synthetic_campaign import (
     CampaignOptions,
@@ -49,7 +50,10 @@ def demo(options: DemoOptions) -> None:
 def _record_test(options: DemoOptions) -> None:
     out.print_status("starting the simulated stand (a first start compiles the solver, up to a minute)")
     series, friction = options.series or "1FFM0", options.friction
-    stand_options = checked(SimulatedStandOptions, series=series, friction=friction, decay_s=_RECORD_S + 2.0)
+    effects = parse_effects(key_values(options.effects, "--effect"))
+    stand_options = checked(
+        SimulatedStandOptions, series=series, friction=friction, effects=effects, decay_s=_RECORD_S + 2.0
+    )
     with SimulatedStand.start(stand_options) as stand:
         port = PortSettings(url=stand.port, protocol=stand_options.protocol, rate_hz=stand_options.rate_hz)
         run = RunSettings(
@@ -61,6 +65,7 @@ def _record_test(options: DemoOptions) -> None:
         )
         (ended,) = record_with_progress(port, run, calibration_file(None), simulated=True)
         truth = msgspec.to_builtins(stand.truth().stand)
+        truth |= motion_values(effects) | gauge_values(effects)
     if ended.ended == EndReason.INTERRUPTED:
         raise typer.Exit(130)
     if ended.ended != EndReason.DURATION:
@@ -86,10 +91,11 @@ _COMPARED = (
 def _print_compared(results: dict[str, Any], truth: dict[str, float]) -> None:
     """Write found beside true, and their difference in per cent and in standard uncertainties."""
     rows = []
-    for row in map(definition, _COMPARED):
-        if row.name not in results:
+    effects = (effect.parameter for effect in EFFECTS.values() if effect.parameter in truth)
+    for name in (*_COMPARED, *effects):
+        if name not in results:
             continue
-        found, true = read_quantity(results[row.name]), truth[row.name]
+        row, found, true = definition(name), read_quantity(results[name]), truth[name]
         off, scale = found.value - true, row.unit_at(Place.TERMINAL).scale
         uncertainty = found.standard_uncertainty or 0.0
         shown = str(format_value(found.value * scale, uncertainty * scale))
@@ -110,6 +116,7 @@ def _record_campaign(options: DemoOptions) -> None:
         repeats=options.repeats,
         friction_scatter=options.scatter,
         seed=options.seed,
+        effects=parse_effects(key_values(options.effects, "--effect")),
     )
     executor = executor_options(options.jobs)
     stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()

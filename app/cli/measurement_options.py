@@ -43,6 +43,7 @@ class DemoOptions:
     friction: float | None = number("--friction", "True f_d; the series' if absent.", above=0.0)
     directory: Path | None = shared.directory()
     campaign: bool = flag("--campaign", "All series of Table 1, several tests each, not in real time.")
+    effects: list[str] | None = shared.effects()
     repeats: int = option("--repeats", "With --campaign: tests of each series.", 3)
     scatter: float = option(
         "--scatter", "With --campaign: standard deviation of f_d from run to run, as a share.", 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.campaign.rows import SeriesRow
 from analysis.catalogue import CATALOGUE, table_columns
-from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.motion.two_mass import TwoMassParameters
 from app.runs.analyze import Progress
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import error_message, map_runs
@@ -21,11 +21,13 @@ from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.errors import RunError
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
+from app.simulated_stand.effects import check_effects, gauge_values, motion_values
+from app.simulated_stand.gauge_chain import GaugeChain
+from app.simulated_stand.motion import simulate_stand
 from app.simulated_stand.options import check_within
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauges, Stand
-from drivers.arrays import Floats
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
@@ -48,6 +50,8 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
     friction_scatter: float = 0.0  # standard deviation of f_d from run to run, as a share of it
     friction_per_kg: float = 0.0  # by which share f_d changes for each kg of added mass
     friction_by_contact: bool = False  # f_d of the contact's first row everywhere
+    effects: dict[str, float] = {}
+    """What is not ideal in every test, by the names in `effects.EFFECTS`."""
     static_friction: Literal["printed", "dynamic"] = "printed"
     """"printed": as in Table 1, or f_d where the row would then never slip; "dynamic": f_d everywhere."""
 
@@ -58,6 +62,7 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
         }  # fmt: skip
         for name, (low, high) in limits.items():
             check_within(name, getattr(self, name), low, high)
+        check_effects(self.effects)
 
 
 class SystematicErrors(msgspec.Struct, frozen=True):
@@ -111,13 +116,14 @@ def plan_tests(
     errors = draw_errors(stand, gauges, options.seed)
     drawn = dict(zip(("gain_error_table", "gain_error_relative"), errors.gains, strict=True))
     drawn |= {"lag_s": errors.lag_s, "clock_error": errors.clock, "campaign_seed": options.seed}
+    drawn |= motion_values(options.effects) | gauge_values(options.effects)
     codes = [stand.series(code).code for code in options.series or published_table()]
     tests = []
     for number, (code, repeat) in enumerate(product(codes, range(1, options.repeats + 1))):
         start, seed = first + number * _BETWEEN_TESTS, (options.seed, 1 + number)
         parameters = _varied(series_parameters(options, stand, errors, code), options.friction_scatter, seed)
         path = folder / f"{start:%Y%m%dT%H%M%S}_{code}_{repeat:03d}.h5"
-        truth = expected_results(parameters, code) | drawn
+        truth = expected_results(options, parameters, code) | drawn
         tests.append(SyntheticTest(str(path), code, start, seed, options, errors, parameters, truth))
     return tests
 
@@ -149,10 +155,10 @@ def series_parameters(
     )
 
 
-def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
+def expected_results(options: CampaignOptions, parameters: TwoMassParameters, code: str) -> dict[str, Any]:
     """What a perfect analysis would find, by the names of its results."""
     printed = published_row(code)
-    motion = parameters.simulate(_UNTIL_REST_S)
+    motion = simulate_stand(parameters, motion_values(options.effects), _UNTIL_REST_S)
     given = {name: value for name, value in asdict(parameters).items() if value is not None}
     return given | {
         "friction_static": parameters.static_or_dynamic,
@@ -193,7 +199,10 @@ def series_truths(
 ) -> dict[str, Any]:
     """What is true of each series, by its code: the mean of its runs where they differ."""
     errors = draw_errors(stand, gauges, options.seed)
-    return {code: expected_results(series_parameters(options, stand, errors, code), code) for code in codes}
+    return {
+        code: expected_results(options, series_parameters(options, stand, errors, code), code)
+        for code in codes
+    }
 
 
 def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Comparison]:
@@ -238,9 +247,13 @@ def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
     time_s = np.arange(count) / options.rate_hz
     release_s = _HELD_S + rng.random() / options.rate_hz
     since_s = time_s * (1.0 + errors.clock) - release_s
-    motion = test.parameters.simulate(options.duration_s + 1.0)
+    motion = simulate_stand(test.parameters, motion_values(options.effects), options.duration_s + 1.0)
     places_m = rng.normal(scale=_PLACES_M)
-    shown = _displacements(motion, since_s, errors.lag_s, of_plate=gauges.relative.measures == "plate")
+    values = gauge_values(options.effects)
+    values["gauge_2_lag_s"] = values.get("gauge_2_lag_s", 0.0) + errors.lag_s
+    is_absolute = gauges.relative.measures == "plate"
+    chain = GaugeChain(values, test.parameters.pullback_m, options.rate_hz, is_absolute=is_absolute)
+    shown = chain.read(motion.sample_displacements, since_s)
     stated = (gauges.table, gauges.relative)
     gauge_errors = zip(stated, errors.gains, errors.bends_m, places_m, shown, _OVERLOADS, strict=True)
     counts, readings, status = [], [], np.zeros(count, np.uint8)
@@ -294,10 +307,3 @@ def test_metadata(test: SyntheticTest) -> RunMetadata:
         source="simulated",
         truth=test.truth,
     )
-
-
-def _displacements(motion: Motion, since_s: Floats, lag_s: float, *, of_plate: bool) -> tuple[Floats, Floats]:
-    """True displacements (n,) that gauge 1 and the later gauge 2 are to read."""
-    table, _ = motion.sample_displacements(since_s)
-    table_then, relative = motion.sample_displacements(since_s - lag_s)
-    return table, relative + table_then if of_plate else relative

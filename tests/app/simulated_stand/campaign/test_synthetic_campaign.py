@@ -82,6 +82,22 @@ def test_a_run_says_what_is_stated_reads_by_what_is_true_and_knows_both(tmp_path
     assert swing == pytest.approx(0.012, rel=0.2)
 
 
+def test_every_test_of_a_campaign_has_its_effects(tmp_path):
+    ideal = msgspec.structs.replace(FEW, repeats=1, noise_m=0.0)
+    real = msgspec.structs.replace(ideal, effects={"gauge-ratio": 0.02, "release-ramp": 0.02})
+    (plain, *_), (test, *_) = planned(ideal, tmp_path / "ideal"), planned(real, tmp_path / "real")
+    assert (test.truth["release_ramp_s"], test.truth["relative_gain"]) == (0.02, 0.02)
+    for one in (plain, test):
+        Path(one.path).parent.mkdir()
+        write_test(one)
+    before, after = open_run(Path(plain.path)), open_run(Path(test.path))
+    held = before.time_s < 0.9
+    np.testing.assert_allclose(after.table_reading[held], before.table_reading[held], atol=1e-8)
+    assert np.abs(after.relative_reading - before.relative_reading).max() > 1e-4
+    with pytest.raises(ValueError, match="is not known"):
+        msgspec.structs.replace(FEW, effects={"ramp": 1.0})
+
+
 def test_a_series_that_is_none_is_refused():
     with pytest.raises(ConfigError, match="9XX"):
         planned(CampaignOptions(series=("9XX",)))
