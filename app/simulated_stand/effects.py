@@ -29,6 +29,7 @@ STRIBECK = "stribeck_velocity_m_per_s"
 MOTION_EFFECTS = {
     "release-ramp": Effect("release_ramp_s", "s", 0.0, 0.06),
     "release-step": Effect("release_step", "1", 0.0, 0.95),
+    "release-shape": Effect("release_shape", "1", -1.5, 3.0),
     "release-velocity": Effect("release_velocity_m_per_s", "m/s", -0.3, 0.3),
     "spring-hardening": Effect("spring_hardening", "1", -0.3, 0.5),
     "spring-asymmetry": Effect("spring_asymmetry", "1", -0.3, 0.3),
@@ -53,6 +54,8 @@ GAUGE_EFFECTS = {
     "gauge-2-filter": Effect("gauge_2_filter_hz", "Hz", 0.5, 1e5),
     "gauge-1-bend": Effect("gauge_1_bend", "1", -0.2, 0.2),
     "gauge-2-bend": Effect("gauge_2_bend", "1", -0.2, 0.2),
+    "gauge-1-creep": Effect("gauge_1_creep_m", "m", -0.01, 0.01),
+    "gauge-2-creep": Effect("gauge_2_creep_m", "m", -0.01, 0.01),
     "cross-talk": Effect("cross_talk", "1", -0.2, 0.2),
     "gauge-ratio": Effect("relative_gain", "1", -0.3, 0.3),
 }

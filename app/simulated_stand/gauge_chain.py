@@ -1,4 +1,4 @@
-"""What gauges that are not ideal make of a motion: lag, filter, bend, cross-talk and gain."""
+"""What gauges that are not ideal make of a motion: lag, filter, bend, creep, cross-talk and gain."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 
+_CREEP_TIME_S = 10.0  # a bridge that is switched on warms up in some tens of seconds
 Displacements = Callable[[Floats], tuple[Floats, Floats]]
 """u1 and u2 - u1 (n,) at times (n,)."""
 
@@ -28,6 +29,8 @@ class GaugeChain:
         self._bends = [values.get(f"gauge_{number}_bend", 0.0) / square for number in (1, 2)]
         corners = [values.get(f"gauge_{number}_filter_hz") for number in (1, 2)]
         self._filters = [None if corner is None else ButterworthFilter(corner, rate_hz) for corner in corners]
+        self._creeps_m = [values.get(f"gauge_{number}_creep_m", 0.0) for number in (1, 2)]
+        self._first_s: float | None = None
         self._is_absolute = is_absolute
 
     def read(self, displacements: Displacements, time_s: Floats) -> tuple[Floats, Floats]:
@@ -39,9 +42,13 @@ class GaugeChain:
         if self._is_absolute:
             relative = relative + moved[0]
         relative = self._gain * (relative + self._cross_talk * moved[0])
+        if self._first_s is None:
+            self._first_s = float(time_s[0])
+        warm = -np.expm1((self._first_s - time_s) / _CREEP_TIME_S)
         shown = []
-        for row, bend, low_pass in zip((table, relative), self._bends, self._filters, strict=True):
-            bent = row + bend * row**3 if bend else row
+        chains = zip((table, relative), self._bends, self._creeps_m, self._filters, strict=True)
+        for row, bend, creep_m, low_pass in chains:
+            bent = row + bend * row**3 + creep_m * warm
             shown.append(bent if low_pass is None else low_pass.filter(bent))
         return shown[0], shown[1]
 

@@ -90,6 +90,9 @@ def test_lag_gain_cross_talk_and_bend_are_as_large_as_chosen():
     table, relative = GaugeChain(values, 0.012, RATE_HZ).read(moving, time_s)
     np.testing.assert_allclose(relative, 1.02 * (relative_m + 0.01 * table_m), rtol=1e-12)
     assert np.abs(table - table_m).max() == pytest.approx(0.005 * 0.012)
+    creeping = GaugeChain({"gauge_2_creep_m": 1e-4}, 0.012, RATE_HZ)
+    crept = np.concatenate([creeping.read(moving, part)[1] for part in np.split(time_s, 5)]) - relative_m
+    np.testing.assert_allclose(crept, 1e-4 * -np.expm1(-time_s / 10.0), atol=1e-15)
     _, plate = GaugeChain({}, 0.012, RATE_HZ, is_absolute=True).read(moving, time_s)
     np.testing.assert_array_equal(plate, relative_m + table_m)
 
