@@ -1,0 +1,1 @@
+"""Friction from the plate alone: slips, their parabolas, and the mean over the slid path."""

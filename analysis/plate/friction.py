@@ -1,0 +1,290 @@
+"""Dynamic friction from the plate alone: needs no model of the table, the springs or the release.
+
+While the plate slides, only friction, gravity and tilt act on it: u2'' = -g (s f_d - alpha), with s the sign
+of its velocity relative to the table.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.plate.slips import Sliding, Slip, find_slips
+from analysis.plate.spline import (
+    GAIN,
+    LAG,
+    SHARED_COUNT,
+    Covariate,
+    NormalEquations,
+    Readings,
+    normal_equations,
+)
+from analysis.preparation.free_decay import FreeDecay, relative_to_table
+from analysis.record import Record
+
+_EDGES_S = (0.005, 0.012, 0.03)
+"""Left out at both ends of a slip, where friction changes sign: longer where filters round more than this."""
+_EDGE_READINGS = 3
+_FILTER_LAGS = 3.0  # edges behind a filter, over its lag: what is left of a step is less than 5 %
+_MISFIT_SIGMAS = 5.0  # by which chi-square may be too large before edges grow
+_READINGS_MIN = 50
+_SLIPS_MIN = 3  # scatter between fewer slips is not known
+_FRICTION_UNCERTAINTY_MAX = 0.5  # of a slip, as a share of the median: others tell nothing
+_TILT_PRIOR_RAD = 0.02  # a plate that leans more slides off
+_LAG_STEPS = 4
+_LAG_SETTLED_S = 3e-5  # what is left of second order moves u1 by nanometres
+_EVIDENCE_MIN = (
+    12.0  # fall of -2 ln L for which friction is taken to vary: BIC of 1,000 readings, three looks
+)
+_SCATTERS = (0.0, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2, 6.4e-2, 0.13, 0.26)  # shares of friction
+
+COVARIATES = "sliding velocity", "position", "slid path"
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """Slope of friction in a covariate, all else constant."""
+
+    per_unit: float
+    standard_uncertainty: float
+    is_significant: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlateFriction:
+    """Friction from the plate's parabolas."""
+
+    friction_dynamic: float  # mean over the path that the plate slid
+    standard_uncertainty: float
+    tilt_rad: float  # in the frame of the decay
+    tilt_standard_uncertainty_rad: float
+    lag_s: float  # by which gauge 2 is later than gauge 1
+    lag_standard_uncertainty_s: float
+    relative_gain_error: float  # of gauge 2 against gauge 1
+    time_s: Floats
+    """(k,) float64: middle of each slip (s)."""
+    friction: Floats
+    """(k,) float64: friction of each slip, with `tilt_rad` taken off."""
+    friction_standard_uncertainty: Floats
+    position_m: Floats  # (k,) float64: middle of each slip on the table
+    speed_m_per_s: Floats  # (k,) float64: mean of each slip
+    path_m: Floats  # (k,) float64: slid in each slip
+    scatter: float  # standard deviation of friction between slips beyond noise
+    variation: dict[str, Variation]
+    """By covariate: per m/s of sliding velocity, per m of position, per m of slid path."""
+    misfit: float  # chi-square of the readings over its expectation
+
+
+def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction | None:
+    """Estimate f_d from the curvature of u2 in each slip.
+
+    Returns None without gauge 2, with fewer than three slips that are long enough, or where all of them
+    have one direction.
+    """
+    if decay.relative is None:
+        return None
+    relative = relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute)
+    relative = relative.between(decay.release.time_s, decay.dense_until_s)
+    if len(relative) < _READINGS_MIN:
+        return None
+    sliding = Sliding.of(relative, decay)
+    readings = Readings.of(record, decay, sliding)
+    lags_s = [gauge.lateness_s for gauge in (record.table_gauge, record.relative_gauge) if gauge.filter]
+    least_s = max(_EDGE_READINGS * decay.channels.interval_s, _FILTER_LAGS * max(lags_s, default=0.0))
+    best = None
+    for edge_s in _EDGES_S:
+        fitted = _fit(sliding, readings, max(edge_s, least_s))
+        if fitted is None:
+            break
+        best = fitted
+        if best.misfit < 1.0 + _MISFIT_SIGMAS * np.sqrt(2.0 / best.freedom):
+            break
+    return None if best is None else _summarise(best, record, sliding)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Fitted:
+    slips: list[Slip]
+    equations: NormalEquations
+    lag_s: float
+    extents: tuple[float, ...]  # ranges of the covariates
+
+    @property
+    def sign(self) -> Floats:
+        return np.array([slip.sign for slip in self.slips], dtype=np.float64)
+
+    @property
+    def freedom(self) -> int:
+        equations = self.equations
+        return max(equations.reading_count - equations.eliminated - len(equations.right), 1)
+
+    @property
+    def misfit(self) -> float:
+        """Chi-square over its expectation, with all friction free."""
+        found, _ = self.free_friction(range(len(self.extents)))
+        return (self.equations.squares - float(found @ self.equations.right)) / self.freedom
+
+    def free_friction(self, varying: Iterable[int]) -> tuple[Floats, Floats]:
+        """Estimates (friction of slips, shared, covariates) and their covariance; no slip knows of others.
+
+        Covariates that are not `varying` have no part in friction.
+        """
+        k = len(self.slips) + SHARED_COUNT
+        kept = [*range(k), *(k + number for number in varying)]
+        full, covariance = np.zeros(len(self.equations.right)), np.zeros_like(self.equations.matrix)
+        inverse = _inverse(self.equations.matrix[np.ix_(kept, kept)])
+        full[kept] = inverse @ self.equations.right[kept]
+        covariance[np.ix_(kept, kept)] = inverse
+        return full, covariance
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Inverse of a positive matrix whose rows differ in unit."""
+    size = 1.0 / np.sqrt(np.diag(matrix))
+    return np.asarray(np.linalg.inv(matrix * np.outer(size, size)) * np.outer(size, size))
+
+
+def _fit(sliding: Sliding, readings: Readings, edge_s: float) -> _Fitted | None:
+    slips = find_slips(sliding, edge_s)
+    if len(slips) < _SLIPS_MIN or len({slip.sign for slip in slips}) < 2:
+        return None
+    time_s, speed = sliding.relative.time_s, np.abs(sliding.speed_m_per_s)
+    weight = np.zeros(len(time_s))
+    for slip in slips:
+        within = slice(*np.searchsorted(time_s, (slip.begin_s, slip.end_s)))
+        weight[within] = speed[within]
+    path = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time_s))))
+    made = [Covariate.of(time_s, value, weight) for value in (speed, sliding.relative.value_m, path)]
+    covariates = [covariate for covariate, _ in made]
+    lag_s = 0.0
+    for _ in range(_LAG_STEPS):
+        equations = normal_equations(readings, slips, covariates, lag_s, edge_s)
+        fitted = _Fitted(slips, equations, lag_s, tuple(extent for _, extent in made))
+        left_s = float(_pool(fitted, None, ()).shared[LAG])
+        if abs(left_s) < _LAG_SETTLED_S:
+            break
+        lag_s += left_s
+    return fitted
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Pooled:
+    """Means over all slips."""
+
+    mean: float
+    tilt: float
+    covariance: Floats  # of mean and tilt
+    shared: Floats
+    shared_deviation: Floats
+    slopes: Floats  # of the covariates that were let vary, with ...
+    slopes_deviation: Floats
+    deviations: Floats  # (k,) of slips from the mean
+    scatter: float
+    cost: float  # -2 ln L
+
+
+def _pool(fitted: _Fitted, weights: Floats | None, varying: tuple[int, ...]) -> _Pooled:
+    """Mean friction over `weights` and tilt, with friction that varies at random between slips.
+
+    Friction of a slip is the mean, its own deviation, and a slope in each of the `varying` covariates. The
+    variance of the deviations is the likeliest.
+    """
+    equations, k, sign, misfit = fitted.equations, len(fitted.slips), fitted.sign, max(1.0, fitted.misfit)
+    columns = np.zeros((len(equations.right), 2 + k + SHARED_COUNT + len(varying)))
+    columns[:k, 0], columns[:k, 1], columns[range(k), range(2, 2 + k)] = sign, -1.0, sign
+    columns[range(k, k + SHARED_COUNT), range(2 + k, 2 + k + SHARED_COUNT)] = 1.0
+    for place, covariate in enumerate(varying, start=2 + k + SHARED_COUNT):
+        columns[k + SHARED_COUNT + covariate, place] = 1.0
+    normal, right = columns.T @ equations.matrix @ columns / misfit, columns.T @ equations.right / misfit
+    typical = abs(float(_inverse(normal[:1, :1])[0, 0] * right[0]))
+    best: tuple[float, float, Floats, Floats] | None = None
+    for share in _SCATTERS:
+        scatter = max(share, 1e-5) * typical
+        prior = np.zeros(len(normal))
+        prior[1], prior[2 : 2 + k] = _TILT_PRIOR_RAD**-2, scatter**-2
+        precision = normal + np.diag(prior)
+        covariance = _inverse(precision)
+        found = covariance @ right
+        determinant = np.linalg.slogdet(precision)[1]
+        cost = equations.squares / misfit - float(found @ right) + determinant + 2.0 * k * np.log(scatter)
+        if best is None or cost < best[0]:
+            best = cost, scatter, found, covariance
+    assert best is not None
+    cost, scatter, found, covariance = best
+    mean = np.zeros((2, len(found)))
+    mean[0, 0] = mean[1, 1] = 1.0
+    if weights is not None:
+        mean[0, 2 : 2 + k] = weights / weights.sum()
+    values, deviation = mean @ found, np.sqrt(np.diag(covariance))
+    return _Pooled(
+        float(values[0]),
+        float(values[1]),
+        mean @ covariance @ mean.T,
+        found[2 + k : 2 + k + SHARED_COUNT],
+        deviation[2 + k : 2 + k + SHARED_COUNT],
+        found[2 + k + SHARED_COUNT :],
+        deviation[2 + k + SHARED_COUNT :],
+        found[2 : 2 + k],
+        scatter if scatter > 1e-5 * typical else 0.0,
+        cost,
+    )
+
+
+def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction:
+    slips, relative = best.slips, sliding.relative
+    k = len(slips)
+    ends = np.array([(slip.begin_s, slip.end_s) for slip in slips])
+    at = np.interp(ends, relative.time_s, relative.value_m)
+    path_m = np.abs(np.diff(at, axis=1)[:, 0])
+    chosen = _pool(best, path_m, ())
+    varying: tuple[int, ...] = ()
+    variation = {}
+    alone = [_pool(best, path_m, (number,)) for number in range(len(COVARIATES))]
+    while len(varying) < 2:
+        others = [number for number in range(len(COVARIATES)) if number not in varying]
+        tried = {number: _pool(best, path_m, (*varying, number)) for number in others}
+        likeliest = min(others, key=lambda number: tried[number].cost)
+        if chosen.cost - tried[likeliest].cost < _EVIDENCE_MIN:
+            break
+        varying, chosen = (*varying, likeliest), tried[likeliest]
+    for number, name in enumerate(COVARIATES):
+        pooled, place = (chosen, varying.index(number)) if number in varying else (alone[number], 0)
+        extent = best.extents[number]
+        variation[name] = Variation(
+            float(pooled.slopes[place]) / extent,
+            float(pooled.slopes_deviation[place]) / extent,
+            number in varying,
+        )
+    free, covariance = best.free_friction(varying)
+    return PlateFriction(
+        friction_dynamic=chosen.mean,
+        standard_uncertainty=float(
+            np.hypot(np.sqrt(chosen.covariance[0, 0]), chosen.mean * _scale_uncertainty(record))
+        ),
+        tilt_rad=chosen.tilt,
+        tilt_standard_uncertainty_rad=float(np.sqrt(chosen.covariance[1, 1])),
+        lag_s=best.lag_s + float(chosen.shared[LAG]),
+        lag_standard_uncertainty_s=float(chosen.shared_deviation[LAG]),
+        relative_gain_error=float(chosen.shared[GAIN]),
+        time_s=ends.mean(axis=1),
+        friction=best.sign * (free[:k] + chosen.tilt),
+        friction_standard_uncertainty=np.sqrt(np.diag(covariance)[:k]),
+        position_m=at.mean(axis=1),
+        speed_m_per_s=path_m / np.diff(ends, axis=1)[:, 0],
+        path_m=path_m,
+        scatter=chosen.scatter,
+        variation=variation,
+        misfit=best.misfit,
+    )
+
+
+def _scale_uncertainty(record: Record) -> float:
+    """Relative uncertainty that all slips share: gain of gauge 1, time base (twice), gravity."""
+    masses = record.masses
+    shares = (
+        record.table_gauge.gain_relative or 0.0,
+        2.0 * record.clock_scale_uncertainty / record.clock_scale,
+        masses.gravity_uncertainty_m_per_s2 / masses.gravity_m_per_s2,
+    )
+    return float(np.linalg.norm(shares))
