@@ -3,57 +3,16 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analysis.record import GaugeUncertainty, Record, StandMasses
-from benchmarks.real_gauges import GRID_HZ, Floats, RealGauge
-from benchmarks.real_stand import BASE, REL, RealStand, U
+from benchmarks.real_gauges import RealGauge
+from benchmarks.real_record import Scene
+from benchmarks.real_stand import RealStand
 from config.files import load_stand, published_table
 
 Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A test on a stand and what records it."""
-
-    stand: RealStand
-    gauges: tuple[RealGauge, ...]
-    gauge_1_on_floor: bool = False  # and not on the base
-    yaw_share: float = (
-        0.0  # of the pullback, in gauge 1 alone: the table turns, and the gauge is off its centre
-    )
-    yaw_hz: float = 0.0
-    hold_creep_m_per_s: float = 0.0  # the pull goes on until the release
-    series: str = ""
-    rate_hz: float = 1000.0
-    noise_m: float = 2e-5
-    hold_s: float = 1.0
-    duration_s: float = 12.0  # from the release
-    gain_uncertainty: float | None = None  # as stated
-    seed: int = 0
-
-    def with_stand(self, **values: Any) -> "Scene":
-        """Change fields of the stand."""
-        return replace(self, stand=replace(self.stand, **values))
-
-    def with_gauge(self, which: int, **values: Any) -> "Scene":
-        """Change gauge 1, gauge 2, or both where `which` is 0."""
-        changed = (replace(g, **values) if which in (0, n) else g for n, g in enumerate(self.gauges, 1))
-        return replace(self, gauges=tuple(changed))
-
-
-@dataclass(frozen=True, eq=False)
-class Simulated:
-    """A record and its truth."""
-
-    record: Record
-    friction_dynamic: float  # mean over the slid path
-    slips_m: Floats
 
 
 Change = Callable[[Scene, float, Rng], Scene]
@@ -165,12 +124,16 @@ def none(scene: Scene, _: float, __: Rng) -> Scene:
     return scene
 
 
-RAMP, KICK = frozenset({"release_ramp_s"}), frozenset({"release_velocity_m_per_s"})
-LAG = frozenset({"gauge_2_lag_s", "gauge_1_filter_hz", "gauge_2_filter_hz"})
-FILTER = frozenset({"gauge_1_filter_hz", "gauge_2_filter_hz"})
-MODE = frozenset({"second_mode_frequency_hz", "second_mode_share"})
-DAMPING = frozenset({"loss_factor", "drag_per_m", "stand_friction_m"})
-TILT = frozenset({"tilt", "friction_asymmetry"})
+RAMP = frozenset({"release-ramp", "release-shape", "release-step"})
+KICK = frozenset({"release-velocity"})
+LAG = frozenset({"gauge-lag", "gauge-2-filter", "filter"})
+FILTER = frozenset({"filter"})
+MODE = frozenset({"second-mode"})
+DAMPING = frozenset({"loss-factor", "drag", "stand-friction"})
+TILT = frozenset({"tilt", "asymmetry"})
+STATIC = frozenset({"static", "static-friction", "stribeck"})
+VELOCITY = frozenset({"stribeck", "log-velocity", "film"})
+"""Effects of `analysis.laws.stand_parts` and parts of the names of laws; kinds that look alike share one."""
 
 
 def _effects() -> tuple[Effect, ...]:
@@ -194,26 +157,26 @@ def _effects() -> tuple[Effect, ...]:
         ("creeping hold, 20 to 500 um/s", 2e-5, 5e-4, hold_creep, KICK),
     ]  # fmt: skip
     suspension = [
-        ("hardening, 0.2 to 1 %", 2e-3, 1e-2, on_stand("spring_hardening"), one("spring_hardening")),
-        ("hardening, 1 to 4 %", 1e-2, 4e-2, on_stand("spring_hardening"), one("spring_hardening")),
+        ("hardening, 0.2 to 1 %", 2e-3, 1e-2, on_stand("spring_hardening"), one("spring-hardening")),
+        ("hardening, 1 to 4 %", 1e-2, 4e-2, on_stand("spring_hardening"), one("spring-hardening")),
         (
             "softening, 0.3 to 3 %", 3e-3, 3e-2,
-            lambda scene, x, _: scene.with_stand(spring_hardening=-x), one("spring_hardening"),
+            lambda scene, x, _: scene.with_stand(spring_hardening=-x), one("spring-hardening"),
         ),
-        ("asymmetry, 0.3 to 3 %", 3e-3, 3e-2, on_stand("spring_asymmetry"), one("spring_asymmetry"), True),
-        ("quadratic drag, 0.1 to 0.5 %", 1e-3, 5e-3, at_pullback("drag_per_m"), one("drag_per_m")),
-        ("quadratic drag, 0.5 to 2 %", 5e-3, 2e-2, at_pullback("drag_per_m"), one("drag_per_m")),
+        ("asymmetry, 0.3 to 3 %", 3e-3, 3e-2, on_stand("spring_asymmetry"), one("spring-asymmetry"), True),
+        ("quadratic drag, 0.1 to 0.5 %", 1e-3, 5e-3, at_pullback("drag_per_m"), one("drag")),
+        ("quadratic drag, 0.5 to 2 %", 5e-3, 2e-2, at_pullback("drag_per_m"), one("drag")),
         ("structural damping, 0.1 to 1 %", 1e-3, 1e-2, on_stand("loss_factor"), DAMPING),
-        ("x_k, 1 to 8 um", 1e-6, 8e-6, on_stand("stand_friction_m"), one("stand_friction_m")),
-        ("x_k, 8 to 50 um", 8e-6, 5e-5, on_stand("stand_friction_m"), one("stand_friction_m")),
-        ("arc of leaf springs, 0.5 to 4 /m", 0.5, 4.0, on_stand("arc_per_m"), one("arc_per_m")),
+        ("x_k, 1 to 8 um", 1e-6, 8e-6, on_stand("stand_friction_m"), one("stand-friction")),
+        ("x_k, 8 to 50 um", 8e-6, 5e-5, on_stand("stand_friction_m"), one("stand-friction")),
+        ("arc of leaf springs, 0.5 to 4 /m", 0.5, 4.0, on_stand("arc_per_m"), one("arc")),
     ]  # fmt: skip
     gauges = [
         ("gauge 2 late, 0.1 to 1 ms", 1e-4, 1e-3, on_gauge(2, "lag_s"), LAG),
         ("gauge 2 late, 1 to 5 ms", 1e-3, 5e-3, on_gauge(2, "lag_s"), LAG),
         ("gauge 1 late, 0.1 to 2 ms", 1e-4, 2e-3, on_gauge(1, "lag_s"), LAG),
         ("gauge 2: RC, 500 to 100 Hz", 500.0, 100.0, on_gauge(2, "corner_hz", filter="rc"), LAG),
-        ("gauge 2: RC, 100 to 20 Hz", 100.0, 20.0, on_gauge(2, "corner_hz", filter="rc"), FILTER),
+        ("gauge 2: RC, 100 to 20 Hz", 100.0, 20.0, on_gauge(2, "corner_hz", filter="rc"), LAG),
         (
             "gauge 2: Butterworth 2, 300 to 20 Hz", 300.0, 20.0,
             on_gauge(2, "corner_hz", filter="butterworth", order=2), LAG,
@@ -234,13 +197,13 @@ def _effects() -> tuple[Effect, ...]:
             on_gauge(0, "corner_hz", filter="bessel", order=4), FILTER,
         ),
         ("both: sinc 3, 500 to 50 Hz", 500.0, 50.0, on_gauge(0, "corner_hz", filter="sinc", order=3), FILTER),
-        ("gain of gauge 2, 0.3 to 3 %", 3e-3, 3e-2, on_gauge(2, "gain_error"), one("relative_gain"), True),
-        ("gauge 1: square, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(1, "bend"), one("gauge_1_bend"), True),
-        ("gauge 1: cube, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(1, "bend_cubic"), one("gauge_1_bend"), True),
-        ("gauge 2: square, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(2, "bend"), one("gauge_2_bend"), True),
-        ("gauge 2: cube, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(2, "bend_cubic"), one("gauge_2_bend"), True),
-        ("gauge 1 in gauge 2, 0.1 to 2 %", 1e-3, 2e-2, on_gauge(2, "cross_talk"), one("cross_talk"), True),
-        ("gauge 2 in gauge 1, 0.1 to 2 %", 1e-3, 2e-2, on_gauge(1, "cross_talk"), one("cross_talk"), True),
+        ("gain of gauge 2, 0.3 to 3 %", 3e-3, 3e-2, on_gauge(2, "gain_error"), one("gauge-ratio"), True),
+        ("gauge 1: square, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(1, "bend"), one("gauge-1-bend"), True),
+        ("gauge 1: cube, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(1, "bend_cubic"), one("gauge-1-bend"), True),
+        ("gauge 2: square, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(2, "bend"), one("gauge-2-bend"), True),
+        ("gauge 2: cube, 0.1 to 1 %", 1e-3, 1e-2, on_gauge(2, "bend_cubic"), one("gauge-2-bend"), True),
+        ("gauge 1 in gauge 2, 0.1 to 2 %", 1e-3, 2e-2, on_gauge(2, "cross_talk"), one("cross-talk"), True),
+        ("gauge 2 in gauge 1, 0.1 to 2 %", 1e-3, 2e-2, on_gauge(1, "cross_talk"), one("cross-talk"), True),
         (
             "gauge 1 creeps, 20 to 200 um", 2e-5, 2e-4,
             on_gauge(1, "creep_m", creep_time_s=(2.0, 15.0)), one(), True,
@@ -259,37 +222,37 @@ def _effects() -> tuple[Effect, ...]:
         ("yaw in gauge 1, 0.2 to 2 %", 2e-3, 2e-2, yaw, MODE),
     ]
     friction = [
-        ("f_s over f_d, 5 to 100 %", 0.05, 1.0, static, one("static", "stribeck")),
+        ("f_s over f_d, 5 to 100 %", 0.05, 1.0, static, STATIC),
         ("Stribeck, 1 to 10 mm/s", 0.05, 0.5, stribeck((1e-3, 1e-2)), one("stribeck")),
-        ("Stribeck, 10 to 100 mm/s", 0.05, 0.5, stribeck((1e-2, 1e-1)), one("stribeck", "film_s_per_m")),
-        ("viscous film, 2 to 10 %", 0.02, 0.1, film, one("film_s_per_m")),
-        ("viscous film, 10 to 40 %", 0.1, 0.4, film, one("film_s_per_m")),
+        ("Stribeck, 10 to 100 mm/s", 0.05, 0.5, stribeck((1e-2, 1e-1)), VELOCITY),
+        ("viscous film, 2 to 10 %", 0.02, 0.1, film, one("film")),
+        ("viscous film, 10 to 40 %", 0.1, 0.4, film, one("film")),
         (
             "logarithm of velocity, 0.5 to 4 % a decade", 5e-3, 4e-2,
-            on_stand("log_per_decade"), one("film_s_per_m", "stribeck", "log_per_decade"), True,
+            on_stand("log_per_decade"), VELOCITY, True,
         ),
         (
             "gradient, 1 to 10 % over 10 mm", 0.01, 0.1,
-            over_range("friction_gradient_per_m", 0.01), one("friction_gradient_per_m"), True,
+            over_range("friction_gradient_per_m", 0.01), one("gradient"), True,
         ),
         (
             "wave along the track, 1 to 8 %", 0.01, 0.08,
-            on_stand("friction_wave", friction_wave_m=(2e-3, 1e-2)), one("friction_gradient_per_m"),
+            on_stand("friction_wave", friction_wave_m=(2e-3, 1e-2)), one("gradient"),
         ),
         (
             "wear, 1 to 8 % over 50 mm", 0.01, 0.08,
-            over_range("friction_wear_per_m", 0.05), one("friction_wear_per_m"),
+            over_range("friction_wear_per_m", 0.05), one("wear"),
         ),
         (
             "running in, 1 to 8 % over 50 mm", 0.01, 0.08,
-            over_range("friction_wear_per_m", -0.05), one("friction_wear_per_m"),
+            over_range("friction_wear_per_m", -0.05), one("wear"),
         ),
         ("asymmetry, 0.5 to 5 %", 5e-3, 5e-2, on_stand("friction_asymmetry"), TILT, True),
-        ("presliding, 0.5 to 2 um", 5e-7, 2e-6, on_stand("presliding_m"), one("presliding_m")),
-        ("presliding, 2 to 10 um", 2e-6, 1e-5, on_stand("presliding_m"), one("presliding_m")),
+        ("presliding, 0.5 to 2 um", 5e-7, 2e-6, on_stand("presliding_m"), one("presliding")),
+        ("presliding, 2 to 10 um", 2e-6, 1e-5, on_stand("presliding_m"), one("presliding")),
         (
             "f_s grows with contact time, 1 to 10 % a decade", 0.01, 0.1,
-            on_stand("dwell_per_decade"), one("static", "dwell_per_decade"),
+            on_stand("dwell_per_decade"), STATIC,
         ),
         ("tilt, 0.3 to 3 mrad", 3e-4, 3e-3, on_stand("tilt_rad"), TILT, True),
     ]  # fmt: skip
@@ -373,54 +336,3 @@ def _may_join(effect: Effect, scene: Scene) -> bool:
         (rolling and (p.base_compliance or p.second_mode_share))
         or (moving and (p.stand_friction_m or p.loss_factor))
     )
-
-
-def simulate(scene: Scene, cache: Path | None = None) -> Simulated:
-    """Simulate the record of a scene; what is without noise is kept in the folder `cache`."""
-    kept = cache / f"{_fingerprint(scene)}.npz" if cache else None
-    if kept and kept.exists():
-        with np.load(kept) as file:
-            readings, mean, slips_m = file["readings"], float(file["mean"]), file["slips_m"]
-    else:
-        readings, mean, slips_m = _readings(scene)
-        if kept:
-            np.savez(kept, readings=readings, mean=mean, slips_m=slips_m)
-    times_s = np.arange(readings.shape[1]) / scene.rate_hz
-    noisy = readings + scene.noise_m * np.random.default_rng((scene.seed, 16)).standard_normal(readings.shape)
-    gauge = GaugeUncertainty(gain_relative=scene.gain_uncertainty)
-    record = Record(
-        times_s, noisy[0], noisy[1],
-        StandMasses(scene.stand.table_mass_kg, scene.stand.plate_mass_kg),
-        pullback_m=load_stand().series(scene.series).pullback_m,
-        table_gauge=gauge, relative_gauge=gauge,
-    )  # fmt: skip
-    return Simulated(record, mean, slips_m)
-
-
-def _fingerprint(scene: Scene) -> str:
-    """Of the scene and the simulator."""
-    sources = (Path(__file__).with_name(f"real_{name}.py") for name in ("stand", "gauges", "effects"))
-    return sha256(b"".join([repr(scene).encode(), *(path.read_bytes() for path in sources)])).hexdigest()[:20]
-
-
-def _readings(scene: Scene) -> tuple[Floats, float, Floats]:
-    """Both gauges (2, n) without noise, the mean friction, and the slips."""
-    margin_s = 2e-2  # what late gauges and the phase of the clock may reach beyond the record
-    stand, phase = scene.stand, float(np.random.default_rng((scene.seed, 17)).random())
-    times_s = np.arange(round((scene.hold_s + scene.duration_s) * scene.rate_hz)) / scene.rate_hz
-    times_s -= scene.hold_s + phase / scene.rate_hz
-    since_s = np.arange(-scene.hold_s - margin_s, scene.duration_s + margin_s, 1.0 / GRID_HZ)
-    motion = stand.simulate(float(since_s[-1]) + margin_s)
-    states = motion.sample(since_s)
-    table = states[U] + scene.hold_creep_m_per_s * np.minimum(since_s, 0.0)
-    if scene.gauge_1_on_floor:
-        table = table + states[BASE]
-    if scene.yaw_share:
-        after_s, angular = np.maximum(since_s, 0.0), 2.0 * math.pi * scene.yaw_hz
-        swing = np.exp(-0.01 * angular * after_s) * np.cos(angular * after_s)
-        table = table + scene.yaw_share * stand.pullback_m * swing
-    moved = table, states[REL]
-    readings = np.array(
-        [gauge.read(moved[n], moved[1 - n], since_s, times_s) for n, gauge in enumerate(scene.gauges)]
-    )
-    return readings, motion.friction_dynamic, motion.slips_m

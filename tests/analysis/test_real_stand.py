@@ -8,10 +8,13 @@ import pytest
 from scipy import signal
 from scipy.linalg import expm
 
+from analysis.laws import stand_parts
+from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS
 from analysis.motion.two_mass import TwoMassParameters
 from benchmarks import study_real_stand
-from benchmarks.real_effects import EFFECTS, draw_scene, simulate
+from benchmarks.real_effects import EFFECTS, draw_scene
 from benchmarks.real_gauges import GRID_HZ, RealGauge
+from benchmarks.real_record import simulate
 from benchmarks.real_stand import BASE, BASE_V, BRISTLE, REL, WORK, RealStand, U, V, W
 
 TIMES_S = np.linspace(0.0, 6.0, 3001)
@@ -231,3 +234,10 @@ def test_a_study_is_summarized_from_its_file_as_when_it_ran(tmp_path, monkeypatc
     study_real_stand.main()
 
     assert capsys.readouterr().out == ran
+
+
+def test_names_of_effects_are_those_that_the_identification_gives():
+    laws = {word for law in (*COMPARED_LAWS, *FALLBACK_LAWS) for word in law.name.split("+")}
+    known = {effect.name for effect in stand_parts.EFFECTS} | laws | {"presliding"}
+
+    assert set().union(*(effect.named for effect in EFFECTS)) <= known
