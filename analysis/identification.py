@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from analysis.arrays import Floats
+from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 
@@ -87,3 +88,4 @@ class Identification:
     curves_by_friction: Callable[[float, Floats], Curves] | None = None
     """Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`."""
     monte_carlo: MonteCarlo | None = None  # where it was asked for
+    plate: PlateFriction | None = None  # friction from the plate alone, slip by slip

@@ -18,6 +18,7 @@ from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, law_by_name, law_without
 from analysis.laws.parameters import Parameter
+from analysis.plate.friction import estimate_plate_friction
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
@@ -73,6 +74,7 @@ def identify(
     else:
         points = guess_release(informed_problem, start, decay.period_s, record.pullback_m)
 
+    plate = estimate_plate_friction(record, decay)
     report(0.3, "following the motion")
     minima = search.find_minima(points)
 
@@ -100,6 +102,8 @@ def identify(
     joint_fit.add_constants(constants, budget)
     labels = fitted_quantities.add_fitted_quantities(joint, budget, slip_ended=slip_ended)
     fitted_quantities.add_static_friction_bounds(joint, budget)
+    if plate is not None:
+        budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     warnings = [
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
         *(joint_fit.tail_warnings(decay) if decay.tail is not None else [_no_tail_warning()]),
@@ -126,6 +130,7 @@ def identify(
         joint_fit.friction_objective(problem, joint.chosen),
         joint_fit.friction_curves(joint.chosen, decay, delays_s),
         drawn,
+        plate,
     )
 
 

@@ -4,6 +4,7 @@ While the plate slides, only friction, gravity and tilt act on it: u2'' = -g (s 
 of its velocity relative to the table.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from analysis.plate.spline import (
     normal_equations,
 )
 from analysis.preparation.free_decay import FreeDecay, relative_to_table
+from analysis.quantities import BudgetSource, Source
 from analysis.record import Record
 
 _EDGES_S = (0.005, 0.012, 0.03)
@@ -34,9 +36,9 @@ _FRICTION_UNCERTAINTY_MAX = 0.5  # of a slip, as a share of the median: others t
 _TILT_PRIOR_RAD = 0.02  # a plate that leans more slides off
 _LAG_STEPS = 4
 _LAG_SETTLED_S = 3e-5  # what is left of second order moves u1 by nanometres
-_EVIDENCE_MIN = (
-    12.0  # fall of -2 ln L for which friction is taken to vary: BIC of 1,000 readings, three looks
-)
+_VARYING_MAX = 2  # covariates at once: slips are few
+_EVIDENCE_MIN = 12.0
+"""Fall of -2 ln L for which friction is taken to vary: BIC of 1,000 readings, and three looks."""
 _SCATTERS = (0.0, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2, 6.4e-2, 0.13, 0.26)  # shares of friction
 
 COVARIATES = "sliding velocity", "position", "slid path"
@@ -56,7 +58,7 @@ class PlateFriction:
     """Friction from the plate's parabolas."""
 
     friction_dynamic: float  # mean over the path that the plate slid
-    standard_uncertainty: float
+    contributions: dict[Source, float]  # to its standard uncertainty
     tilt_rad: float  # in the frame of the decay
     tilt_standard_uncertainty_rad: float
     lag_s: float  # by which gauge 2 is later than gauge 1
@@ -75,12 +77,16 @@ class PlateFriction:
     """By covariate: per m/s of sliding velocity, per m of position, per m of slid path."""
     misfit: float  # chi-square of the readings over its expectation
 
+    @property
+    def standard_uncertainty(self) -> float:
+        return math.hypot(*self.contributions.values())
+
 
 def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction | None:
     """Estimate f_d from the curvature of u2 in each slip.
 
-    Returns None without gauge 2, with fewer than three slips that are long enough, or where all of them
-    have one direction.
+    Returns None without gauge 2, with fewer than three slips that are long enough, where all of them have
+    one direction, and where the estimate is not above its uncertainty.
     """
     if decay.relative is None:
         return None
@@ -100,7 +106,8 @@ def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction |
         best = fitted
         if best.misfit < 1.0 + _MISFIT_SIGMAS * np.sqrt(2.0 / best.freedom):
             break
-    return None if best is None else _summarise(best, record, sliding)
+    found = None if best is None else _summarise(best, record, sliding)
+    return found if found is not None and found.friction_dynamic > found.standard_uncertainty else None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -240,10 +247,10 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
     chosen = _pool(best, path_m, ())
     varying: tuple[int, ...] = ()
     variation = {}
-    alone = [_pool(best, path_m, (number,)) for number in range(len(COVARIATES))]
-    while len(varying) < 2:
-        others = [number for number in range(len(COVARIATES)) if number not in varying]
-        tried = {number: _pool(best, path_m, (*varying, number)) for number in others}
+    alone = {number: _pool(best, path_m, (number,)) for number in range(len(COVARIATES))}
+    while len(varying) < _VARYING_MAX:
+        others = [number for number in alone if number not in varying]
+        tried = {number: _pool(best, path_m, (*varying, number)) for number in others} if varying else alone
         likeliest = min(others, key=lambda number: tried[number].cost)
         if chosen.cost - tried[likeliest].cost < _EVIDENCE_MIN:
             break
@@ -259,9 +266,7 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
     free, covariance = best.free_friction(varying)
     return PlateFriction(
         friction_dynamic=chosen.mean,
-        standard_uncertainty=float(
-            np.hypot(np.sqrt(chosen.covariance[0, 0]), chosen.mean * _scale_uncertainty(record))
-        ),
+        contributions=_contributions(chosen, record),
         tilt_rad=chosen.tilt,
         tilt_standard_uncertainty_rad=float(np.sqrt(chosen.covariance[1, 1])),
         lag_s=best.lag_s + float(chosen.shared[LAG]),
@@ -279,12 +284,11 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
     )
 
 
-def _scale_uncertainty(record: Record) -> float:
-    """Relative uncertainty that all slips share: gain of gauge 1, time base (twice), gravity."""
-    masses = record.masses
-    shares = (
-        record.table_gauge.gain_relative or 0.0,
-        2.0 * record.clock_scale_uncertainty / record.clock_scale,
-        masses.gravity_uncertainty_m_per_s2 / masses.gravity_m_per_s2,
-    )
-    return float(np.linalg.norm(shares))
+def _contributions(pooled: _Pooled, record: Record) -> dict[Source, float]:
+    masses, mean = record.masses, pooled.mean
+    return {
+        BudgetSource.NOISE: float(np.sqrt(pooled.covariance[0, 0])),
+        BudgetSource.GAUGE_1_GAIN: mean * (record.table_gauge.gain_relative or 0.0),
+        BudgetSource.TIME_BASE: 2.0 * mean * record.clock_scale_uncertainty / record.clock_scale,
+        BudgetSource.GRAVITY: mean * masses.gravity_uncertainty_m_per_s2 / masses.gravity_m_per_s2,
+    }
