@@ -55,6 +55,7 @@ STAND_PARAMETERS = {
     StandParameter.BEND_1: OwnParameter("gauge_1_bend", "1", 0.0, -0.2, 0.2),
     StandParameter.BEND_2: OwnParameter("gauge_2_bend", "1", 0.0, -0.2, 0.2),
     StandParameter.CROSS_TALK: OwnParameter("cross_talk", "1", 0.0, -0.2, 0.2),
+    StandParameter.FILTER_DAMPING: OwnParameter("filter_damping", "1", 0.0, -0.4, 1.0),
 }
 """Names, units and bounds; at zero the stand is ideal. The bounds are beyond what a stand that still serves
 its purpose shows."""
@@ -103,6 +104,7 @@ EFFECTS = (
     StandEffect("wear", (StandParameter.WEAR,)),
     StandEffect("asymmetry", (StandParameter.ASYMMETRY,), rarity=_RARE),
     StandEffect("filter", (StandParameter.FILTER,)),
+    StandEffect("filter-damping", (StandParameter.FILTER_DAMPING,), needs="filter", rarity=_RARE),
     StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE),
     StandEffect("gauge-1-bend", (StandParameter.BEND_1,), rarity=_RARE),
     StandEffect("gauge-2-bend", (StandParameter.BEND_2,), rarity=_RARE),

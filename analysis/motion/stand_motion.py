@@ -51,13 +51,12 @@ class StandParameter(IntEnum):
     WEAR = 16  # relative rise of friction with the slid path (1/m)
     ASYMMETRY = 17  # relative rise of friction in forward slip, and fall in backward slip
     DWELL = 18  # relative rise of static friction with ln(1 + time of stick / 0.1 s)
-    FILTER = (
-        19  # 1 / (2 pi corner frequency) of a low-pass filter before both gauges, its delay taken off (s)
-    )
+    FILTER = 19  # time constant of a low-pass filter before both gauges, squared; its delay is taken off (s2)
     FILTER_2 = 20  # the same of a filter before gauge 2 alone
     BEND_1 = 21  # relative deviation of gauge 1 from a line at the pullback, odd in the displacement
     BEND_2 = 22  # the same of gauge 2
     CROSS_TALK = 23  # share of u1 in the readings of gauge 2
+    FILTER_DAMPING = 24  # damping ratio of the filters less 1
 
 
 STAND_PARAMETER_COUNT = len(StandParameter)
@@ -86,6 +85,7 @@ STAND_PARAMETER_COUNT = len(StandParameter)
     BEND_1,
     BEND_2,
     CROSS_TALK,
+    FILTER_DAMPING,
 ) = range(STAND_PARAMETER_COUNT)
 """The same places for compiled functions, which take no enumerations."""
 
@@ -449,7 +449,7 @@ def stand_kernels(friction: Friction, name: str) -> MotionKernels:
     return MotionKernels(functions["integrate"], sample, peak_rates)
 
 
-_FILTER_STEPS = 4.0  # of the filtered motion in one time constant: its transfer function errs by 0.5 %
+_FILTER_STEPS = 4.0  # of the filtered motion in one time constant
 _FILTER_STEP_MIN_S, _FILTER_STEP_MAX_S = 2e-4, 2e-3
 _NEGLIGIBLE_S = 1e-5  # a filter of 16 kHz
 
@@ -460,18 +460,19 @@ def gauge_readings(
     """u1 and u2 - u1 (2, n) as gauges with these filters, bends and cross-talk show them; times rise."""
     parts, pull = vector[-STAND_PARAMETER_COUNT:], max(abs(float(vector[PULLBACK])), 1e-9)
     constants = math.sqrt(parts[FILTER]), math.sqrt(parts[FILTER_2])
+    damping = 1.0 + parts[FILTER_DAMPING]
     if max(constants) < _NEGLIGIBLE_S:
         read = kernels.sample(vector, *state, times_s, 2)
     else:
         shortest_s = min(constant for constant in constants if constant >= _NEGLIGIBLE_S)
         step_s = min(max(shortest_s / _FILTER_STEPS, _FILTER_STEP_MIN_S), _FILTER_STEP_MAX_S)
         begin_s = min(float(times_s[0]), float(vector[RELEASE]))
-        end_s = float(times_s[-1]) + 2.0 * sum(constants)
+        end_s = float(times_s[-1]) + 2.0 * damping * sum(constants)
         grid = begin_s + step_s * np.arange(int((end_s - begin_s) / step_s) + 3)
         duration_s = float(state[1][-1, TIME])
         moved = kernels.sample(vector, *state, np.minimum(grid, vector[RELEASE] + duration_s), 2)
-        table, relative = (_low_pass(row, constants[0], step_s) for row in moved)
-        relative = _low_pass(relative, constants[1], step_s)
+        table, relative = (_low_pass(row, constants[0], damping, step_s) for row in moved)
+        relative = _low_pass(relative, constants[1], damping, step_s)
         read = np.stack([np.interp(times_s, grid, row) for row in (table, relative)])
     read[1] += parts[CROSS_TALK] * (read[0] - vector[PULLBACK])
     bends = parts[BEND_1 : BEND_2 + 1, None]
@@ -479,17 +480,20 @@ def gauge_readings(
 
 
 @compiled
-def _low_pass(row: Floats, constant_s: float, step_s: float) -> Floats:
-    """The row (n,) behind a Butterworth filter of order 2, shifted back by its delay at low frequencies."""
+def _low_pass(row: Floats, constant_s: float, damping: float, step_s: float) -> Floats:
+    """The row (n,) behind T^2 y'' + 2 damping T y' + y = x, shifted back by its delay at low frequency.
+
+    With a damping ratio of 1 it describes RC and Bessel filters of the same second moment.
+    """
     if constant_s < _NEGLIGIBLE_S:
         return row
-    k = math.tan(0.5 * step_s / constant_s)
-    norm = 1.0 / (1.0 + math.sqrt(2.0) * k + k * k)
-    gain, a1, a2 = k * k * norm, 2.0 * (k * k - 1.0) * norm, (1.0 - math.sqrt(2.0) * k + k * k) * norm
+    k = 0.5 * step_s / constant_s  # bilinear transform, whose delay at low frequency is exact
+    norm = 1.0 / (1.0 + 2.0 * damping * k + k * k)
+    gain, a1, a2 = k * k * norm, 2.0 * (k * k - 1.0) * norm, (1.0 - 2.0 * damping * k + k * k) * norm
     filtered, x1, x2, y1, y2 = np.empty(len(row)), row[0], row[0], row[0], row[0]
     for j in range(len(row)):
         y = gain * (row[j] + 2.0 * x1 + x2) - a1 * y1 - a2 * y2
         x2, x1, y2, y1 = x1, row[j], y1, y
         filtered[j] = y
     places = np.arange(len(row)).astype(np.float64)
-    return np.interp(places + math.sqrt(2.0) * constant_s / step_s, places, filtered)
+    return np.interp(places + 2.0 * damping * constant_s / step_s, places, filtered)
