@@ -28,7 +28,7 @@ class GaugeChain:
         square = max(abs(pullback_m), 1e-9) ** 2
         self._bends = [values.get(f"gauge_{number}_bend", 0.0) / square for number in (1, 2)]
         corners = [values.get(f"gauge_{number}_filter_hz") for number in (1, 2)]
-        self._filters = [None if corner is None else ButterworthFilter(corner, rate_hz) for corner in corners]
+        self._filters = [None if corner is None else RcFilter(corner, rate_hz) for corner in corners]
         self._creeps_m = [values.get(f"gauge_{number}_creep_m", 0.0) for number in (1, 2)]
         self._first_s: float | None = None
         self._is_absolute = is_absolute
@@ -53,25 +53,23 @@ class GaugeChain:
         return shown[0], shown[1]
 
 
-class ButterworthFilter:
-    """Analogue low-pass filter of order 2, of a signal that is straight between its samples."""
+class RcFilter:
+    """Analogue low-pass filter of one stage, of a signal that is straight between its samples."""
 
     def __init__(self, corner_hz: float, rate_hz: float) -> None:
-        from scipy import signal  # takes a third of a second
+        from scipy.signal import lfilter  # takes a third of a second
 
-        w = 2.0 * math.pi * corner_hz
-        system = np.array([w * w]), np.array([1.0, math.sqrt(2.0) * w, w * w])
-        numerator, self._denominator, _ = signal.cont2discrete(system, 1.0 / rate_hz, "foh")
-        self._numerator = np.ravel(numerator)
-        self._signal = signal
+        samples = rate_hz / (2.0 * math.pi * corner_hz)  # in a time constant
+        self._kept = math.exp(-1.0 / samples)
+        late = samples * (1.0 - self._kept)
+        self._weights = np.array([1.0 - late, late - self._kept])
+        self._lfilter = lfilter
         self._state: Floats | None = None
 
     def filter(self, values: Floats) -> Floats:
         """Filtered values (n,) that follow those of the last call; before, the first one held for ever."""
         if self._state is None:
-            self._state = self._signal.lfilter_zi(self._numerator, self._denominator) * values[0]
+            self._state = (1.0 - self._weights[:1]) * values[0]
         filtered: Floats
-        filtered, self._state = self._signal.lfilter(
-            self._numerator, self._denominator, values, zi=self._state
-        )
+        filtered, self._state = self._lfilter(self._weights, [1.0, -self._kept], values, zi=self._state)
         return filtered
