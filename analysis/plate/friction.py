@@ -35,6 +35,12 @@ _SLIPS_MIN = 3  # scatter between fewer slips is not known
 _FRICTION_UNCERTAINTY_MAX = 0.5  # of a slip, as a share of the median: others tell nothing
 _TILT_PRIOR_RAD = 0.02  # a plate that leans more slides off
 _LAG_STEPS = 4
+_LAG_SIGMAS = 2.0
+_SMALL_LAG_S = 4e-3
+"""A lag this small that stands out, where none is stated, may be friction that varies instead."""
+_LAG_TYPICAL_S = 1e-3  # of gauges that differ in lag ...
+_NO_LAG_S = 3e-5  # ... and of those that do not
+_VARIATION_TYPICAL = 0.2  # of friction over the range of a covariate, where it varies
 _LAG_SETTLED_S = 3e-5  # what is left of second order moves u1 by nanometres
 _VARYING_MAX = 2  # covariates at once: slips are few
 _EVIDENCE_MIN = 12.0
@@ -106,7 +112,7 @@ def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction |
         best = fitted
         if best.misfit < 1.0 + _MISFIT_SIGMAS * np.sqrt(2.0 / best.freedom):
             break
-    found = None if best is None else _summarise(best, record, sliding)
+    found = None if best is None else _summarise(best, record, sliding, lag_is_stated=readings.lag_is_stated)
     return found if found is not None and found.friction_dynamic > found.standard_uncertainty else None
 
 
@@ -114,6 +120,7 @@ def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction |
 class _Fitted:
     slips: list[Slip]
     equations: NormalEquations
+    equations_without_lag: NormalEquations
     lag_s: float
     extents: tuple[float, ...]  # ranges of the covariates
 
@@ -165,13 +172,14 @@ def _fit(sliding: Sliding, readings: Readings, edge_s: float) -> _Fitted | None:
     made = [Covariate.of(time_s, value, weight) for value in (speed, sliding.relative.value_m, path)]
     covariates = [covariate for covariate, _ in made]
     lag_s = 0.0
+    equations = without_lag = normal_equations(readings, slips, covariates, lag_s, edge_s)
     for _ in range(_LAG_STEPS):
-        equations = normal_equations(readings, slips, covariates, lag_s, edge_s)
-        fitted = _Fitted(slips, equations, lag_s, tuple(extent for _, extent in made))
+        fitted = _Fitted(slips, equations, without_lag, lag_s, tuple(extent for _, extent in made))
         left_s = float(_pool(fitted, None, ()).shared[LAG])
         if abs(left_s) < _LAG_SETTLED_S:
             break
         lag_s += left_s
+        equations = normal_equations(readings, slips, covariates, lag_s, edge_s)
     return fitted
 
 
@@ -191,13 +199,16 @@ class _Pooled:
     cost: float  # -2 ln L
 
 
-def _pool(fitted: _Fitted, weights: Floats | None, varying: tuple[int, ...]) -> _Pooled:
+def _pool(
+    fitted: _Fitted, weights: Floats | None, varying: tuple[int, ...], *, without_lag: bool = False
+) -> _Pooled:
     """Mean friction over `weights` and tilt, with friction that varies at random between slips.
 
     Friction of a slip is the mean, its own deviation, and a slope in each of the `varying` covariates. The
     variance of the deviations is the likeliest.
     """
-    equations, k, sign, misfit = fitted.equations, len(fitted.slips), fitted.sign, max(1.0, fitted.misfit)
+    equations = fitted.equations_without_lag if without_lag else fitted.equations
+    k, sign, misfit = len(fitted.slips), fitted.sign, max(1.0, fitted.misfit)
     columns = np.zeros((len(equations.right), 2 + k + SHARED_COUNT + len(varying)))
     columns[:k, 0], columns[:k, 1], columns[range(k), range(2, 2 + k)] = sign, -1.0, sign
     columns[range(k, k + SHARED_COUNT), range(2 + k, 2 + k + SHARED_COUNT)] = 1.0
@@ -210,6 +221,7 @@ def _pool(fitted: _Fitted, weights: Floats | None, varying: tuple[int, ...]) -> 
         scatter = max(share, 1e-5) * typical
         prior = np.zeros(len(normal))
         prior[1], prior[2 : 2 + k] = _TILT_PRIOR_RAD**-2, scatter**-2
+        prior[2 + k + LAG] = _NO_LAG_S**-2 if without_lag else 0.0
         precision = normal + np.diag(prior)
         covariance = _inverse(precision)
         found = covariance @ right
@@ -238,7 +250,7 @@ def _pool(fitted: _Fitted, weights: Floats | None, varying: tuple[int, ...]) -> 
     )
 
 
-def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction:
+def _summarise(best: _Fitted, record: Record, sliding: Sliding, *, lag_is_stated: bool) -> PlateFriction:
     slips, relative = best.slips, sliding.relative
     k = len(slips)
     ends = np.array([(slip.begin_s, slip.end_s) for slip in slips])
@@ -255,6 +267,12 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
         if chosen.cost - tried[likeliest].cost < _EVIDENCE_MIN:
             break
         varying, chosen = (*varying, likeliest), tried[likeliest]
+    instead = _varying_instead_of_lag(best, path_m, chosen) if not (varying or lag_is_stated) else {}
+    mean, uncertainty, between = _average(chosen, instead)
+    lag_s = best.lag_s
+    for number, other in instead.items():
+        if chosen.cost - other.cost > _EVIDENCE_MIN:
+            varying, chosen, lag_s = (number,), other, 0.0
     for number, name in enumerate(COVARIATES):
         pooled, place = (chosen, varying.index(number)) if number in varying else (alone[number], 0)
         extent = best.extents[number]
@@ -265,11 +283,11 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
         )
     free, covariance = best.free_friction(varying)
     return PlateFriction(
-        friction_dynamic=chosen.mean,
-        contributions=_contributions(chosen, record),
+        friction_dynamic=mean,
+        contributions=_contributions(mean, uncertainty, between, record),
         tilt_rad=chosen.tilt,
         tilt_standard_uncertainty_rad=float(np.sqrt(chosen.covariance[1, 1])),
-        lag_s=best.lag_s + float(chosen.shared[LAG]),
+        lag_s=lag_s + float(chosen.shared[LAG]),
         lag_standard_uncertainty_s=float(chosen.shared_deviation[LAG]),
         relative_gain_error=float(chosen.shared[GAIN]),
         time_s=ends.mean(axis=1),
@@ -284,10 +302,35 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding) -> PlateFriction
     )
 
 
-def _contributions(pooled: _Pooled, record: Record) -> dict[Source, float]:
-    masses, mean = record.masses, pooled.mean
+def _varying_instead_of_lag(fitted: _Fitted, path_m: Floats, chosen: _Pooled) -> dict[int, _Pooled]:
+    """Explanations of a small lag by friction that varies, by covariate; none where no lag stands out."""
+    lag_s = fitted.lag_s + float(chosen.shared[LAG])
+    if not _LAG_SIGMAS * chosen.shared_deviation[LAG] < abs(lag_s) < _SMALL_LAG_S:
+        return {}
     return {
-        BudgetSource.NOISE: float(np.sqrt(pooled.covariance[0, 0])),
+        number: _pool(fitted, path_m, (number,), without_lag=True) for number in range(len(fitted.extents))
+    }
+
+
+def _average(chosen: _Pooled, others: dict[int, _Pooled]) -> tuple[float, float, float]:
+    """Mean of explanations by their likelihood, its standard uncertainty, and that between explanations."""
+    costs = [chosen.cost + 2.0 * np.log(_LAG_TYPICAL_S)]
+    narrow = _NO_LAG_S * _VARIATION_TYPICAL
+    costs += [other.cost + 2.0 * np.log(narrow * abs(other.mean)) for other in others.values()]
+    explanations = [chosen, *others.values()]
+    weights = np.exp(-0.5 * (np.array(costs) - min(costs)))
+    weights /= weights.sum()
+    means = np.array([explanation.mean for explanation in explanations])
+    mean = float(weights @ means)
+    variance = float(weights @ np.array([explanation.covariance[0, 0] for explanation in explanations]))
+    return mean, float(np.sqrt(variance)), float(np.sqrt(weights @ (means - mean) ** 2))
+
+
+def _contributions(mean: float, noise: float, by_lag: float, record: Record) -> dict[Source, float]:
+    masses = record.masses
+    return {
+        BudgetSource.NOISE: noise,
+        BudgetSource.GAUGE_2_LAG: by_lag,
         BudgetSource.GAUGE_1_GAIN: mean * (record.table_gauge.gain_relative or 0.0),
         BudgetSource.TIME_BASE: 2.0 * mean * record.clock_scale_uncertainty / record.clock_scale,
         BudgetSource.GRAVITY: mean * masses.gravity_uncertainty_m_per_s2 / masses.gravity_m_per_s2,

@@ -65,6 +65,7 @@ class Readings:
     gravity: float
     lag_prior_s: float
     gain_prior: float
+    lag_is_stated: bool
     follows_lag: bool  # False where gauge 2 measures u2 itself
 
     @classmethod
@@ -84,6 +85,7 @@ class Readings:
             record.masses.gravity_m_per_s2,
             _lag_prior_s(record),
             _gain_prior(record),
+            _lag_prior_s(record) != _LAG_PRIOR_S,
             not decay.gauge_2_absolute,
         )
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from analysis.laws.stand_parts import stand_displacements
 from analysis.plate.friction import PlateFriction, estimate_plate_friction
 from analysis.preparation.free_decay import prepare
 from analysis.record import GaugeUncertainty, Record
@@ -60,3 +61,38 @@ def test_a_stated_lag_makes_the_estimate_sharper() -> None:
 def test_too_few_slips_give_nothing() -> None:
     record = simulate_record(_TRUTH.replace(friction_dynamic=0.45, friction_static=0.46))
     assert estimate_plate_friction(record, prepare(record)) is None
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"release_ramp_s": 0.01}, {"spring_hardening": 0.02}, {"stand_friction_m": 2e-5}],
+    ids=lambda effects: next(iter(effects)),
+)
+def test_release_and_springs_do_not_bias_friction(effects: dict[str, float]) -> None:
+    displacements = stand_displacements(_TRUTH.parameters(), effects, _TRUTH.duration_s + 1e-3)
+    found = _estimate(simulate_record(_TRUTH, displacements))
+    assert found.friction_dynamic == pytest.approx(0.1, abs=3.0 * found.standard_uncertainty)
+    assert found.standard_uncertainty < 5e-4
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["lag stated", "lag not stated"])
+def test_a_viscous_film_is_seen_and_friction_is_the_mean_over_the_path(stated: bool) -> None:
+    """A film without a stated lag once read as a lag of milliseconds, and f_d was 12 % low."""
+    truth = _TRUTH.replace(period_s=0.24, friction_dynamic=0.07, friction_static=None, pullback_m=6e-3)
+    displacements = stand_displacements(truth.parameters(), {"film_s_per_m": 1.5}, truth.duration_s + 1e-3)
+    gauge = GaugeUncertainty(delay_s_uncertainty=2e-5) if stated else GaugeUncertainty()
+    found = _estimate(simulate_record(truth, displacements, relative_gauge=gauge))
+    times_s = np.linspace(0.0, truth.duration_s, 100_001)
+    speed = np.abs(np.gradient(displacements(times_s)[1], times_s))
+    mean = 0.07 * (1.0 + 1.5 * float((speed @ speed) / speed.sum()))
+    assert found.friction_dynamic == pytest.approx(mean, abs=3.0 * found.standard_uncertainty)
+    assert found.variation["sliding velocity"].is_significant
+    assert found.variation["sliding velocity"].per_unit == pytest.approx(0.07 * 1.5, rel=0.2)
+
+
+def test_friction_that_wears_is_not_taken_for_a_lag_with_certainty() -> None:
+    displacements = stand_displacements(
+        _TRUTH.parameters(), {"friction_wear_per_m": 0.15}, _TRUTH.duration_s + 1e-3
+    )
+    worn = _estimate(simulate_record(_TRUTH, displacements))
+    assert worn.standard_uncertainty > 1.5 * _estimate(simulate_record(_TRUTH)).standard_uncertainty
