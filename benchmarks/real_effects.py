@@ -99,8 +99,10 @@ def yaw(scene: Scene, x: float, rng: Rng) -> Scene:
 
 
 def soft_base(*, on_floor: bool) -> Change:
+    """Stiffness of the springs over that of the base, whose frequency is at least twice that of the swing."""
+
     def change(scene: Scene, x: float, rng: Rng) -> Scene:
-        drawn = _drawn({"base_mass_kg": (300.0, 2000.0), "base_damping_ratio": (0.01, 0.1)}, rng)
+        drawn = _drawn({"base_mass_kg": (200.0, 800.0), "base_damping_ratio": (0.01, 0.1)}, rng)
         return replace(scene.with_stand(base_compliance=x, **drawn), gauge_1_on_floor=on_floor)
 
     return change
@@ -126,8 +128,8 @@ def none(scene: Scene, _: float, __: Rng) -> Scene:
 
 RAMP = frozenset({"release-ramp", "release-shape", "release-step"})
 KICK = frozenset({"release-velocity"})
-LAG = frozenset({"gauge-lag", "gauge-2-filter", "filter"})
-FILTER = frozenset({"filter"})
+FILTER = frozenset({"filter", "filter-damping"})
+LAG = FILTER | {"gauge-lag", "gauge-2-filter"}
 MODE = frozenset({"second-mode"})
 DAMPING = frozenset({"loss-factor", "drag", "stand-friction"})
 TILT = frozenset({"tilt", "asymmetry"})
