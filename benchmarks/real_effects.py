@@ -171,7 +171,7 @@ def _effects() -> tuple[Effect, ...]:
         ("structural damping, 0.1 to 1 %", 1e-3, 1e-2, on_stand("loss_factor"), DAMPING),
         ("x_k, 1 to 8 um", 1e-6, 8e-6, on_stand("stand_friction_m"), one("stand-friction")),
         ("x_k, 8 to 50 um", 8e-6, 5e-5, on_stand("stand_friction_m"), one("stand-friction")),
-        ("arc of leaf springs, 0.5 to 4 /m", 0.5, 4.0, on_stand("arc_per_m"), one("arc")),
+        ("arc of leaf springs, 0.5 to 4 /m", 0.5, 4.0, on_stand("arc_per_m"), one("arc"), True),
     ]  # fmt: skip
     gauges = [
         ("gauge 2 late, 0.1 to 1 ms", 1e-4, 1e-3, on_gauge(2, "lag_s"), LAG),

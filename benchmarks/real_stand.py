@@ -75,7 +75,7 @@ class RealStand:
     drag_per_m: float = 0.0  # force over (m1 + m2) u1' |u1'|
     loss_factor: float = 0.0  # force loss_factor c |u1| against the motion (Reid)
     stand_friction_m: float = 0.0  # x_k: Coulomb friction of the stand over c
-    arc_per_m: float = 0.0  # 1 / effective length of the leaf springs
+    arc_per_m: float = 0.0  # 1 / effective length of the leaf springs; negative where the table hangs on them
 
     second_mode_frequency_hz: float = 0.0  # with the plate stuck
     second_mode_share: float = 0.0  # of the swing of the table after a sudden release
