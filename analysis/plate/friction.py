@@ -5,7 +5,6 @@ of its velocity relative to the table.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +70,10 @@ class PlateFriction:
     lag_standard_uncertainty_s: float
     relative_gain_error: float  # of gauge 2 against gauge 1
     time_s: Floats
-    """(k,) float64: middle of each slip (s)."""
+    """(k,) float64: middle of each slip, in the base of `Record.time_s`."""
     friction: Floats
-    """(k,) float64: friction of each slip, with `tilt_rad` taken off."""
+    """(k,) float64: friction of each slip, with `tilt_rad` taken off, and its standard uncertainty by noise,
+    given lag, gain and tilt."""
     friction_standard_uncertainty: Floats
     position_m: Floats  # (k,) float64: middle of each slip on the table
     speed_m_per_s: Floats  # (k,) float64: mean of each slip
@@ -112,7 +112,11 @@ def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction |
         best = fitted
         if best.misfit < 1.0 + _MISFIT_SIGMAS * np.sqrt(2.0 / best.freedom):
             break
-    found = None if best is None else _summarise(best, record, sliding, lag_is_stated=readings.lag_is_stated)
+    found = (
+        None
+        if best is None
+        else _summarise(best, record, decay, sliding, lag_is_stated=readings.lag_is_stated)
+    )
     return found if found is not None and found.friction_dynamic > found.standard_uncertainty else None
 
 
@@ -136,21 +140,16 @@ class _Fitted:
     @property
     def misfit(self) -> float:
         """Chi-square over its expectation, with all friction free."""
-        found, _ = self.free_friction(range(len(self.extents)))
+        found = _inverse(self.equations.matrix) @ self.equations.right
         return (self.equations.squares - float(found @ self.equations.right)) / self.freedom
 
-    def free_friction(self, varying: Iterable[int]) -> tuple[Floats, Floats]:
-        """Estimates (friction of slips, shared, covariates) and their covariance; no slip knows of others.
 
-        Covariates that are not `varying` have no part in friction.
-        """
-        k = len(self.slips) + SHARED_COUNT
-        kept = [*range(k), *(k + number for number in varying)]
-        full, covariance = np.zeros(len(self.equations.right)), np.zeros_like(self.equations.matrix)
-        inverse = _inverse(self.equations.matrix[np.ix_(kept, kept)])
-        full[kept] = inverse @ self.equations.right[kept]
-        covariance[np.ix_(kept, kept)] = inverse
-        return full, covariance
+def _slip_friction(equations: NormalEquations, shared: Floats) -> tuple[Floats, Floats]:
+    """Friction of slips, times sign, less tilt, and its covariance, given the `shared` parameters."""
+    k = len(equations.right) - SHARED_COUNT - len(COVARIATES)
+    own, common = slice(0, k), slice(k, k + SHARED_COUNT)
+    covariance = _inverse(equations.matrix[own, own])
+    return covariance @ (equations.right[own] - equations.matrix[own, common] @ shared), covariance
 
 
 def _inverse(matrix: Floats) -> Floats:
@@ -250,9 +249,10 @@ def _pool(
     )
 
 
-def _summarise(best: _Fitted, record: Record, sliding: Sliding, *, lag_is_stated: bool) -> PlateFriction:
+def _summarise(
+    best: _Fitted, record: Record, decay: FreeDecay, sliding: Sliding, *, lag_is_stated: bool
+) -> PlateFriction:
     slips, relative = best.slips, sliding.relative
-    k = len(slips)
     ends = np.array([(slip.begin_s, slip.end_s) for slip in slips])
     at = np.interp(ends, relative.time_s, relative.value_m)
     path_m = np.abs(np.diff(at, axis=1)[:, 0])
@@ -281,7 +281,8 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding, *, lag_is_stated
             float(pooled.slopes_deviation[place]) / extent,
             number in varying,
         )
-    free, covariance = best.free_friction(varying)
+    equations = best.equations if lag_s == best.lag_s else best.equations_without_lag
+    friction, covariance = _slip_friction(equations, chosen.shared)
     return PlateFriction(
         friction_dynamic=mean,
         contributions=_contributions(mean, uncertainty, between, record),
@@ -290,9 +291,9 @@ def _summarise(best: _Fitted, record: Record, sliding: Sliding, *, lag_is_stated
         lag_s=lag_s + float(chosen.shared[LAG]),
         lag_standard_uncertainty_s=float(chosen.shared_deviation[LAG]),
         relative_gain_error=float(chosen.shared[GAIN]),
-        time_s=ends.mean(axis=1),
-        friction=best.sign * (free[:k] + chosen.tilt),
-        friction_standard_uncertainty=np.sqrt(np.diag(covariance)[:k]),
+        time_s=decay.channels.to_record_time(ends.mean(axis=1)),
+        friction=best.sign * (friction + chosen.tilt),
+        friction_standard_uncertainty=np.sqrt(np.diag(covariance)),
         position_m=at.mean(axis=1),
         speed_m_per_s=path_m / np.diff(ends, axis=1)[:, 0],
         path_m=path_m,

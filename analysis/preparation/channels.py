@@ -49,7 +49,7 @@ class Channels:
     interval_s: float  # median time between rows
     quantisation_m: tuple[float, float]  # smallest step of each gauge's readings
 
-    def to_record_time(self, time_s: float) -> float:
+    def to_record_time(self, time_s: _Time) -> _Time:
         """Time in the base of `Record.time_s`."""
         return self.origin_s + time_s / self.clock_scale
 

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
+from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
 from analysis.record import Record, StandMasses
 from messages.i18n import N_
@@ -97,6 +98,20 @@ def read_warning(document: dict[str, Any]) -> ResultWarning:
 def json_values(value: Any) -> Any:
     """A value as read back from JSON: objects are dicts, and numbers that are not finite None."""
     return msgspec.json.decode(msgspec.json.encode(value))
+
+
+def plate_document(plate: PlateFriction | None) -> dict[str, Any] | None:
+    """Friction from the plate alone: each slip, and how friction varies; None where there is none."""
+    if plate is None:
+        return None
+    names = "time_s", "friction", "friction_standard_uncertainty", "position_m", "speed_m_per_s", "path_m"
+    columns = [getattr(plate, name).tolist() for name in names]
+    return {
+        "slips": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+        "variation": json_values(plate.variation),
+        "gauge_2_lag_s": plate.lag_s,
+        "gauge_2_lag_standard_uncertainty_s": plate.lag_standard_uncertainty_s,
+    }
 
 
 def budget_documents(budget: Iterable[BudgetLine]) -> list[dict[str, Any]]:

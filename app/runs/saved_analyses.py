@@ -15,7 +15,13 @@ import numpy as np
 from analysis.identification import Identification
 from analysis.record import Record
 from app.runs import schema
-from app.runs.analysis_json import budget_documents, json_values, quantity_document, warning_documents
+from app.runs.analysis_json import (
+    budget_documents,
+    json_values,
+    plate_document,
+    quantity_document,
+    warning_documents,
+)
 from app.runs.fields import make_group, read_number, read_text, write_number, write_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
@@ -55,6 +61,7 @@ def analysis_document(path: Path, series: str | None, losses: Losses, result: Id
         "kind": result.kind,
         "results": quantities | result.labels,
         "model": json_values(result.model),
+        "plate": plate_document(result.plate),
         "budget": budget_documents(result.budget),
         "events": json_values(result.events),
         "warnings": warning_documents(result.warnings, with_templates=True),

@@ -96,3 +96,12 @@ def test_friction_that_wears_is_not_taken_for_a_lag_with_certainty() -> None:
     )
     worn = _estimate(simulate_record(_TRUTH, displacements))
     assert worn.standard_uncertainty > 1.5 * _estimate(simulate_record(_TRUTH)).standard_uncertainty
+
+
+def test_friction_of_slips_scatters_about_the_mean_by_its_uncertainty() -> None:
+    found = _estimate(simulate_record(_TRUTH))
+    score = (found.friction - found.friction_dynamic) / found.friction_standard_uncertainty
+    assert 0.5 < np.sqrt(np.mean(score**2)) < 1.6
+    assert np.median(found.friction_standard_uncertainty) < 1e-3
+    assert (np.diff(found.time_s) > 0.0).all()
+    assert found.path_m.sum() > abs(found.position_m[-1])

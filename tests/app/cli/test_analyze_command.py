@@ -18,6 +18,7 @@ SCHEMA_KEYS = {
     "kind",
     "results",
     "model",
+    "plate",
     "budget",
     "events",
     "warnings",
@@ -54,6 +55,18 @@ def test_json_is_what_interface_says(slipstand: Any, simulated_run: Path) -> Non
     friction = document["results"]["friction_dynamic"]
     assert set(friction) == {"value", "standard_uncertainty", "interval_95", "unit"}
     assert friction["interval_95"][0] < friction["value"] < friction["interval_95"][1]
+
+
+def test_json_holds_friction_slip_by_slip(slipstand: Any, simulated_run: Path) -> None:
+    (document,) = slipstand("analyze", simulated_run, "--json").json
+    mean = document["results"]["friction_dynamic_plate"]["value"]
+    slips = document["plate"]["slips"]
+    assert len(slips) > 5
+    assert all(
+        slip["friction"] == pytest.approx(mean, abs=6.0 * slip["friction_standard_uncertainty"])
+        for slip in slips
+    )
+    assert set(document["plate"]["variation"]) == {"sliding velocity", "position", "slid path"}
 
 
 def test_a_run_that_fails_does_not_stop_the_rest(slipstand: Any, simulated_run: Path, tmp_path: Path) -> None:
