@@ -41,6 +41,7 @@ _LAG_TYPICAL_S = 1e-3  # of gauges that differ in lag ...
 _NO_LAG_S = 3e-5  # ... and of those that do not
 _VARIATION_TYPICAL = 0.2  # of friction over the range of a covariate, where it varies
 _LAG_SETTLED_S = 3e-5  # what is left of second order moves u1 by nanometres
+_SLOPE_SIGMAS = 3.0
 _VARYING_MAX = 2  # covariates at once: slips are few
 _EVIDENCE_MIN = 12.0
 """Fall of -2 ln L for which friction is taken to vary: BIC of 1,000 readings, and three looks."""
@@ -264,9 +265,11 @@ def _summarise(
         others = [number for number in alone if number not in varying]
         tried = {number: _pool(best, path_m, (*varying, number)) for number in others} if varying else alone
         likeliest = min(others, key=lambda number: tried[number].cost)
-        if chosen.cost - tried[likeliest].cost < _EVIDENCE_MIN:
+        found = tried[likeliest]
+        is_clear = abs(found.slopes[-1]) > _SLOPE_SIGMAS * found.slopes_deviation[-1]
+        if not is_clear or chosen.cost - found.cost < _EVIDENCE_MIN:
             break
-        varying, chosen = (*varying, likeliest), tried[likeliest]
+        varying, chosen = (*varying, likeliest), found
     instead = _varying_instead_of_lag(best, path_m, chosen) if not (varying or lag_is_stated) else {}
     mean, uncertainty, between = _average(chosen, instead)
     lag_s = best.lag_s

@@ -21,6 +21,7 @@ _LAG_PRIOR_S = 0.02  # standard uncertainty of the gauges' difference in lag whe
 _LAG_STATED_MIN_S = 1e-5
 _GAIN_PRIOR = 0.003  # standard uncertainty of the gauges' relative gain where none is stated
 _GAIN_STATED_MIN = 1e-6
+_MODEL_ERROR_M = 3e-7  # of times of reversals and smoothed readings: what computed records without noise show
 _TRANSITION_SHARE = 0.4  # of the edges: standard uncertainty of the time that friction takes at a reversal
 _VARIATION_PRIOR = 1.0  # of friction over the range of a covariate: nothing is known
 
@@ -81,7 +82,7 @@ class Readings:
             table.time_s,
             _integral(table.time_s, speed),
             speed,
-            decay.noise_m[1] if decay.gauge_2_absolute else float(np.hypot(*decay.noise_m)),
+            math.hypot(_MODEL_ERROR_M, *(decay.noise_m[1:] if decay.gauge_2_absolute else decay.noise_m)),
             record.masses.gravity_m_per_s2,
             _lag_prior_s(record),
             _gain_prior(record),

@@ -62,10 +62,7 @@ def test_json_holds_friction_slip_by_slip(slipstand: Any, simulated_run: Path) -
     mean = document["results"]["friction_dynamic_plate"]["value"]
     slips = document["plate"]["slips"]
     assert len(slips) > 5
-    assert all(
-        slip["friction"] == pytest.approx(mean, abs=6.0 * slip["friction_standard_uncertainty"])
-        for slip in slips
-    )
+    assert all(slip["friction"] == pytest.approx(mean, rel=0.02) for slip in slips)
     assert set(document["plate"]["variation"]) == {"sliding velocity", "position", "slid path"}
 
 
