@@ -65,7 +65,14 @@ class Symbol:
 
 
 _SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_LATEX_LETTERS: Final = {"δ": r"\delta", "μ": r"\mu", "α": r"\alpha", "ζ": r"\zeta"}
+_LATEX_LETTERS: Final = {
+    "δ": r"\delta",
+    "μ": r"\mu",
+    "α": r"\alpha",
+    "ζ": r"\zeta",
+    "η": r"\eta",
+    "κ": r"\kappa",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +149,7 @@ class QuantityDefinition:
 
 
 _NUMBER = Unit("")
+_PERCENT = Unit("%", 1e2, r"\%")
 MICROMETRE = Unit("µm", 1e6)
 MILLIMETRE = Unit("mm", 1e3)
 MILLISECOND = Unit("ms", 1e3)
@@ -170,6 +178,56 @@ CATALOGUE: Final = (
          _NUMBER),
     _Row("stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"),
          _MILLIMETRES_PER_SECOND),
+    _Row("release_ramp_s", Symbol("t", "r"), "s",
+         N_("time of release"), MILLISECOND),
+    _Row("release_step", Symbol("q", "r"), "1",
+         N_("share of the hook's force that it loses at once"), _NUMBER),
+    _Row("release_shape", Symbol("p", "r"), "1",
+         N_("shape of the release"), _NUMBER),
+    _Row("release_velocity_m_per_s", Symbol("v", "0"), "m/s",
+         N_("velocity at the release"), _MILLIMETRES_PER_SECOND),
+    _Row("gauge_2_lag_s", Symbol("t", "2"), "s",
+         N_("lag of gauge 2"), MILLISECOND),
+    _Row("relative_gain", Symbol("g", "2"), "1",
+         N_("relative gain error of gauge 2"), _PERCENT),
+    _Row("spring_hardening", Symbol("c", "3"), "1",
+         N_("hardening of the springs at the pullback"), _PERCENT),
+    _Row("spring_asymmetry", Symbol("c", "2"), "1",
+         N_("asymmetry of the springs at the pullback"), _PERCENT),
+    _Row("stand_friction_m", Symbol("x", "s"), "m",
+         N_("friction of the stand"), MICROMETRE),
+    _Row("drag_per_m", Symbol("d"), "1/m",
+         N_("quadratic damping of the stand"), Unit("1/m")),
+    _Row("loss_factor", Symbol("η", ascii="loss factor"), "1",
+         N_("loss factor of the springs"), _NUMBER),
+    _Row("arc_per_m", Symbol("κ", ascii="arc"), "1/m",
+         N_("curvature of the table's path"), Unit("1/m")),
+    _Row("second_mode_mass_share", Symbol("m", "3"), "1",
+         N_("mass of the second mode over the table's"), _PERCENT),
+    _Row("second_mode_frequency_hz", Symbol("f", "3"), "Hz",
+         N_("frequency of the second mode"), Unit("Hz")),
+    _Row("second_mode_damping", Symbol("ζ", "3", ascii="damping of second mode"), "1",
+         N_("damping ratio of the second mode"), _NUMBER),
+    _Row("film_s_per_m", Symbol("b", "f"), "s/m",
+         N_("relative rise of friction with velocity"), Unit("s/m")),
+    _Row("friction_per_log_velocity", Symbol("b", "l"), "1",
+         N_("relative rise of friction with the logarithm of velocity"), _NUMBER),
+    _Row("friction_gradient_per_m", Symbol("b", "x"), "1/m",
+         N_("relative rise of friction along the track"), Unit("%/mm", 0.1)),
+    _Row("friction_wear_per_m", Symbol("b", "p"), "1/m",
+         N_("relative rise of friction with the slid path"), Unit("%/mm", 0.1)),
+    _Row("friction_asymmetry", Symbol("b", "s"), "1",
+         N_("relative difference of friction by direction"), _PERCENT),
+    _Row("gauge_filter_hz", Symbol("f", "c"), "Hz",
+         N_("corner frequency of the filter of both gauges"), Unit("Hz")),
+    _Row("gauge_2_filter_hz", Symbol("f", "c2"), "Hz",
+         N_("corner frequency of the filter of gauge 2"), Unit("Hz")),
+    _Row("gauge_1_bend", Symbol("b", "1"), "1",
+         N_("bend of gauge 1 at the pullback"), _PERCENT),
+    _Row("gauge_2_bend", Symbol("b", "2"), "1",
+         N_("bend of gauge 2 at the pullback"), _PERCENT),
+    _Row("cross_talk", Symbol("k", "12"), "1",
+         N_("share of gauge 1 in gauge 2"), _PERCENT),
     _Row("tilt_rad", Symbol("α", ascii="tilt"), "rad", N_("tilt"), MILLIRADIAN),
     _Row("period_s", Symbol("T"), "s", N_("period"), MILLISECOND, {Place.TABLE: SECOND},
          column=TableColumn(3, "period_s", is_of_stand=True)),

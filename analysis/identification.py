@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
 
 from analysis.arrays import Floats
 from analysis.plate.friction import PlateFriction
@@ -18,6 +19,15 @@ class FittedModel:
     friction_dynamic: float
 
 
+class Degree(Enum):
+    """How far a model explains a record; the value is its name in JSON."""
+
+    IDEAL = "ideal"  # a friction law on an ideal stand leaves nothing but noise
+    STAND = "stand"  # a friction law on a stand with the effects in `ModelSelection.parts` does
+    FRICTION = "friction"  # no model does, but independent estimates of f_d agree
+    NONE = "none"  # f_d cannot be told
+
+
 @dataclass(frozen=True, slots=True)
 class ModelSelection:
     """The chosen law, and whether it explains the record to within the noise."""
@@ -27,6 +37,8 @@ class ModelSelection:
     residual_rms_m: float
     noise_rms_m: float
     tried: tuple[FittedModel, ...] = ()
+    degree: Degree = Degree.NONE
+    parts: tuple[str, ...] = ()  # names of the effects of the stand in the chosen model
 
 
 @dataclass(frozen=True, slots=True)

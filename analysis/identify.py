@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from analysis.arrays import Floats
-from analysis.fitting.problem import FitProblem
+from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.search import (
     Fit,
     Search,
@@ -14,16 +14,26 @@ from analysis.fitting.search import (
     initial_points,
     may_be_friction,
 )
+from analysis.fitting.stand_search import StandSearch
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
-from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS, WIDEST_LAW, law_by_name, law_without
+from analysis.laws.catalogue import (
+    COMPARED_LAWS,
+    FALLBACK_LAWS,
+    FIRST_SLIP_LAW,
+    WIDEST_LAW,
+    law_by_name,
+    law_without,
+)
 from analysis.laws.parameters import Parameter
 from analysis.plate.friction import estimate_plate_friction
+from analysis.laws.stand_parts import StandModel
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError
 from analysis.results import fitted_quantities, joint_fit
+from analysis.results.diagnosis import diagnose
 from analysis.results.joint_fit import DecayConstants, JointFit
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
@@ -80,20 +90,29 @@ def identify(
 
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
-    if model == "auto" and _may_need_other_law(problem, decay, fits):
-        widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
-        for law in FALLBACK_LAWS:
-            report(0.7, f"fitting {law.name}")
-            fits.append(search.fit_fallback(law, widest))
+    stand: tuple[Fit, FitProblem] | None = None
+    if model == "auto" and not _is_adequate(problem, decay, fits) and may_be_friction(problem, fits):
+        report(0.7, "looking for effects of the stand")
+        stand = _fit_stand(search, decay, fits, start)
+        if _may_be_other_law(*stand, decay):
+            widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
+            for law in FALLBACK_LAWS:
+                report(0.75, f"fitting {law.name}")
+                fits.append(search.fit_fallback(law, widest))
 
     report(0.8, "uncertainty")
-    joint = joint_fit.choose_law(record, decay, problem, fits)
+    if stand is not None and _explains_more(stand[0], fits):
+        joint = joint_fit.choose_stand(record, decay, *stand, fits)
+    else:
+        joint = joint_fit.choose_law(record, decay, problem, fits)
     adequate = joint.selection.adequate
     slip_end = fitted_quantities.find_slip_end(joint)
     slip_ended = slip_end is not None or (decay.slip_end_s is not None and not adequate)
     decay = decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
     joint = replace(joint, decay=decay)
-    if decay.tail is not None:
+    effects = joint.chosen.law.effects if isinstance(joint.chosen.law, StandModel) else ()
+    has_plain_tail = decay.tail is not None and not any(effect.bends_tail for effect in effects)
+    if has_plain_tail:
         constants = joint_fit.constants_from_tail(record, decay)
     else:
         constants = joint_fit.constants_from_joint_fit(joint.chosen, joint.uncertainty)
@@ -106,7 +125,9 @@ def identify(
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     warnings = [
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
-        *(joint_fit.tail_warnings(decay) if decay.tail is not None else [_no_tail_warning()]),
+        *(joint_fit.tail_warnings(decay) if has_plain_tail else []),
+        *([] if decay.tail is not None else [_no_tail_warning()]),
+        *diagnose(effects, budget.results),
         *joint_fit.identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
         *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
         *([] if adequate else [joint_fit.inadequate_warning(joint.selection), *mass_warnings(joint)]),
@@ -167,11 +188,32 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
     )
 
 
-def _may_need_other_law(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
-    """Whether none of `fits` explains the record, and another friction law may."""
+def _is_adequate(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
+    """Whether the likeliest of `fits` leaves nothing but noise."""
     best = min(fits, key=lambda fit: fit.bic)
-    selection = joint_fit.assess_model(problem, best, fits, decay.noise_reading_counts, decay.period_s)
-    return not selection.adequate and may_be_friction(problem, fits)
+    counts = decay.noise_reading_counts
+    return joint_fit.assess_model(problem, best, fits, counts, decay.period_s).adequate
+
+
+def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats) -> tuple[Fit, FitProblem]:
+    """Fit the simplest law with the effects of the stand that the record shows."""
+    simple = next(fit for fit in fits if fit.law is FIRST_SLIP_LAW)
+    if not simple.determines(Parameter.TILT):
+        simple = next(fit for fit in fits if fit.law is COMPARED_LAWS[0])
+    stand = StandSearch(search, simple.law, min(fits, key=lambda fit: fit.bic))
+    starts = [project_to_bounds(point, simple.law) for point in (start, simple.parameters)]
+    return stand.fit(starts, lambda fit: _is_adequate(search.problem, decay, [fit]))
+
+
+def _may_be_other_law(fit: Fit, problem: FitProblem, decay: FreeDecay) -> bool:
+    """Whether friction that falls with velocity may explain what `fit` explains by other effects."""
+    if not _is_adequate(problem, decay, [fit]):
+        return True
+    return isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects)
+
+
+def _explains_more(stand: Fit, fits: list[Fit]) -> bool:
+    return stand.bic < min(fit.bic for fit in fits)
 
 
 def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[ResultWarning]:

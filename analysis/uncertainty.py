@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from analysis.arrays import Floats, Indices
 from analysis.catalogue import CATALOGUE
 from analysis.fitting.problem import FitProblem, covariance
 from analysis.fitting.search import Fit
-from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
 from analysis.quantities import BudgetLine, BudgetSource, OtherLaw, Quantity, Source
 from analysis.record import Record
@@ -51,7 +50,9 @@ class ParameterUncertainty:
 
     def parameter_contributions(self, place: int) -> dict[Source, float]:
         """Standard uncertainty of one parameter by source."""
-        return self.contributions(np.eye(PARAMETER_COUNT)[place])
+        weights = np.zeros(len(self.noise_covariance))
+        weights[place] = 1.0
+        return self.contributions(weights)
 
 
 def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
@@ -124,7 +125,7 @@ def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:
         return None
     rest = free != Parameter.TILT
     own, _ = covariance(normal[np.ix_(rest, rest)])
-    return _expand(-LEVELLING_UNCERTAINTY_RAD * own @ normal[rest, tilt], fit.free)
+    return _expand(-LEVELLING_UNCERTAINTY_RAD * own @ normal[rest, tilt], fit)
 
 
 def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
@@ -146,10 +147,18 @@ def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> f
     return square * (ratio if ratio > 1.0 + _CORRELATED * np.sqrt(2.0 / blocks) else 1.0)
 
 
-def numerical_gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
-    """Derivatives of one or (m,) values by every parameter, by central differences: (p,) or (m, p)."""
-    columns = []
+def numerical_gradient(
+    function: Callable[[Floats], Values], point: Floats, free: Indices | None = None
+) -> Floats:
+    """Derivatives of one or (m,) values by every parameter, by central differences: (p,) or (m, p).
+
+    Those by parameters that are not `free` are zero.
+    """
+    columns: list[Any] = []
     for index, value in enumerate(point):
+        if free is not None and index not in free:
+            columns.append(np.zeros_like(columns[0]) if columns else np.zeros_like(function(point)))
+            continue
         step = 1e-6 * max(abs(float(value)), 1e-3)
         up, down = point.copy(), point.copy()
         up[index] += step
@@ -165,6 +174,11 @@ class UncertaintyBudget:
     def __init__(self) -> None:
         self.results: dict[str, Quantity] = {}
         self.lines: list[BudgetLine] = []
+
+    def remove(self, name: str) -> None:
+        """Remove a quantity with its lines."""
+        del self.results[name]
+        self.lines = [line for line in self.lines if line.contribution_to != name]
 
     def add(
         self,
@@ -198,8 +212,8 @@ def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> Par
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
         if 0.0 < deviation < np.inf:
-            sources[_SOURCES[Parameter(int(place))]] = _expand(inverse[:, index] / deviation, fit.free)
-    full = np.zeros((PARAMETER_COUNT, PARAMETER_COUNT))
+            sources[_SOURCES[Parameter(int(place))]] = _expand(inverse[:, index] / deviation, fit)
+    full = np.zeros((len(fit.parameters), len(fit.parameters)))
     full[fit.free[:, None], fit.free] = noise
     return ParameterUncertainty(sources, full)
 
@@ -209,7 +223,7 @@ def _times(problem: FitProblem) -> list[Floats]:
     return times if problem.relative is None else [*times, problem.relative.time_s]
 
 
-def _expand(column: Floats, free: Indices) -> Floats:
-    wide = np.zeros(PARAMETER_COUNT)
-    wide[free] = column
+def _expand(column: Floats, fit: Fit) -> Floats:
+    wide = np.zeros(len(fit.parameters))
+    wide[fit.free] = column
     return wide

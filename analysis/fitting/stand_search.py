@@ -80,8 +80,11 @@ class StandSearch:
         residual = Channel(search.problem.table.time_s, ideal.table_residual_m)
         self._second_frequency_hz = _strongest_frequency(residual, self._release_s, self._period_s)
 
-    def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> Fit:
-        """Fit the law with the effects that the record shows, from points (p,) of an ideal stand."""
+    def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> tuple[Fit, FitProblem]:
+        """Fit the law with the effects that the record shows, from points (p,) of an ideal stand.
+
+        The problem that the fit solves comes with it.
+        """
         points = [extended_point(start) for start in starts]
         first = self._window(_WINDOWS_PERIODS[0])
         trials = [min((self._trial(first, (), point) for point in points), key=_bic_of)]
@@ -92,7 +95,8 @@ class StandSearch:
         window = self.problem.decimated(_READINGS_WHOLE, self._slip_end_s)
         trials = self._continue(window, trials)[:1]
         trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
-        return self._finish(self._without_needless(window, trials[0]))
+        fit = self._finish(self._without_needless(window, trials[0]))
+        return fit, _open_shared(self.problem, fit.law)
 
     def _continue(self, window: FitProblem, trials: list[_Trial]) -> list[_Trial]:
         """Refit trials of a shorter window, also with an f_s, which matters only once a stick has ended."""
@@ -235,12 +239,11 @@ def extended_problem(problem: FitProblem) -> FitProblem:
     )
 
 
-def _open_shared(problem: FitProblem, model: StandModel) -> FitProblem:
+def _open_shared(problem: FitProblem, model: FrictionLaw) -> FitProblem:
     """The problem without what is stated of lag and gain of gauge 2, where the model frees them."""
-    for effect in model.effects:
-        for place in effect.shared:
-            if place in (Parameter.LAG, Parameter.RELATIVE_GAIN):
-                problem = problem.with_prior(place, 0.0, np.inf)
+    for place in (Parameter.LAG, Parameter.RELATIVE_GAIN):
+        if place in model.extra:
+            problem = problem.with_prior(place, 0.0, np.inf)
     return problem
 
 

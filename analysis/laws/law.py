@@ -214,6 +214,10 @@ class FrictionLaw:
     def has_tilt(self) -> bool:
         return Parameter.TILT in self.extra
 
+    def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:
+        """Motion from release to `duration_s`; `own` are the values of its own parameters."""
+        return self.solver.simulate(parameters, own, duration_s)
+
     def vector(self, point: Floats) -> Floats:
         """Parameters for the solver from a parameter vector: those of the motion, then its own."""
         motion = point[:MOTION_PARAMETER_COUNT]

@@ -18,17 +18,24 @@ from analysis.motion.events import (
     DURATION_MIN_S,
     FRICTION_DYNAMIC,
     FRICTION_STATIC,
+    GRAVITY,
     PULLBACK,
     RELEASE,
     TILT,
 )
 from analysis.motion.stand_motion import (
+    ACCELERATION,
+    SLIP,
+    SLIP_RATE,
     STAND_PARAMETER_COUNT,
+    TABLE,
+    TIME,
+    VELOCITY,
     StandParameter,
     gauge_readings,
     stand_kernels,
 )
-from analysis.motion.two_mass import TwoMassParameters
+from analysis.motion.two_mass import Motion, TwoMassParameters
 
 STAND_PARAMETERS = {
     StandParameter.RELEASE_RAMP: OwnParameter("release_ramp_s", "s", 0.0, 0.0, 0.06),
@@ -74,6 +81,8 @@ class StandEffect:
     shared: tuple[Parameter, ...] = ()
     probes: tuple[tuple[float, ...], ...] = ()
     needs: str = ""  # name of the effect that this one refines
+    bends_tail: bool = False  # whether the stick tail is no damped cosine with it
+    varies_friction: bool = False  # whether f_d is a mean over the slid path with it
     rarity: float = 0.0
     """Added to the BIC: what stands rarely show must explain more than what they often show."""
 
@@ -88,21 +97,21 @@ EFFECTS = (
     StandEffect("release-velocity", (StandParameter.RELEASE_VELOCITY,), rarity=_RARE),
     StandEffect("gauge-lag", shared=(Parameter.LAG,)),
     StandEffect("gauge-ratio", shared=(Parameter.RELATIVE_GAIN,), rarity=_RARE),
-    StandEffect("stand-friction", (StandParameter.STAND_FRICTION,), probes=((3e-5,),)),
-    StandEffect("film", (StandParameter.FILM,)),
-    StandEffect("spring-hardening", (StandParameter.SPRING_HARDENING,)),
-    StandEffect("spring-asymmetry", (StandParameter.SPRING_ASYMMETRY,), rarity=_RARE),
-    StandEffect("drag", (StandParameter.DRAG,)),
-    StandEffect("loss-factor", (StandParameter.LOSS_FACTOR,), rarity=_RARE),
-    StandEffect("arc", (StandParameter.ARC,)),
+    StandEffect("stand-friction", (StandParameter.STAND_FRICTION,), probes=((3e-5,),), bends_tail=True),
+    StandEffect("film", (StandParameter.FILM,), varies_friction=True),
+    StandEffect("spring-hardening", (StandParameter.SPRING_HARDENING,), bends_tail=True),
+    StandEffect("spring-asymmetry", (StandParameter.SPRING_ASYMMETRY,), rarity=_RARE, bends_tail=True),
+    StandEffect("drag", (StandParameter.DRAG,), bends_tail=True),
+    StandEffect("loss-factor", (StandParameter.LOSS_FACTOR,), rarity=_RARE, bends_tail=True),
+    StandEffect("arc", (StandParameter.ARC,), bends_tail=True),
     StandEffect(
         "second-mode",
         (StandParameter.MODE_MASS, StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING),
+        bends_tail=True,
     ),
-    StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE),
-    StandEffect("gradient", (StandParameter.GRADIENT,)),
-    StandEffect("wear", (StandParameter.WEAR,)),
-    StandEffect("asymmetry", (StandParameter.ASYMMETRY,), rarity=_RARE),
+    StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE, varies_friction=True),
+    StandEffect("gradient", (StandParameter.GRADIENT,), varies_friction=True),
+    StandEffect("wear", (StandParameter.WEAR,), varies_friction=True),
     StandEffect("filter", (StandParameter.FILTER,)),
     StandEffect("filter-damping", (StandParameter.FILTER_DAMPING,), needs="filter", rarity=_RARE),
     StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE),
@@ -113,6 +122,15 @@ EFFECTS = (
 
 
 STAND_PLACES = {own.name: place for place, own in STAND_PARAMETERS.items()}
+
+
+CORNER_NAMES = {"filter_s2": "gauge_filter_hz", "gauge_2_filter_s2": "gauge_2_filter_hz"}
+"""Results that are given in place of squared time constants."""
+SHARED_NAMES = {
+    Parameter.LAG: ("gauge_2_lag_s", "s"),
+    Parameter.RELATIVE_GAIN: ("relative_gain", "1"),
+}
+"""Names and units of results for shared parameters that effects free."""
 
 
 class StandSolver(MotionSolver):
@@ -160,6 +178,17 @@ class StandSolver(MotionSolver):
             row[-1] = readings - point[offset_place] - gain * read
             row /= noise
         return [row @ row.T for row in rows]
+
+    def mean_friction(self, vector: Floats, duration_s: float) -> float:
+        """Mean of the coefficient of friction over the slid path."""
+        _, nodes = self.kernels.integrate(vector, duration_s)
+        arc = vector[len(vector) - STAND_PARAMETER_COUNT + StandParameter.ARC]
+        vertical = arc * (nodes[:, VELOCITY] ** 2 + nodes[:, TABLE] * nodes[:, ACCELERATION])
+        load = vector[GRAVITY] * vector[TILT] - nodes[:, ACCELERATION] - nodes[:, SLIP_RATE]
+        force = np.abs(load / (vector[GRAVITY] + vertical)) * np.abs(nodes[:, SLIP])
+        steps_s = np.diff(nodes[:, TIME])
+        path = float(steps_s @ (np.abs(nodes[1:, SLIP]) + np.abs(nodes[:-1, SLIP])))
+        return float(steps_s @ (force[1:] + force[:-1])) / path if path > 0.0 else float("nan")
 
     def _readings(self, vector: Floats, lag_s: float, gauges: list[Gauge]) -> list[Floats]:
         """What ideal gauges of these kinds read at their times, gauge 2 later by `lag_s`."""
@@ -214,8 +243,13 @@ def _differences(vector: Floats, direction: Floats) -> tuple[Floats, Floats, flo
 
 
 @cache
-def _solver(law: FrictionLaw) -> StandSolver:
+def _solver_of(law: FrictionLaw) -> StandSolver:
     return StandSolver(law)
+
+
+def _solver(law: FrictionLaw) -> StandSolver:
+    """The solver of a law; those in closed form share one."""
+    return _solver_of(law if law.own else COULOMB)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +259,7 @@ class StandModel(FrictionLaw):
     Its points are those of an ideal stand, followed by the `StandParameter` values.
     """
 
+    law: FrictionLaw = COULOMB
     effects: tuple[StandEffect, ...] = ()
     stand_places: tuple[int, ...] = ()  # places of their own parameters in a point
 
@@ -232,6 +267,16 @@ class StandModel(FrictionLaw):
     def own_places(self) -> Indices:
         count = len(self.own) - len(self.stand_places)
         return np.array([*range(self.own_start, self.own_start + count), *self.stand_places], dtype=np.int64)
+
+    def mean_friction(self, point: Floats, duration_s: float) -> float:
+        """Mean of the coefficient of friction over the slid path."""
+        return _solver(self.law).mean_friction(self.vector(point), duration_s)
+
+    def simulate(self, parameters: TwoMassParameters, own: list[float], duration_s: float) -> Motion:
+        count = len(self.own) - len(self.stand_places)
+        stand = np.zeros(STAND_PARAMETER_COUNT)
+        stand[[place - PARAMETER_COUNT for place in self.stand_places]] = own[count:]
+        return self.solver.simulate(parameters, [*own[:count], *stand.tolist()], duration_s)
 
     def vector(self, point: Floats) -> Floats:
         own = self.own_places[: len(self.own) - len(self.stand_places)]
@@ -271,13 +316,20 @@ def compose(law: FrictionLaw, effects: Iterable[StandEffect]) -> StandModel:
     changed: dict[str, Any] = {
         "extra": (*law.extra, *shared),
         "own": (*law.own, *(STAND_PARAMETERS[place] for place in places)),
-        "solver": _solver(law if law.own else COULOMB),
+        "solver": _solver(law),
     }
     return StandModel(
         **{**base, **changed},
+        law=law,
         effects=effects,
         stand_places=tuple(PARAMETER_COUNT + place for place in places),
     )
+
+
+def effects_by_name(names: Iterable[str]) -> list[StandEffect]:
+    """Effects in the order of `EFFECTS`; names of other versions are passed over."""
+    wanted = set(names)
+    return [effect for effect in EFFECTS if effect.name in wanted]
 
 
 def extended_point(point: Floats) -> Floats:

@@ -15,6 +15,7 @@ from analysis.identification import Events
 from analysis.laws.catalogue import compared_law
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
+from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, StandModel
 from analysis.motion.two_mass import PEAK_RATES
 from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay
@@ -39,23 +40,53 @@ def add_fitted_quantities(
     not explain the record.
     """
     fit, fitted = joint.chosen, joint.uncertainty
-    profiled = joint.selection.adequate or fit.law.solver.is_closed_form
+    of_stand_model = isinstance(fit.law, StandModel)
+    profiled = fit.law.solver.is_closed_form or (joint.selection.adequate and not of_stand_model)
     own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
     of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
+    if isinstance(fit.law, StandModel):
+        of_law += [(int(place), *SHARED_NAMES[place]) for place in fit.law.extra if place in SHARED_NAMES]
     friction = [(place, name, "1") for place, name in FRICTION_PARAMETERS.items()]
     of_stand = (Parameter.TILT, "tilt_rad", "rad"), (Parameter.PULLBACK, "pullback_m", "m")
     for place, name, unit in (*friction, *of_law, *of_stand):
         if fit.determines(place):
             sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
             shares, reach = fitted.parameter_contributions(place), None
+            if name in CORNER_NAMES:
+                _add_corner(CORNER_NAMES[name], fit.value(place), shares, budget)
+                continue
             if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
                 shares, reach = _by_profile(joint.problem, fit, place, shares)
             budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach)
+    if isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects):
+        _add_mean_friction(joint, fit.law, budget)
     if slip_ended:
         _add_residual_displacement(joint, budget)
     _add_peak_rates(joint, budget)
     velocity = budget.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
+
+
+def _add_corner(
+    name: str, squared_constant_s2: float, shares: dict[Source, float], budget: UncertaintyBudget
+) -> None:
+    """Add the corner frequency of a filter, 1 / (2 pi time constant)."""
+    corner_hz = 1.0 / (2.0 * math.pi * math.sqrt(max(squared_constant_s2, 1e-12)))
+    slope = 0.5 * corner_hz / max(squared_constant_s2, 1e-12)
+    budget.add(name, corner_hz, {source: slope * share for source, share in shares.items()})
+
+
+def _add_mean_friction(joint: JointFit, model: StandModel, budget: UncertaintyBudget) -> None:
+    """Replace f_d, which varies with velocity or place, by its mean over the slid path."""
+    fit, duration_s = joint.chosen, joint.duration_s
+
+    def mean(parameters: Floats) -> float:
+        return model.mean_friction(project_to_bounds(parameters, model), duration_s)
+
+    point = fit.parameters
+    gradient = numerical_gradient(mean, point, fit.free)
+    budget.remove("friction_dynamic")
+    _add_finite(joint, budget, [("friction_dynamic", mean(point), gradient)])
 
 
 def _by_profile(
@@ -84,7 +115,11 @@ def _add_peak_rates(joint: JointFit, budget: UncertaintyBudget) -> None:
         return law.solver.peak_rates(law.vector(project_to_bounds(parameters, law)), duration_s)
 
     point = joint.chosen.parameters
-    _add_finite(joint, budget, zip(PEAK_RATES, rates(point), numerical_gradient(rates, point), strict=True))
+    _add_finite(
+        joint,
+        budget,
+        zip(PEAK_RATES, rates(point), numerical_gradient(rates, point, joint.chosen.free), strict=True),
+    )
 
 
 def _add_finite(
@@ -104,7 +139,10 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
         return law.solver.final_relative(law.vector(project_to_bounds(parameters, law)), duration_s)
 
     point = joint.chosen.parameters
-    value, shares = end(point), joint.uncertainty.contributions(numerical_gradient(end, point))
+    value, shares = (
+        end(point),
+        joint.uncertainty.contributions(numerical_gradient(end, point, joint.chosen.free)),
+    )
     if (
         decay.relative is not None
         and decay.plateau is not None
@@ -246,11 +284,13 @@ _SLIP_DOUBT = 2.0  # later slips take back part of the first one: gauge 2 shows 
 def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> None:
     """Add both bounds of f_s to the budget.
 
-    Where a law with f_s explains the record, they are those of its motion: the largest demand that the
-    joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
+    None on a stand that is not ideal. Where a law with f_s explains the record, they are those of its
+    motion: the largest demand that the joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
     f_s may still be somewhat larger: up to where chi-square of the law that frees it has risen.
     """
     chosen, duration_s = joint.chosen, joint.duration_s
+    if isinstance(chosen.law, StandModel):
+        return
     if not chosen.law.has_static_friction:
         _add_tied(joint, budget)
         return
@@ -413,10 +453,11 @@ def find_slip_end(joint: JointFit) -> SlipEnd | None:
         later = _end_of(chosen.parameters, chosen.law, end_s + decay.period_s)
         if later is None or later > end_s:
             return None
-    if not chosen.law.has_static_friction:
+    static_is_open = not chosen.law.has_static_friction and not isinstance(chosen.law, StandModel)
+    if static_is_open:
         _, largest = largest_static_friction(joint)
     fitted = _fitted_slip_end(joint, largest)
-    if fitted is not None and not chosen.law.has_static_friction:
+    if fitted is not None and static_is_open:
         fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted

@@ -9,9 +9,9 @@ from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2, project_to_bounds
 from analysis.fitting.search import Fit, nonlinearity_slope_error, range_m
 from analysis.formatting import format_length
-from analysis.identification import Curves, FittedModel, ModelSelection
-from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.identification import Curves, Degree, FittedModel, ModelSelection
 from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import StandModel
 from analysis.preparation.channels import NOISE_FLOOR_M
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.oscillation import DampedCosine, check_friction, damped_cosine, envelope_curvature
@@ -66,7 +66,12 @@ def assess_model(
     tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
-    return ModelSelection(chosen.law.name, bool(adequate), chosen.rms_m, noise, tried)
+    effects = chosen.law.effects if isinstance(chosen.law, StandModel) else ()
+    degree = (Degree.STAND if effects else Degree.IDEAL) if adequate else Degree.NONE
+    parts = tuple(effect.name for effect in effects)
+    return ModelSelection(
+        chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree=degree, parts=parts
+    )
 
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:
@@ -195,6 +200,16 @@ def choose_law(record: Record, decay: FreeDecay, problem: FitProblem, fits: list
     return JointFit(record, decay, problem, chosen, candidates, uncertainty, selection)
 
 
+def choose_stand(
+    record: Record, decay: FreeDecay, fit: Fit, problem: FitProblem, ideal: list[Fit]
+) -> JointFit:
+    """Choose a fit with effects of the stand over those of an ideal stand, which are only reported."""
+    check_friction(fit.value(Parameter.FRICTION_DYNAMIC))
+    uncertainty = joint_fit_uncertainty(record, decay, problem, fit, [fit])
+    selection = assess_model(problem, fit, [*ideal, fit], decay.noise_reading_counts, decay.period_s)
+    return JointFit(record, decay, problem, fit, [fit], uncertainty, selection)
+
+
 def joint_fit_uncertainty(
     record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, candidates: list[Fit]
 ) -> ParameterUncertainty:
@@ -229,7 +244,7 @@ def add_systematic_uncertainty(
 
 
 def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
-    column = np.zeros(PARAMETER_COUNT)
+    column = np.zeros(len(parameters))
     for place, power in powers.items():
         column[place] = power * parameters[place]
     return column

@@ -15,7 +15,6 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
 from analysis.identification import MonteCarlo
-from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.parameters import Parameter
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import refit_damped_cosine
@@ -98,7 +97,7 @@ def run_monte_carlo(
 
     `refits` is the number of full fits; `progress` is called with the number done.
     """
-    constants = {name: PARAMETER_COUNT + place for place, name in enumerate(_CONSTANTS)}
+    constants = {name: len(drawing.joint.chosen.parameters) + place for place, name in enumerate(_CONSTANTS)}
     columns = {name: int(place) for name, place in (_PARAMETERS | constants).items() if name in results}
     linear = drawing.linear(np.random.default_rng(seed), LINEAR_DRAWS)
     full = _refits(drawing, refits, seed, progress)
@@ -144,7 +143,7 @@ def _refits(
             found.append(values)
             if progress is not None:
                 progress(count)
-    return np.array(found).reshape(-1, PARAMETER_COUNT + len(_CONSTANTS))
+    return np.array(found).reshape(-1, len(drawing.joint.chosen.parameters) + len(_CONSTANTS))
 
 
 def _rms(residual_m: Floats) -> float:

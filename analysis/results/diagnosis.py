@@ -1,0 +1,70 @@
+"""Warnings that name what is wrong with a stand, with its size and a remedy."""
+
+from analysis.catalogue import Place, definition
+from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, STAND_PARAMETERS, StandEffect
+from analysis.quantities import Quantity, ResultWarning, result_warning
+from messages.i18n import N_
+
+_SENTENCES = {
+    "release-ramp": N_("the release took {size}: use a sharper hook."),
+    "release-shape": N_("the hook let go unevenly (shape {size}): use a sharper hook."),
+    "release-step": N_("the hook lost {size} of its force at once and the rest later: use a sharper hook."),
+    "release-velocity": N_("the table moved at {size} when it was released: wait until it hangs still."),
+    "gauge-lag": N_(
+        "gauge 2 lags gauge 1 by {size}: give both amplifiers the same filter, or state the filters in"
+        " gauges.toml."
+    ),
+    "gauge-ratio": N_(
+        "gauge 2 reads {size} more than gauge 1 lets expect: calibrate both gauges, and check that the base"
+        " of the stand does not give way."
+    ),
+    "stand-friction": N_(
+        "the stand itself has dry friction, x_k = {size}: clean its bearings and cables, and identify a run"
+        " of the bare table."
+    ),
+    "film": N_("friction rises with the sliding velocity, by {size}: the contact is lubricated; clean it."),
+    "log-velocity": N_(
+        "friction changes by {size} of itself as the sliding velocity changes by a factor of e: f_d is a"
+        " mean over the slid path."
+    ),
+    "gradient": N_("friction changes along the track by {size}: f_d is a mean over the slid path."),
+    "wear": N_("friction changes with the slid path by {size}: f_d is a mean over the slid path."),
+    "spring-hardening": N_("the springs harden by {size} at the pullback: pull back less."),
+    "spring-asymmetry": N_(
+        "the springs are stiffer on one side, by {size} at the pullback: check their clamps."
+    ),
+    "drag": N_("damping grows with the square of the velocity, by {size}: look for plates that move air."),
+    "loss-factor": N_("the springs lose energy at every speed, loss factor {size}: check their clamps."),
+    "arc": N_("the table moves on an arc of curvature {size}: use longer leaf springs, or pull back less."),
+    "second-mode": N_(
+        "a second mode at {frequency}, of {size} of the table's mass: tighten what is mounted."
+    ),
+    "filter": N_("a filter of {size} before both gauges rounds their readings: raise its corner frequency."),
+    "gauge-2-filter": N_(
+        "a filter of {size} before gauge 2 rounds its readings: raise its corner frequency."
+    ),
+    "gauge-1-bend": N_("gauge 1 is bent by {size} at the pullback: calibrate it over its whole range."),
+    "gauge-2-bend": N_("gauge 2 is bent by {size} at the pullback: calibrate it over its whole range."),
+    "cross-talk": N_("gauge 2 shows {size} of gauge 1: separate their cables, and check their mounting."),
+    "static-friction": "",
+}
+"""By name of the effect, which is the code of the warning; f_s is a result and no fault of the stand."""
+
+
+def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> list[ResultWarning]:
+    """One warning for each effect that the model holds."""
+    warnings = []
+    for effect in effects:
+        names = [STAND_PARAMETERS[place].name for place in effect.own]
+        names += [SHARED_NAMES[place][0] for place in effect.shared if place in SHARED_NAMES]
+        shown = {name: _text(results, CORNER_NAMES.get(name, name)) for name in names}
+        if _SENTENCES[effect.name] and all(shown.values()):
+            values = {"size": shown[names[0]]}
+            if "second_mode_frequency_hz" in shown:
+                values["frequency"] = shown["second_mode_frequency_hz"]
+            warnings.append(result_warning(effect.name, _SENTENCES[effect.name], **values))
+    return warnings
+
+
+def _text(results: dict[str, Quantity], name: str) -> str:
+    return str(definition(name).format(results[name], Place.WINDOW)) if name in results else ""
