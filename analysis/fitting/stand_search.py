@@ -39,6 +39,10 @@ _PROMISE_MIN = 10.0
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
 _STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
 _EXPLAINED = 1.15  # chi-square a reading below which a window asks for no further effect
+_EXPLAINED_SHARE_MIN = 0.2
+"""Share of what is not explained by which an effect lowers the BIC at the least: one of four does, and an
+effect that does less is not what is wrong with the record."""
+_TAIL_PERIODS = 8.0  # of the stick tail in which effects are looked for
 _FOLLOWED_BIC = 2000.0  # above the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
@@ -92,7 +96,8 @@ class StandSearch:
             window = self._window(periods)
             trials = self._continue(window, trials)
             trials = self._extend_while(window, trials, _explains)
-        window = self.problem.decimated(_READINGS_WHOLE, self._slip_end_s)
+        end_s = self._slip_end_s + _TAIL_PERIODS * self._period_s
+        window = self.problem.before(end_s).decimated(_READINGS_WHOLE, self._slip_end_s)
         trials = self._continue(window, trials)[:1]
         trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
         fit = self._finish(self._without_needless(window, trials[0]))
@@ -115,13 +120,14 @@ class StandSearch:
         """Add effects to the best of `trials` until the best is enough, or no lower BIC is found."""
         extended = set[frozenset[str]]()
         while not is_enough(window, trials[0]):
-            best_bic = trials[0].bic
+            best = trials[0]
             for trial in trials[:]:
                 if trial.names not in extended and len(trial.model.effects) < _EFFECTS_MOST:
                     extended.add(trial.names)
                     trials += self._extensions(window, trial)
             trials = _lowest(trials)
-            if trials[0].bic > best_bic - _EVIDENCE_MIN:
+            excess = best.minimum.cost - window.sample_count
+            if trials[0].bic > best.bic - max(_EVIDENCE_MIN, _EXPLAINED_SHARE_MIN * excess):
                 break
         return trials
 

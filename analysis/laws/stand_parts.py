@@ -157,14 +157,13 @@ class StandSolver(MotionSolver):
         ideal = self._readings(vector, lag_s, gauges)
         rows = [np.zeros((len(free) + 1, len(gauge[0]))) for gauge in gauges]
         for k, direction in enumerate(directions):
-            up, down, step = _differences(vector, direction)
-            sides = zip(self._readings(up, lag_s, gauges), self._readings(down, lag_s, gauges), strict=True)
-            for row, (above, below) in zip(rows, sides, strict=True):
+            step = _step(vector, direction)
+            moved = self._readings(vector + step * direction, lag_s, gauges)
+            for row, above, below in zip(rows, moved, ideal, strict=True):
                 row[k] = (above - below) / step
-        later = earlier = ideal
+        later = ideal
         if Parameter.LAG in free:
             later = self._readings(vector, lag_s + _LAG_STEP_S, gauges)
-            earlier = self._readings(vector, lag_s - _LAG_STEP_S, gauges)
         for number, (_, readings, which, noise) in enumerate(gauges):
             row, slopes, read = rows[number], rows[number][:-1], ideal[number]
             second = which != GAUGE_1
@@ -174,7 +173,7 @@ class StandSolver(MotionSolver):
             slopes[:moving] *= gain
             slopes[free == offset_place], slopes[free == gain_place] = 1.0, read
             if second:
-                slopes[free == Parameter.LAG] = gain * (later[number] - earlier[number]) / (2.0 * _LAG_STEP_S)
+                slopes[free == Parameter.LAG] = gain * (later[number] - read) / _LAG_STEP_S
             row[-1] = readings - point[offset_place] - gain * read
             row /= noise
         return [row @ row.T for row in rows]
@@ -216,15 +215,11 @@ _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATI
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
 
 
-def _differences(vector: Floats, direction: Floats) -> tuple[Floats, Floats, float]:
-    """Two vectors about `vector` along `direction`, and their distance.
-
-    Parameters of the stand keep their lower bounds.
-    """
+def _step(vector: Floats, direction: Floats) -> float:
+    """Step of a difference along `direction`."""
     first = len(vector) - STAND_PARAMETER_COUNT
-    places = np.flatnonzero(direction)
     steps = []
-    for place in places.tolist():
+    for place in np.flatnonzero(direction).tolist():
         if place >= first:
             own = STAND_PARAMETERS[StandParameter(place - first)]
             steps.append(_FILTER_STEP_S2 if own.unit == "s2" else _STEP_SHARE * (own.upper - own.lower))
@@ -232,14 +227,7 @@ def _differences(vector: Floats, direction: Floats) -> tuple[Floats, Floats, flo
             steps.append(_ADDITIVE_STEP)
         else:
             steps.append(_STEP_SHARE * abs(float(vector[place])) or _ADDITIVE_STEP)
-    step = min(steps)
-    up, down = vector + step * direction, vector - step * direction
-    for place in places[places >= first].tolist():
-        lower = STAND_PARAMETERS[StandParameter(place - first)].lower
-        if down[place] < lower:
-            down[place] = lower
-            return up, down, float(up[place] - lower)
-    return up, down, 2.0 * step
+    return min(steps)
 
 
 @cache

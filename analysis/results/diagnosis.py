@@ -39,10 +39,8 @@ _SENTENCES = {
     "second-mode": N_(
         "a second mode at {frequency}, of {size} of the table's mass: tighten what is mounted."
     ),
-    "filter": N_("a filter of {size} before both gauges rounds their readings: raise its corner frequency."),
-    "gauge-2-filter": N_(
-        "a filter of {size} before gauge 2 rounds its readings: raise its corner frequency."
-    ),
+    "filter": N_("a filter of {size} before both gauges rounds their readings: raise its corner."),
+    "gauge-2-filter": N_("a filter of {size} before gauge 2 rounds its readings: raise its corner."),
     "gauge-1-bend": N_("gauge 1 is bent by {size} at the pullback: calibrate it over its whole range."),
     "gauge-2-bend": N_("gauge 2 is bent by {size} at the pullback: calibrate it over its whole range."),
     "cross-talk": N_("gauge 2 shows {size} of gauge 1: separate their cables, and check their mounting."),

@@ -285,8 +285,9 @@ def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> No
     """Add both bounds of f_s to the budget.
 
     None on a stand that is not ideal. Where a law with f_s explains the record, they are those of its
-    motion: the largest demand that the joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
-    f_s may still be somewhat larger: up to where chi-square of the law that frees it has risen.
+    motion: the largest demand that the joint stood without slip, and the smallest at which slip began.
+    Where the likeliest law ties f_s to f_d, f_s may still be somewhat larger: up to where chi-square of
+    the law that frees it has risen.
     """
     chosen, duration_s = joint.chosen, joint.duration_s
     if isinstance(chosen.law, StandModel):
