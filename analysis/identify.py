@@ -26,8 +26,8 @@ from analysis.laws.catalogue import (
     law_without,
 )
 from analysis.laws.parameters import Parameter
-from analysis.plate.friction import estimate_plate_friction
 from analysis.laws.stand_parts import StandModel
+from analysis.plate.friction import estimate_plate_friction
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
@@ -37,11 +37,15 @@ from analysis.results.diagnosis import diagnose
 from analysis.results.joint_fit import DecayConstants, JointFit
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
+from analysis.results.verdict import judge
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import UncertaintyBudget, unstated_gains
 from messages.i18n import N_
 from messages.message import message
 
+_LEFT_MAX = 0.1
+"""Share of what no law explains that effects may leave: with more, others must be at work, and what these
+effects explain is theirs."""
 Progress = Callable[[float, str], None]
 
 
@@ -101,7 +105,7 @@ def identify(
                 fits.append(search.fit_fallback(law, widest))
 
     report(0.8, "uncertainty")
-    if stand is not None and _explains_more(stand[0], fits):
+    if stand is not None and _explains_more(*stand, decay, fits):
         joint = joint_fit.choose_stand(record, decay, *stand, fits)
     else:
         joint = joint_fit.choose_law(record, decay, problem, fits)
@@ -123,7 +127,9 @@ def identify(
     fitted_quantities.add_static_friction_bounds(joint, budget)
     if plate is not None:
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
+    joint, verdict_warnings = judge(joint, plate, budget)
     warnings = [
+        *verdict_warnings,
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
         *(joint_fit.tail_warnings(decay) if has_plain_tail else []),
         *([] if decay.tail is not None else [_no_tail_warning()]),
@@ -212,8 +218,13 @@ def _may_be_other_law(fit: Fit, problem: FitProblem, decay: FreeDecay) -> bool:
     return isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects)
 
 
-def _explains_more(stand: Fit, fits: list[Fit]) -> bool:
-    return stand.bic < min(fit.bic for fit in fits)
+def _explains_more(stand: Fit, problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
+    """Whether effects of the stand explain the record, or most of what the friction laws leave."""
+    best = min(fits, key=lambda fit: fit.bic)
+    if stand.bic > best.bic or not isinstance(stand.law, StandModel) or not stand.law.effects:
+        return False
+    excess, left = (fit.chi_square - problem.sample_count for fit in (best, stand))
+    return left < _LEFT_MAX * excess or _is_adequate(problem, decay, [stand])
 
 
 def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[ResultWarning]:

@@ -1,6 +1,6 @@
 """Standard uncertainties by the law of propagation (JCGM 100, 5.1.2), with contributions by source."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -184,7 +184,7 @@ class UncertaintyBudget:
         self,
         name: str,
         value: float,
-        contributions: dict[Source, float],
+        contributions: Mapping[Any, float],
         *,
         unit: str = "",
         half_widths: tuple[float, float] | None = None,

@@ -1,0 +1,73 @@
+"""The verdict in degrees: how far a model explains a record, and whether f_d holds all the same.
+
+The joint fit and the plate's own estimate rest on different readings: the fit on every reading and on a
+model of the stand, the plate on its curvature in slips alone. Where they agree, what the model leaves
+unexplained does not bear on f_d.
+"""
+
+import math
+from dataclasses import replace
+
+from analysis.identification import Degree
+from analysis.plate.friction import PlateFriction
+from analysis.quantities import BudgetSource, Quantity, ResultWarning, result_warning
+from analysis.results.joint_fit import JointFit
+from analysis.uncertainty import UncertaintyBudget
+from messages.i18n import N_
+
+_NAME = "friction_dynamic"
+_SIGMAS = 3.0  # estimates that differ by more standard uncertainties of the plate's own contradict each other
+_SPREAD_MAX = 0.02  # of f_d: estimates of a failed model that differ by more leave f_d open
+_MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
+_CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however small the uncertainties are
+
+
+def judge(
+    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget
+) -> tuple[JointFit, list[ResultWarning]]:
+    """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for."""
+    selection, results = joint.selection, budget.results
+    own = results.get(_NAME)
+    if own is None:
+        return _with_degree(joint, Degree.NONE), []
+    difference = math.inf if plate is None else plate.friction_dynamic - own.value
+    if selection.adequate:
+        if plate is None or selection.degree is Degree.IDEAL or _agree(own, plate):
+            return joint, []
+        _add_model_spread(budget, own, abs(difference))
+        return joint, [_disagreement(own, plate)]
+    if plate is None or plate.misfit > _MISFIT_MAX or abs(difference) > _SPREAD_MAX * plate.friction_dynamic:
+        return _with_degree(joint, Degree.NONE), []
+    budget.remove(_NAME)
+    shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: abs(difference)}
+    budget.add(_NAME, plate.friction_dynamic, shares)
+    return _with_degree(joint, Degree.FRICTION), []
+
+
+def _agree(own: Quantity, plate: PlateFriction) -> bool:
+    tolerance = _SIGMAS * math.hypot(own.standard_uncertainty, plate.standard_uncertainty)
+    return abs(own.value - plate.friction_dynamic) <= max(tolerance, _CLOSE * own.value)
+
+
+def _with_degree(joint: JointFit, degree: Degree) -> JointFit:
+    return replace(joint, selection=replace(joint.selection, degree=degree))
+
+
+def _add_model_spread(budget: UncertaintyBudget, own: Quantity, spread: float) -> None:
+    shares = {
+        line.source: line.standard_uncertainty for line in budget.lines if line.contribution_to == _NAME
+    }
+    budget.remove(_NAME)
+    budget.add(_NAME, own.value, {**shares, BudgetSource.MODEL: spread})
+
+
+def _disagreement(own: Quantity, plate: PlateFriction) -> ResultWarning:
+    return result_warning(
+        "estimates-differ",
+        N_(
+            "the plate alone gives f_d = {plate:.4f}, the joint fit {joint:.4f}: the difference is part of"
+            " the uncertainty."
+        ),
+        plate=plate.friction_dynamic,
+        joint=own.value,
+    )
