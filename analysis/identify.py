@@ -43,6 +43,8 @@ from analysis.uncertainty import UncertaintyBudget, unstated_gains
 from messages.i18n import N_
 from messages.message import message
 
+_EVIDENCE_MIN = 10.0
+"""Fall of the BIC below which a friction law on an ideal stand is preferred to effects of the stand."""
 _LEFT_MAX = 0.1
 """Share of what no law explains that effects may leave: with more, others must be at work, and what these
 effects explain is theirs."""
@@ -221,7 +223,7 @@ def _may_be_other_law(fit: Fit, problem: FitProblem, decay: FreeDecay) -> bool:
 def _explains_more(stand: Fit, problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
     """Whether effects of the stand explain the record, or most of what the friction laws leave."""
     best = min(fits, key=lambda fit: fit.bic)
-    if stand.bic > best.bic or not isinstance(stand.law, StandModel) or not stand.law.effects:
+    if stand.bic > best.bic - _EVIDENCE_MIN or not isinstance(stand.law, StandModel) or not stand.law.effects:
         return False
     excess, left = (fit.chi_square - problem.sample_count for fit in (best, stand))
     return left < _LEFT_MAX * excess or _is_adequate(problem, decay, [stand])

@@ -132,7 +132,7 @@ FILTER = frozenset({"filter", "filter-damping"})
 LAG = FILTER | {"gauge-lag", "gauge-2-filter"}
 MODE = frozenset({"second-mode"})
 DAMPING = frozenset({"loss-factor", "drag", "stand-friction"})
-TILT = frozenset({"tilt", "asymmetry"})
+TILT = frozenset({"tilt"})
 STATIC = frozenset({"static", "static-friction", "stribeck"})
 VELOCITY = frozenset({"stribeck", "log-velocity", "film"})
 """Effects of `analysis.laws.stand_parts` and parts of the names of laws; kinds that look alike share one."""

@@ -5,7 +5,7 @@ from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, STAND_PARAMETE
 from analysis.quantities import Quantity, ResultWarning, result_warning
 from messages.i18n import N_
 
-_SENTENCES = {
+SENTENCES = {
     "release-ramp": N_("the release took {size}: use a sharper hook."),
     "release-shape": N_("the hook let go unevenly (shape {size}): use a sharper hook."),
     "release-step": N_("the hook lost {size} of its force at once and the rest later: use a sharper hook."),
@@ -44,9 +44,10 @@ _SENTENCES = {
     "gauge-1-bend": N_("gauge 1 is bent by {size} at the pullback: calibrate it over its whole range."),
     "gauge-2-bend": N_("gauge 2 is bent by {size} at the pullback: calibrate it over its whole range."),
     "cross-talk": N_("gauge 2 shows {size} of gauge 1: separate their cables, and check their mounting."),
+    "filter-damping": "",
     "static-friction": "",
 }
-"""By name of the effect, which is the code of the warning; f_s is a result and no fault of the stand."""
+"""By name of the effect, which is the code of the warning; those without one are told by other results."""
 
 
 def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> list[ResultWarning]:
@@ -56,11 +57,11 @@ def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> 
         names = [STAND_PARAMETERS[place].name for place in effect.own]
         names += [SHARED_NAMES[place][0] for place in effect.shared if place in SHARED_NAMES]
         shown = {name: _text(results, CORNER_NAMES.get(name, name)) for name in names}
-        if _SENTENCES[effect.name] and all(shown.values()):
+        if SENTENCES[effect.name] and all(shown.values()):
             values = {"size": shown[names[0]]}
             if "second_mode_frequency_hz" in shown:
                 values["frequency"] = shown["second_mode_frequency_hz"]
-            warnings.append(result_warning(effect.name, _SENTENCES[effect.name], **values))
+            warnings.append(result_warning(effect.name, SENTENCES[effect.name], **values))
     return warnings
 
 

@@ -70,8 +70,12 @@ def add_fitted_quantities(
 def _add_corner(
     name: str, squared_constant_s2: float, shares: dict[Source, float], budget: UncertaintyBudget
 ) -> None:
-    """Add the corner frequency of a filter, 1 / (2 pi time constant)."""
-    corner_hz = 1.0 / (2.0 * math.pi * math.sqrt(max(squared_constant_s2, 1e-12)))
+    """Add the corner frequency of an RC filter that rounds the readings as much as the fitted one.
+
+    What is left of a filter without its delay is its second moment: half the squared time constant of an RC
+    filter, the whole of a critically damped one.
+    """
+    corner_hz = 1.0 / (2.0 * math.pi * math.sqrt(2.0 * max(squared_constant_s2, 1e-12)))
     slope = 0.5 * corner_hz / max(squared_constant_s2, 1e-12)
     budget.add(name, corner_hz, {source: slope * share for source, share in shares.items()})
 

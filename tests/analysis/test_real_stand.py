@@ -208,7 +208,7 @@ def test_there_are_sixty_effects_and_the_cache_keeps_records(tmp_path):
 def test_the_study_counts_what_it_claims(tmp_path):
     ideal = study_real_stand.run(62 * 3, (0,), tmp_path)
     wrong = replace(ideal, friction=1.02 * ideal.truth, parts="drag_per_m", is_misnamed=True)
-    doubted = replace(wrong, adequate=False, number=7, slips=2)
+    doubted = replace(wrong, adequate=False, degree="none", number=7, slips=2)
     holding = replace(wrong, adequate=False, degree="friction")
 
     assert ideal.adequate

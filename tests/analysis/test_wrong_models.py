@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, simulate_readings, simulate_record
 
+from analysis.identification import Degree
 from analysis.identify import identify
 from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.record import Record, StandMasses
@@ -66,14 +67,14 @@ def test_stribeck_friction_fitted_by_another_law_is_called_inadequate():
 
 
 @pytest.mark.parametrize(
-    "changes",
-    [{"lag_s": 1e-3}, {"gain_errors": (0.0, 0.01)}],
+    ("changes", "effect"),
+    [({"lag_s": 1e-3}, "gauge-lag"), ({"gain_errors": (0.0, 0.01)}, "gauge-ratio")],
     ids=["gauge 2 late", "gauge 2 gain"],
 )
-def test_faults_of_the_gauges_are_called_inadequate(changes):
+def test_faults_of_the_gauges_are_named(changes, effect):
     found = identify(simulate_record(Truth().replace(**changes)))
 
-    assert not found.model.adequate
+    assert (found.model.degree, found.model.parts) == (Degree.STAND, (effect,))
 
 
 def test_a_common_gain_is_invisible_and_so_must_come_from_the_calibration():

@@ -75,11 +75,13 @@ def _of_old_results(now: Any, then: Any) -> list[Any]:
 
 
 def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypatch):
+    """Those that a friction law on an ideal stand explains; to others effects of the stand may be added."""
     *two_gauges, one_gauge = expected["analyze"]
+    two_gauges = [then for then in two_gauges if (then["model"] or {}).get("adequate", True)]
     runs = [folder / analysis["run"] for analysis in two_gauges]
     now = printed(capsys, monkeypatch, "analyze", *runs)
     now += printed(capsys, monkeypatch, "analyze", folder / one_gauge["run"], "--kind", "one-mass")
-    for one, other in zip(now, expected["analyze"], strict=True):
+    for one, other in zip(now, [*two_gauges, one_gauge], strict=True):
         one["budget"] = _of_old_results(one, other)
     assert_same(now, [*two_gauges, one_gauge], "analyze")
 
