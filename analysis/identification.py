@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from analysis.arrays import Floats
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
@@ -39,6 +41,12 @@ class ModelSelection:
     tried: tuple[FittedModel, ...] = ()
     degree: Degree = Degree.NONE
     parts: tuple[str, ...] = ()  # names of the effects of the stand in the chosen model
+    residual_share: float | None = None  # residual_rms_m over the largest swing of gauge 1 (1)
+
+
+def residual_share(residual_rms: float, readings: Floats) -> float:
+    """Residual over the largest swing, half the range of the fitted `readings` (n,) (1)."""
+    return residual_rms / max(0.5 * float(np.ptp(readings)), 1e-300)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from analysis.one_mass.turning_points import find_turning_points, regress_half_c
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import DampedCosine, fit_damped_cosine
 from analysis.record import RecordError
+from analysis.uncertainty import COVERAGE_FACTOR_95, noise_variance_factor
 
 _STEP = 1e-30
 COULOMB = 4  # place of x_k among the parameters
@@ -72,6 +73,18 @@ class OneMassFit:
     def rms(self) -> float:
         """Root mean square of the residual, per degree of freedom."""
         return math.sqrt(self.cost / max(1, len(self.residual) - len(self.parameters)))
+
+    @property
+    def noise_factor(self) -> float:
+        """How much more a slow average of the residuals varies than if they were white; at least 1."""
+        unit = self.residual / max(self.rms, 1e-300)
+        return max(1.0, noise_variance_factor(unit, self.channel.time_s, self.parameters.period_s / 4.0))
+
+    @property
+    def coulomb_is_negative(self) -> bool:
+        """Tell whether the 95 % interval of x_k lies below zero, as where damping rises with the swing."""
+        deviation = math.sqrt(self.noise_factor) * self.uncertainty(COULOMB)
+        return self.parameters.coulomb < -COVERAGE_FACTOR_95 * deviation
 
     def uncertainty(self, which: int) -> float:
         return math.sqrt(max(0.0, float(self.covariance[which, which])))

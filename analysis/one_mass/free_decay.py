@@ -138,7 +138,8 @@ _GAP_PERIODS_MAX = 1000.0  # without a reading for longer than this, it was the 
 class FreeDecayFit:
     """A fitted decay with its assessment and warnings."""
 
-    fit: OneMassFit  # with viscous and Coulomb damping
+    fit: OneMassFit  # with viscous and Coulomb damping; `viscous` where x_k came out clearly negative
+    free: OneMassFit  # the same readings with x_k on either side of zero
     viscous: OneMassFit  # the same readings without Coulomb damping
     verdict: ResidualAssessment
     adequate: bool  # the residuals are noise, and nothing moves after the motion should have ended
@@ -175,7 +176,11 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
             period_s=format_number(1.0 / found.parameters.period_s),
         )
         warnings.append(ResultWarning("second-mode", text))
-    return FreeDecayFit(found, viscous, verdict, verdict.adequate and quiet, unit, warnings)
+    free = found
+    if free.coulomb_is_negative:  # friction drives nothing: keep x_k at its bound, and judge that curve
+        found = viscous
+        verdict = assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+    return FreeDecayFit(found, free, viscous, verdict, verdict.adequate and quiet, unit, warnings)
 
 
 def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:

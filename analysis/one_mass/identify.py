@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
-from analysis.identification import Curves, Events, Identification, ModelSelection
+from analysis.identification import Curves, Events, Identification, ModelSelection, residual_share
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
 from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
@@ -17,7 +17,7 @@ from analysis.one_mass.turning_points import classical_log_decrement, find_turni
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
-from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
+from analysis.uncertainty import UncertaintyBudget, numerical_gradient
 from messages.message import message
 
 MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
@@ -39,8 +39,10 @@ def identify_one_mass(
     The motion m u'' + 2 m n u' + c u + F sign(u') = 0 is fitted in the time domain, from where it surely
     moves freely until shortly before its stop, with x_k = F / c free to come out on either side of zero. So
     the interval of n holds also where friction is too small to be seen; it is then not claimed
-    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times,
-    gaps, an initial hold, an offset, either sign and coarse steps are taken as they are.
+    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Where x_k is
+    negative beyond its interval, as where damping rises with the swing, x_k is held at 0, and the distance
+    from the free fit is the budget's share "model". Uneven times, gaps, an initial hold, an offset, either
+    sign and coarse steps are taken as they are.
 
     `quantity` is what gauge 1 reads, `unit` that of the displacement and x_k in any case: "m", "rad", "V".
     With the moving `mass` (kg) come stiffness and damping coefficient. See `single_channel`.
@@ -61,7 +63,7 @@ def identify_one_mass(
     channels, warnings = read_channels(record.replace(relative_displacement_m=None))
     order = _ORDERS[quantity]
     solution = fit_free_decay(channels.table, order, unit + _PER_TIME[order])
-    budget = _uncertainty_budget(solution.fit, record, unit, mass)
+    budget = _uncertainty_budget(solution, record, unit, mass)
     return _identification(record, channels, solution, budget, [*warnings, *solution.warnings])
 
 
@@ -111,17 +113,11 @@ def _is_significant(solution: FreeDecayFit) -> bool:
     """Tell whether the readings need friction: by the uncertainty of x_k, and by the fit without it."""
     found = solution.fit
     variance = found.uncertainty(COULOMB) ** 2
-    factor = _noise_factor(found)
+    factor = found.noise_factor
     better = solution.viscous.cost - found.cost
     limit = _SIGNIFICANT_SIGMAS**2 * factor
     clear = found.parameters.coulomb > 0.0 and found.parameters.coulomb**2 > limit * variance
     return bool(clear and better > limit * found.rms**2)
-
-
-def _noise_factor(found: OneMassFit) -> float:
-    """How much more a slow average of the residuals varies than if they were white; at least 1."""
-    unit = found.residual / max(found.rms, 1e-300)
-    return max(1.0, noise_variance_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
 
 
 def _identification(
@@ -136,12 +132,14 @@ def _identification(
         _clip_coulomb(budget)
     warnings += _classical_figures(channels.table, solution, budget, significant)
     verdict = solution.verdict
+    share = residual_share(verdict.rms, solution.fit.channel.value_m)
     if not solution.adequate:
         text = message(
-            "one decay with viscous and dry friction leaves {rms} of residual for {noise} of noise,"
-            " or a pattern in it: period and damping may be biased.",
+            "one decay with viscous and dry friction leaves {rms} of residual ({share_percent} % of the swing)"
+            " for {noise} of noise, or a pattern in it: period and damping may be biased.",
             rms=format_with_unit(verdict.rms, solution.unit),
             noise=format_with_unit(verdict.noise, solution.unit),
+            share_percent=format_number(100.0 * share, 2),
         )
         warnings.append(ResultWarning("model-inadequate", text))
     law = "viscous+coulomb" if significant else "viscous"
@@ -149,7 +147,7 @@ def _identification(
         "one-mass",
         budget.results,
         {"coulomb_significant": significant},
-        ModelSelection(law, solution.adequate, verdict.rms, verdict.noise),
+        ModelSelection(law, solution.adequate, verdict.rms, verdict.noise, residual_share=share),
         budget.lines,
         _events(channels, solution.fit, significant),
         warnings,
@@ -166,15 +164,18 @@ def _identification(
 
 
 def _uncertainty_budget(
-    found: OneMassFit, record: Record, unit: str, mass: Quantity | None
+    solution: FreeDecayFit, record: Record, unit: str, mass: Quantity | None
 ) -> UncertaintyBudget:
     """All quantities with their uncertainty by source; the point is (the six parameters, mass)."""
+    found = solution.fit
     value, deviation = (0.0, 0.0) if mass is None else (mass.value, mass.standard_uncertainty)
     point = np.array([*found.parameters, value])
     noise = np.zeros((7, 7))
-    noise[:6, :6] = _noise_factor(found) * found.covariance
+    noise[:6, :6] = found.noise_factor * found.covariance
     columns = _sources(found, record)
     columns[BudgetSource.MASS] = np.array([0.0] * 6 + [deviation])
+    if found is not solution.free:
+        columns[BudgetSource.MODEL] = np.append(np.subtract(solution.free.parameters, found.parameters), 0.0)
     budget = UncertaintyBudget()
     for name, function in (_QUANTITIES if mass is None else _QUANTITIES | _WITH_MASS).items():
         weights = numerical_gradient(function, point)

@@ -9,7 +9,7 @@ from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2, project_to_bounds
 from analysis.fitting.search import Fit, nonlinearity_slope_error, range_m
 from analysis.formatting import format_length
-from analysis.identification import Curves, Degree, FittedModel, ModelSelection
+from analysis.identification import Curves, Degree, FittedModel, ModelSelection, residual_share
 from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import StandModel
 from analysis.preparation.channels import NOISE_FLOOR_M
@@ -66,11 +66,12 @@ def assess_model(
     tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
+    share = residual_share(chosen.rms_m, problem.table.value_m)
     effects = chosen.law.effects if isinstance(chosen.law, StandModel) else ()
     degree = (Degree.STAND if effects else Degree.IDEAL) if adequate else Degree.NONE
     parts = tuple(effect.name for effect in effects)
     return ModelSelection(
-        chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree=degree, parts=parts
+        chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree, parts, share
     )
 
 

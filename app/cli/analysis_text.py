@@ -81,9 +81,10 @@ def _print_model(model: dict[str, Any], scale: float, unit: str) -> None:
     """The chosen law and its verdict, then every law that was tried."""
     verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
     residual, noise = model["residual_rms_m"] * scale, model["noise_rms_m"] * scale
-    out.print_line(
-        f"  the model {model['name']} {verdict} (residual {residual:.3g} {unit}, noise {noise:.3g} {unit})"
-    )
+    sizes = f"residual {residual:.3g} {unit}, noise {noise:.3g} {unit}"
+    if (share := model.get("residual_share")) is not None:
+        sizes += f"; {100.0 * share:.2g} % of the swing is left"
+    out.print_line(f"  the model {model['name']} {verdict} ({sizes})")
     if len(model["tried"]) > 1:
         tried = (
             f"{law['name']} (BIC {law['bic']:.1f}, residual {law['residual_rms_m'] * scale:.3g} {unit})"

@@ -127,7 +127,8 @@ def _report_run(outcome: AnalysisOutcome, as_json: bool) -> dict[str, Any]:
 def save_figure(analysis: Analysis, path: Path) -> None:
     from app.reports.figures.record_figure import save_record_figure
 
-    save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
+    metadata = analysis.run.metadata
+    save_record_figure(path, analysis.record, analysis.identification, metadata.title, metadata.unit)
 
 
 def _quantity(document: dict[str, Any], name: str) -> Any:

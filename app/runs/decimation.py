@@ -43,9 +43,7 @@ def open_decimated(
 
 def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
     """Times (n,) and readings (n,) as an `Overview` has them, of about so many spans."""
-    per_span = max(1, len(columns[0]) // spans)
-    whole = len(columns[0]) // per_span * per_span
-    return _condensed(tuple(column[:whole] for column in columns), per_span)
+    return _condensed(columns, max(1, len(columns[0]) // spans))
 
 
 def _overview(file: h5py.File, spans: int, before_release_s: float) -> DecimatedRun:
@@ -63,19 +61,19 @@ def _overview(file: h5py.File, spans: int, before_release_s: float) -> Decimated
 
 
 def _parts(first: int, rows: int, per_span: int) -> Iterator[slice]:
-    """Whole spans of rows from row `first` on, some at a time; one without rows if there are none."""
-    end = first + (rows - first) // per_span * per_span
+    """Spans of rows from row `first` on, some at a time; one without rows if there are none."""
     step = max(1, _ROWS_AT_ONCE // per_span) * per_span
-    for start in range(first, max(end, first + 1), step):
-        yield slice(start, min(start + step, end))
+    for start in range(first, max(rows, first + 1), step):
+        yield slice(start, min(start + step, rows))
 
 
 def _condensed(columns: tuple[Floats, ...], per_span: int) -> tuple[Floats, ...]:
-    """The first time of each span twice, and its lowest and highest readings."""
+    """The first time of each span twice, and its lowest and highest readings; the last may be shorter."""
     if per_span == 1:
         return columns
-    time_s, *readings = (column.reshape(-1, per_span) for column in columns)
+    time_s, *readings = columns
+    starts = np.arange(0, len(time_s), per_span)
     both = [
-        np.stack((np.fmin.reduce(r, axis=1), np.fmax.reduce(r, axis=1)), axis=1).ravel() for r in readings
+        np.column_stack((np.fmin.reduceat(r, starts), np.fmax.reduceat(r, starts))).ravel() for r in readings
     ]
-    return (np.repeat(time_s[:, 0], 2), *both)
+    return (np.repeat(time_s[starts], 2), *both)

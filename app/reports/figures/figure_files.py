@@ -106,7 +106,9 @@ def write_figures(
         for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
             progress(done / len(chosen), path.name)
             analysis, left_out = repeat_saved_analysis(path, validator), []
-            run = RunFigureData.from_identification(analysis.record, analysis.identification)
+            run = RunFigureData.from_identification(
+                analysis.record, analysis.identification, analysis.run.metadata.unit
+            )
             name = analysis.run.metadata.series or path.stem
             for one in RUN_FIGURES:
                 if one.number not in numbers:

@@ -26,6 +26,7 @@ from app.reports.figures.style import (
     decimate_for_print,
     new_figure,
     place_legend_above,
+    reading_units,
 )
 from config.schema import Stand
 
@@ -47,9 +48,10 @@ class RunFigureData:
     motion: MotionSamples | None  # of the fitted law; None without one
     slip_end_s: float | None
     results: dict[str, Quantity]
+    unit: str = "m"  # of the readings
 
     @classmethod
-    def from_identification(cls, record: Record, found: Identification) -> Self:
+    def from_identification(cls, record: Record, found: Identification, unit: str = "m") -> Self:
         release_s = found.events.release_s or float(record.time_s[0])
         first_s, last_s = _span_s(record, found, release_s)
         since_s = record.time_s - release_s
@@ -64,6 +66,7 @@ class RunFigureData:
             None if motion is None else motion.sample(_times(motion, first_s, last_s, _period_s(found))),
             None if found.events.slip_end_s is None else found.events.slip_end_s - release_s,
             found.results,
+            unit,
         )
 
 
@@ -171,7 +174,7 @@ class RunFigure:
 def _table_displacement(axes: Axes, run: RunFigureData) -> None:
     _experiment(axes, run, run.table_m, TABLE)
     _simulated(axes, run.motion, "table_displacement_m")
-    axes.set_ylabel(MILLIMETRE.labelled("table $u_1$"))
+    axes.set_ylabel(reading_units(run.unit)[0].labelled("table $u_1$"))
 
 
 def _both_displacements(axes: Axes, run: RunFigureData) -> None:
@@ -184,10 +187,10 @@ def _both_displacements(axes: Axes, run: RunFigureData) -> None:
 
 def _relative_displacement(axes: Axes, run: RunFigureData) -> None:
     if run.relative_m is not None:
-        relative = MILLIMETRE.scale * run.relative_m
+        relative = reading_units(run.unit)[0].scale * run.relative_m
         axes.plot(run.time_s, relative, color=PLATE, linewidth=2.2, alpha=0.45, label="experiment")
     _simulated(axes, run.motion, "relative_displacement_m")
-    axes.set_ylabel(MILLIMETRE.labelled("relative $u_2 - u_1$"))
+    axes.set_ylabel(reading_units(run.unit)[0].labelled("relative $u_2 - u_1$"))
 
 
 def _rates(axes: Axes, run: RunFigureData, symbol: str, rate: str, unit: Unit, suffix: str) -> None:
@@ -243,7 +246,7 @@ def _motion(run: RunFigureData) -> MotionSamples:
 
 def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) -> None:
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
-    curve = decimate_for_print(run.time_s, MILLIMETRE.scale * reading_m)
+    curve = decimate_for_print(run.time_s, reading_units(run.unit)[0].scale * reading_m)
     axes.plot(*curve, color=colour, linewidth=width, alpha=alpha, label="experiment")
 
 

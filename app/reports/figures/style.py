@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from analysis.catalogue import MICROMETRE, MILLIMETRE, Unit
+
 TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
 """Colours of the channels and of the simulation, as in the window."""
 DASHED: Final = (0, (4, 2))
@@ -57,11 +59,14 @@ def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
     """Decimate a curve of very many readings (n,) to the minimum and maximum of each stretch."""
     if len(value) <= 2 * _STRETCHES:
         return time_s, value
-    each = len(value) // _STRETCHES
-    whole = each * _STRETCHES
-    stretches = value[:whole].reshape(_STRETCHES, each)
-    ends = np.fmin.reduce(stretches, axis=1), np.fmax.reduce(stretches, axis=1)
-    return np.repeat(time_s[each // 2 : whole : each], 2), np.column_stack(ends).ravel()
+    edges = np.arange(_STRETCHES + 1) * len(value) // _STRETCHES
+    ends = np.fmin.reduceat(value, edges[:-1]), np.fmax.reduceat(value, edges[:-1])
+    return np.repeat(time_s[(edges[:-1] + edges[1:]) // 2], 2), np.column_stack(ends).ravel()
+
+
+def reading_units(unit: str) -> tuple[Unit, Unit]:
+    """Units in which readings in `unit` and their residuals are drawn: metres as mm and µm."""
+    return (MILLIMETRE, MICROMETRE) if unit == "m" else (Unit(unit), Unit(unit))
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -19,7 +19,7 @@ from analysis.formatting import format_interval, format_uncertainty, typeset
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
-from app.reports.figures.style import print_style
+from app.reports.figures.style import print_style, reading_units
 from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
@@ -45,7 +45,7 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
     sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
     columns = [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
     return [
-        Section("Result", [*_notices(found, excluded), *_result(found)]),
+        Section("Result", [*_notices(found, excluded), *_result(found, run.metadata.unit)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
         shared.stand_section([run.metadata.stand]),
@@ -70,7 +70,7 @@ def _notices(found: Identification, excluded: str) -> Iterator[blocks.Block]:
             yield blocks.Notice(str(warning.message), "warn")
 
 
-def _result(found: Identification) -> Iterator[blocks.Block]:
+def _result(found: Identification, unit: str) -> Iterator[blocks.Block]:
     """The first of the headline quantities that has a value, with its assessment."""
     key = next((key for key in _HEADLINES if key in found.results), None)
     if key is None:
@@ -84,9 +84,10 @@ def _result(found: Identification) -> Iterator[blocks.Block]:
             text = "The plate did not slip: f_s is at least so large."
         yield blocks.Conclusion(symbol, value, text, "warn", relation or "=")
         return
+    _, shown = reading_units(unit)
     residual, noise = (
-        f"{MICROMETRE.scale * size_m:.3g} {MICROMETRE.symbol}"
-        for size_m in (found.model.residual_rms_m, found.model.noise_rms_m)
+        f"{shown.scale * size:.3g} {shown.symbol}"
+        for size in (found.model.residual_rms_m, found.model.noise_rms_m)
     )
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
     text = f"The law {found.model.name} {fits} (residual {residual}, noise {noise})."
@@ -216,7 +217,8 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
 
 def _figures(analysis: Analysis) -> list[blocks.Block]:
     caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
+    unit = analysis.run.metadata.unit
     with print_style():
-        whole = shared.drawing(record_figure(analysis.record, analysis.identification), caption)
+        whole = shared.drawing(record_figure(analysis.record, analysis.identification, unit), caption)
         items = shared.run_drawings(analysis, _FIGURES)
     return [whole, blocks.Drawings(items)] if items else [whole]

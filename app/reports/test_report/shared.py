@@ -73,7 +73,8 @@ def drawing(figure: Figure, caption: str) -> Drawing:
 
 def run_drawings(analysis: Analysis, numbers: Sequence[str], prefix: str = "") -> list[Drawing]:
     """The figures of a run with these numbers, drawn in `print_style`, that it has something to show in."""
-    run = RunFigureData.from_identification(analysis.record, analysis.identification)
+    unit = analysis.run.metadata.unit
+    run = RunFigureData.from_identification(analysis.record, analysis.identification, unit)
     made = [(one.render(run), prefix + one.caption) for one in RUN_FIGURES if one.number in numbers]
     return [drawing(figure, caption) for figure, caption in made if figure is not None]
 

@@ -5,7 +5,7 @@ import pytest
 from runs_kit import ANALYSIS, ENDING, block
 
 from app.runs.blocks import BlockLayout, RunBlock
-from app.runs.decimation import open_decimated
+from app.runs.decimation import decimate, open_decimated
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.saved_analyses import save_analysis
@@ -36,8 +36,9 @@ def stored(path, metadata, count=ROWS, layout=None):
 
 
 def spans_of(column, first, per_span):
-    end = first + (len(column) - first) // per_span * per_span
-    return column[first:end].reshape(-1, per_span)
+    """Rows of spans; the last is filled up with its last reading."""
+    filled = np.pad(column[first:], (0, -(len(column) - first) % per_span), mode="edge")
+    return filled.reshape(-1, per_span)
 
 
 def assert_drawn_as(overview, run, spans, before_release_s):
@@ -83,3 +84,15 @@ def test_a_short_run_is_drawn_row_by_row(tmp_path, metadata, validator, count):
     assert np.array_equal(overview.time_s, run.time_s)
     (drawn,) = overview.readings
     assert np.array_equal(drawn, run.table_reading, equal_nan=True)
+
+
+@pytest.mark.parametrize("count", [299, 1999, 70_001])
+def test_the_last_rows_are_drawn(tmp_path, metadata, validator, count):
+    path = stored(tmp_path / "run.h5", metadata, count, BlockLayout(channels=1))
+    run = open_run(path, trusted=True)
+    (drawn,) = open_decimated(path, 100, validator=validator).readings
+    per_span = count // 100
+    last = run.table_reading[(count - 1) // per_span * per_span :]
+    assert drawn[-2:] == pytest.approx([np.nanmin(last), np.nanmax(last)], nan_ok=True)
+    time_s, value = decimate((np.arange(count), np.arange(count)), 100)
+    assert (time_s[0], value[-1]) == (0, count - 1)
