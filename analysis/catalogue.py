@@ -198,6 +198,8 @@ CATALOGUE: Final = (
          N_("friction of the stand"), MICROMETRE),
     _Row("drag_per_m", Symbol("d"), "1/m",
          N_("quadratic damping of the stand"), Unit("1/m")),
+    _Row("damping_rise", Symbol("r", "n"), "1",
+         N_("rise of the damping at the first swing"), _PERCENT),
     _Row("loss_factor", Symbol("η", ascii="loss factor"), "1",
          N_("loss factor of the springs"), _NUMBER),
     _Row("arc_per_m", Symbol("κ", ascii="arc"), "1/m",

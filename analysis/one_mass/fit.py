@@ -1,6 +1,7 @@
 """Least squares of a one-mass decay with viscous and Coulomb damping, in the time domain."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.formatting import format_number
+from analysis.motion.nonlinear_decay import nonlinear_decay
 from analysis.motion.one_mass import free_decay, turning_magnitude
 from analysis.one_mass.turning_points import find_turning_points, regress_half_cycles
 from analysis.preparation.channels import Channel
@@ -16,11 +18,14 @@ from analysis.record import RecordError
 from analysis.uncertainty import COVERAGE_FACTOR_95, noise_variance_factor
 
 _STEP = 1e-30
-COULOMB = 4  # place of x_k among the parameters
+COULOMB, OFFSET = 4, 5  # places of x_k and of the zero among the parameters
+LINEAR_COUNT = 6  # parameters of a linear spring with viscous and Coulomb damping
 _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
 _GROWTH = 20.0  # largest natural logarithm by which a trial swing may grow over the record
 _FAR = 1e12  # residual, in units of the swing, of impossible trial parameters
+_TRIALS_MAX = 30  # curves that a fit with a numerical motion may compute, each with its derivatives
+_DIFFERENCE = 1e-5  # step of numerical derivatives, in natural sizes of the parameters
 
 
 class Parameters(NamedTuple):
@@ -32,6 +37,19 @@ class Parameters(NamedTuple):
     damping_n_per_s: float
     coulomb: float  # x_k, in the unit of displacement; below zero where no Coulomb friction is left
     offset: float  # zero of the readings, in their own unit
+    cubic: float = 0.0  # restoring force u + cubic u^3, of the stiffness of small swings
+    sine: float = 0.0  # restoring force sin(a u) / a, a^2 = sine: a pendulum read in rad has 1
+    drag: float = 0.0  # deceleration over the square of the velocity
+    rise: float = 0.0  # damping constant n (1 + rise u^2)
+
+    @property
+    def motion(self) -> tuple[float, ...]:
+        """All but the offset."""
+        return self[: LINEAR_COUNT - 1] + self[LINEAR_COUNT:]
+
+    @property
+    def is_linear(self) -> bool:
+        return not any(self[LINEAR_COUNT:])
 
     @property
     def period_s(self) -> float:
@@ -45,6 +63,9 @@ class Parameters(NamedTuple):
         """Tell whether this swings about like another, and stays finite until `end_s`."""
         ratio, damping = self.omega_rad_per_s / other.omega_rad_per_s, self.damping_n_per_s
         near = 0.5 < ratio < 2.0 and abs(self.turning_s - other.turning_s) < other.period_s
+        square = self.turning**2
+        near = near and -0.25 < self.cubic * square < 3.0 and 0.0 <= self.sine * square < 8.0
+        near = near and -1.0 < self.drag * abs(self.turning) < 3.0 and -0.9 < self.rise * square < 50.0
         return near and damping < self.omega_rad_per_s and -damping * (end_s - self.turning_s) < _GROWTH
 
     def from_turning_point_before(self, time_s: float) -> "Parameters":
@@ -63,7 +84,7 @@ class OneMassFit:
     """A fitted decay."""
 
     parameters: Parameters
-    covariance: Floats  # (6, 6) float64: type A, for white residuals; zero in rows of what was held
+    covariance: Floats  # (10, 10) float64: type A, for white residuals; zero in rows of what was held
     channel: Channel  # readings that were fitted
     residual: Floats  # (n,) float64: reading minus curve, in the unit of the readings
     cost: float
@@ -72,7 +93,8 @@ class OneMassFit:
     @property
     def rms(self) -> float:
         """Root mean square of the residual, per degree of freedom."""
-        return math.sqrt(self.cost / max(1, len(self.residual) - len(self.parameters)))
+        parts = sum(value != 0.0 for value in self.parameters[LINEAR_COUNT:])
+        return math.sqrt(self.cost / max(1, len(self.residual) - LINEAR_COUNT - parts))
 
     @property
     def noise_factor(self) -> float:
@@ -92,7 +114,9 @@ class OneMassFit:
 
 def curve(parameters: Parameters, time_s: Floats, order: int) -> Floats:
     """Readings (n,) that `parameters` predict at `time_s`."""
-    return np.asarray(parameters.offset + free_decay(time_s, *parameters[:5], order=order))
+    if parameters.is_linear:
+        return np.asarray(parameters.offset + free_decay(time_s, *parameters[:5], order=order))
+    return parameters.offset + nonlinear_decay(time_s, np.array(parameters.motion), order)
 
 
 def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassFit:
@@ -121,19 +145,25 @@ def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMass
     return found
 
 
-def fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool = True) -> OneMassFit:
+def fit(
+    channel: Channel, start: Parameters, order: int, *, coulomb: bool = True, parts: tuple[int, ...] = ()
+) -> OneMassFit:
     """Least squares from `start` to a minimum near it; without `coulomb`, x_k is held at zero.
+
+    Of the parameters beyond the linear ones those are free that are not zero, or whose places are `parts`.
 
     Accelerations next to a turning point are left out: friction turns there within no time, and no
     sample or gauge can follow.
     """
-    start = start.from_turning_point_before(float(channel.time_s[0]))
+    if start.is_linear:
+        start = start.from_turning_point_before(float(channel.time_s[0]))
     if not coulomb:
         start = start._replace(coulomb=0.0)
+    free = [place for place in used_places(start, *parts) if coulomb or place != COULOMB]
     if order < 2:
-        return _fit(channel, start, order, coulomb=coulomb)
+        return _fit(channel, start, order, free)
     for _ in range(3):
-        found = _fit(_away_from_turns(channel, start), start, order, coulomb=coulomb)
+        found = _fit(_away_from_turns(channel, start), start, order, free)
         start = found.parameters
     return found
 
@@ -145,6 +175,12 @@ def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
 
 def readings_before_amplitude(limit: float, channel: Channel, parameters: Parameters) -> Channel:
     """Readings up to the first turning point inside `limit`; all if that is under two periods."""
+    if not parameters.is_linear:
+        reach, speed = (nonlinear_decay(channel.time_s, np.array(parameters.motion), k) for k in (0, 1))
+        below = np.flatnonzero(np.hypot(reach, speed / parameters.omega_rad_per_s) < limit)
+        end_s = float(channel.time_s[below[0]]) if below.size else math.inf
+        lasts = end_s - float(channel.time_s[0]) > 0.5 * _HALF_CYCLES_MIN * parameters.period_s
+        return channel.between(-math.inf, end_s) if lasts else channel
     half_s = 0.5 * parameters.period_s
     cycles = np.arange(max(0.0, (channel.time_s[-1] - parameters.turning_s) / half_s) + 1.0)
     magnitude = turning_magnitude(
@@ -156,8 +192,7 @@ def readings_before_amplitude(limit: float, channel: Channel, parameters: Parame
     return channel.between(-math.inf, parameters.turning_s + half_s * inside[0])
 
 
-def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> OneMassFit:
-    free = [i for i in range(len(start)) if coulomb or i != COULOMB]
+def _fit(channel: Channel, start: Parameters, order: int, free: list[int]) -> OneMassFit:
     scale = _scales(start, order)
     origin = np.array(start)
     end_s = float(channel.time_s[-1])
@@ -173,47 +208,81 @@ def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> O
         trial = unpack(steps)
         if not trial.swings_like(start, end_s):
             return np.full(len(channel), _FAR)
-        return np.asarray((curve(trial, channel.time_s, order) - channel.value_m) / scale[-1])
+        misfit = (curve(trial, channel.time_s, order) - channel.value_m) / scale[OFFSET]
+        return np.asarray(np.nan_to_num(misfit, nan=_FAR, posinf=_FAR, neginf=-_FAR))
 
     def slopes(steps: Floats) -> Floats:
-        columns = _gradient(unpack(steps), channel.time_s, order)[:, free]
-        return np.asarray(columns * (scale[free] / scale[-1]))
+        columns = gradient(unpack(steps), channel.time_s, order, free)
+        columns *= scale[free] / scale[OFFSET]
+        return np.asarray(np.nan_to_num(columns, posinf=_FAR, neginf=-_FAR))
 
     from scipy.optimize import least_squares  # late: a quarter of the time that an analysis takes to start
 
-    found = least_squares(misfit, np.zeros(len(free)), slopes, method="lm", x_scale="jac", max_nfev=100)
+    found = least_squares(
+        misfit,
+        np.zeros(len(free)),
+        slopes,
+        method="lm",
+        x_scale="jac",
+        max_nfev=100 if start.is_linear else _TRIALS_MAX,
+    )
     parameters = unpack(found.x)
     residual = channel.value_m - curve(parameters, channel.time_s, order)
     cost = float(residual @ residual)
     scale = _scales(parameters, order)[free]
-    columns = _gradient(parameters, channel.time_s, order)[:, free] * scale
+    columns = gradient(parameters, channel.time_s, order, free) * scale
     variance = cost / max(1, len(residual) - len(free))
     covariance = np.zeros((len(parameters),) * 2)
     covariance[np.ix_(free, free)] = variance * np.linalg.pinv(columns.T @ columns) * np.outer(scale, scale)
     return OneMassFit(parameters, covariance, channel, residual, cost, order)
 
 
-def _gradient(parameters: Parameters, time_s: Floats, order: int) -> Floats:
-    """Derivatives (n, 6) of the curve, by complex steps."""
-    columns = np.ones((len(time_s), len(parameters)))
-    for which in range(len(parameters) - 1):
-        stepped: list[complex] = list(parameters[:5])
-        stepped[which] += _STEP * 1j
-        columns[:, which] = free_decay(time_s, *stepped, order=order).imag / _STEP
+def used_places(parameters: Parameters, *parts: int) -> list[int]:
+    """Places of the linear parameters, of those beyond that are not zero, and of `parts`."""
+    return [k for k, value in enumerate(parameters) if k < LINEAR_COUNT or value or k in parts]
+
+
+def gradient(parameters: Parameters, time_s: Floats, order: int, places: Sequence[int]) -> Floats:
+    """Derivatives (n, k) of the curve by the parameters at k `places`."""
+    one = _complex_step if parameters.is_linear and max(places) < LINEAR_COUNT else _difference
+    columns = np.ones((len(time_s), len(places)))
+    for column, place in enumerate(places):
+        if place != OFFSET:
+            columns[:, column] = one(parameters, time_s, order, place)
     return columns
 
 
+def _complex_step(parameters: Parameters, time_s: Floats, order: int, place: int) -> Floats:
+    stepped: list[complex] = list(parameters[:5])
+    stepped[place] += _STEP * 1j
+    return np.asarray(free_decay(time_s, *stepped, order=order).imag / _STEP)
+
+
+def _difference(parameters: Parameters, time_s: Floats, order: int, place: int) -> Floats:
+    step = _DIFFERENCE * float(_scales(parameters, order)[place])
+    sides = []
+    for shift in (step, -step):
+        motion = np.array(parameters.motion)
+        motion[place - (place > OFFSET)] += shift
+        sides.append(nonlinear_decay(time_s, motion, order))
+    return np.asarray((sides[0] - sides[1]) / (2.0 * step))
+
+
 def _scales(start: Parameters, order: int) -> Floats:
-    """A natural size of each parameter (6,); the last is that of the readings."""
+    """A natural size of each parameter (10,); that of the offset is that of the readings."""
     omega, reach = start.omega_rad_per_s, max(abs(start.turning), 1e-300)
-    return np.array([1.0 / omega, reach, omega, omega, reach, reach * omega**order])
+    linear = [1.0 / omega, reach, omega, omega, reach, reach * omega**order]
+    return np.array([*linear, reach**-2, reach**-2, 1.0 / reach, reach**-2])
 
 
 def parameter_shift(found: OneMassFit, disturbance: Floats) -> Floats:
-    """Shift (6,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
-    scale = _scales(found.parameters, found.order)
-    columns = _gradient(found.parameters, found.channel.time_s, found.order) * scale
-    return np.asarray(np.linalg.lstsq(columns, disturbance, rcond=None)[0] * scale)
+    """Shift (10,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
+    places = used_places(found.parameters)
+    scale = _scales(found.parameters, found.order)[places]
+    columns = gradient(found.parameters, found.channel.time_s, found.order, places) * scale
+    shift = np.zeros(len(found.parameters))
+    shift[places] = np.linalg.lstsq(columns, disturbance, rcond=None)[0] * scale
+    return shift
 
 
 def _no_decay(period_s: float) -> RecordError:

@@ -11,6 +11,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
 from analysis.motion.one_mass import turning_magnitude
 from analysis.one_mass.fit import (
+    LINEAR_COUNT,
     OneMassFit,
     curve,
     fit,
@@ -18,6 +19,7 @@ from analysis.one_mass.fit import (
     readings_before_amplitude,
     readings_before_stop,
 )
+from analysis.one_mass.parts import add_parts, parts_of
 from analysis.one_mass.turning_points import Crossings, find_crossings
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import check_gap, median_of_three
@@ -124,6 +126,7 @@ PERIODS_MIN = 2.0
 _BEFORE_CROSSING = 0.2  # of a period before it first passes the middle the mass surely moves freely
 _SIGNAL_MIN = 20.0  # least ratio of mean squares, oscillation over residual: noise reaches about 5
 _EXPLAINED_MIN = 0.75
+_PROMISING = 0.5  # share of the motion that a linear fit explains of a decay that parts may explain
 _LOSS_MIN = 3e-3  # of the amplitude, lost over the record: with less, damping is not determined
 _AMPLITUDE = (1, 3, 4)  # places of swing, damping and friction; the frequency is known far better
 _SIGMAS = 3.0
@@ -131,6 +134,7 @@ _SPIKE_SIGMAS = 6.0
 _SPIKES_MAX = 0.02
 _REST_READINGS_MIN = 8
 _STEPS_SEEN = 3.0  # swings under this many rounding steps look as if they stopped
+_BETTER = 0.5  # residual over that of the linear model; parts that leave more than noise must halve it
 _GAP_PERIODS_MAX = 1000.0  # without a reading for longer than this, it was the clock that jumped
 
 
@@ -159,11 +163,24 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
     step = rounding_step(readings.value_m)
     found = _fit_stretch(readings, crossings, order)
-    found = _refit_without_spikes(found, warnings)
-    if is_rounding(found.rms, step):
-        found = _refit_above_rounding(found, step, unit, warnings)
     interval_s = float(np.median(np.diff(readings.time_s)))
-    verdict = assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+
+    def assess(one: OneMassFit) -> ResidualAssessment:
+        return assess_residuals(one.residual, interval_s, step, float(np.ptp(one.channel.value_m)))
+
+    found, noted = _refined(found, step, unit)
+    verdict = assess(found)
+    explained = 1.0 - found.cost / max(_scatter(found), 1e-300)
+    is_decay = _PROMISING < explained < 1.0 - _COMPUTED**2
+    richer = add_parts(found) if is_decay else found
+    if richer is not found:
+        whole = readings.between(float(found.channel.time_s[0]), math.inf)
+        whole = readings_before_stop(whole, richer.parameters)
+        richer, noted_richer = _refined(fit(whole, richer.parameters, order), step, unit)
+        verdict_richer = assess(richer)
+        if verdict_richer.adequate or (richer.rms < _BETTER * found.rms and _parts_are_clear(richer)):
+            found, noted, verdict = richer, noted_richer, verdict_richer
+    warnings += noted
     _refuse_what_is_no_decay(found, verdict)
     viscous = fit(found.channel, found.parameters, order, coulomb=False)
     quiet = _quiet_after(readings, found, step, unit, warnings)
@@ -179,7 +196,7 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     free = found
     if free.coulomb_is_negative:  # friction drives nothing: keep x_k at its bound, and judge that curve
         found = viscous
-        verdict = assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+        verdict = assess(found)
     return FreeDecayFit(found, free, viscous, verdict, verdict.adequate and quiet, unit, warnings)
 
 
@@ -222,6 +239,23 @@ def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> 
     return _left_out(readings, off > reach, warnings) if reach > 0.0 else readings
 
 
+def _parts_are_clear(found: OneMassFit) -> bool:
+    """Tell whether x_k is physical and each part well above its uncertainty, correlated noise included."""
+    limit = _SIGMAS * math.sqrt(found.noise_factor)
+    places = (part.place for part in parts_of(found.parameters))
+    clear = all(abs(found.parameters[place]) > limit * found.uncertainty(place) for place in places)
+    return clear and not found.coulomb_is_negative
+
+
+def _refined(found: OneMassFit, step: float, unit: str) -> tuple[OneMassFit, list[ResultWarning]]:
+    """Fit again without spikes, and without what rounding to `step` hides."""
+    warnings: list[ResultWarning] = []
+    found = _refit_without_spikes(found, warnings)
+    if is_rounding(found.rms, step):
+        found = _refit_above_rounding(found, step, unit, warnings)
+    return found, warnings
+
+
 def _refit_without_spikes(found: OneMassFit, warnings: list[ResultWarning]) -> OneMassFit:
     """Fit again without the few residuals that no noise of the others' size explains."""
     scatter = 1.4826 * float(np.median(np.abs(found.residual)))
@@ -259,8 +293,8 @@ def _refit_above_rounding(
 
 def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> None:
     """Raise RecordError for noise, for a swing that does not die away, and for what fits no decay at all."""
-    total = float(np.sum((found.channel.value_m - found.channel.value_m.mean()) ** 2))
-    degrees = max(1, len(found.residual) - 6)
+    total = _scatter(found)
+    degrees = max(1, len(found.residual) - LINEAR_COUNT)
     explained = 1.0 - found.cost / max(total, 1e-300)
     signal = explained * total / 5.0 / max(found.cost / degrees, 1e-300)
     if not signal > _SIGNAL_MIN:
@@ -283,6 +317,11 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> 
             change=-100.0 * loss,
             uncertainty=100.0 * uncertainty,
         )
+
+
+def _scatter(found: OneMassFit) -> float:
+    """Sum of squares of the fitted readings about their mean."""
+    return float(np.sum((found.channel.value_m - found.channel.value_m.mean()) ** 2))
 
 
 def _loss(found: OneMassFit) -> tuple[float, float]:

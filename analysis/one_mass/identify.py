@@ -8,11 +8,13 @@ from typing import Final, Literal
 import numpy as np
 
 from analysis.arrays import Floats
+from analysis.catalogue import Place, definition
 from analysis.formatting import format_number, format_with_unit
-from analysis.identification import Curves, Events, Identification, ModelSelection, residual_share
+from analysis.identification import Curves, Degree, Events, Identification, ModelSelection, residual_share
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
+from analysis.one_mass.fit import COULOMB, OneMassFit, Parameters, curve, parameter_shift
 from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
+from analysis.one_mass.parts import Part, parts_of
 from analysis.one_mass.turning_points import classical_log_decrement, find_turning_points
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
@@ -135,19 +137,33 @@ def _identification(
     share = residual_share(verdict.rms, solution.fit.channel.value_m)
     if not solution.adequate:
         text = message(
-            "one decay with viscous and dry friction leaves {rms} of residual ({share_percent} % of the swing)"
-            " for {noise} of noise, or a pattern in it: period and damping may be biased.",
+            "one decay with viscous and dry friction leaves {rms} of residual"
+            " ({share_percent} % of the swing) for {noise} of noise, or a pattern in it:"
+            " period and damping may be biased.",
             rms=format_with_unit(verdict.rms, solution.unit),
             noise=format_with_unit(verdict.noise, solution.unit),
             share_percent=format_number(100.0 * share, 2),
         )
         warnings.append(ResultWarning("model-inadequate", text))
     law = "viscous+coulomb" if significant else "viscous"
+    parts = parts_of(parameters)
+    for part in parts:
+        size = definition(part.result).format(budget.results[part.result], Place.WINDOW)
+        warnings.append(result_warning(part.name, part.text, size=str(size)))
+    degree = (Degree.STAND if parts else Degree.IDEAL) if solution.adequate else Degree.NONE
     return Identification(
         "one-mass",
         budget.results,
         {"coulomb_significant": significant},
-        ModelSelection(law, solution.adequate, verdict.rms, verdict.noise, residual_share=share),
+        ModelSelection(
+            law,
+            solution.adequate,
+            verdict.rms,
+            verdict.noise,
+            degree=degree,
+            parts=tuple(part.name for part in parts),
+            residual_share=share,
+        ),
         budget.lines,
         _events(channels, solution.fit, significant),
         warnings,
@@ -158,7 +174,8 @@ def _identification(
             "damping_n_per_s": parameters.damping_n_per_s,
             _COULOMB: parameters.coulomb,
             "offset": parameters.offset,
-        },
+        }
+        | {part.result: part.size(parameters) for part in parts},
         _curves(channels, solution.fit, record.table_gauge.lateness_s),
     )
 
@@ -166,40 +183,52 @@ def _identification(
 def _uncertainty_budget(
     solution: FreeDecayFit, record: Record, unit: str, mass: Quantity | None
 ) -> UncertaintyBudget:
-    """All quantities with their uncertainty by source; the point is (the six parameters, mass)."""
+    """All quantities with their uncertainty by source; the point is (the fitted parameters, mass)."""
     found = solution.fit
     value, deviation = (0.0, 0.0) if mass is None else (mass.value, mass.standard_uncertainty)
     point = np.array([*found.parameters, value])
-    noise = np.zeros((7, 7))
-    noise[:6, :6] = found.noise_factor * found.covariance
+    noise = np.zeros((len(point), len(point)))
+    noise[:-1, :-1] = found.noise_factor * found.covariance
     columns = _sources(found, record)
-    columns[BudgetSource.MASS] = np.array([0.0] * 6 + [deviation])
+    columns[BudgetSource.MASS] = np.append(np.zeros(len(point) - 1), deviation)
     if found is not solution.free:
         columns[BudgetSource.MODEL] = np.append(np.subtract(solution.free.parameters, found.parameters), 0.0)
     budget = UncertaintyBudget()
-    for name, function in (_QUANTITIES if mass is None else _QUANTITIES | _WITH_MASS).items():
+    for name, function in _functions(found, with_mass=mass is not None).items():
         weights = numerical_gradient(function, point)
         shares: dict[Source, float] = {
             BudgetSource.NOISE: math.sqrt(max(0.0, float(weights @ noise @ weights)))
         }
         shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
-        budget.add(name, function(point), shares, unit=unit if name == _COULOMB else "")
+        units = {_COULOMB: unit, "drag_per_m": f"1/{unit}"}
+        budget.add(name, function(point), shares, unit=units.get(name, ""))
     return budget
 
 
+def _functions(found: OneMassFit, *, with_mass: bool) -> dict[str, Callable[[Floats], float]]:
+    """Results as functions of (the fitted parameters, mass)."""
+
+    def of_part(part: Part) -> Callable[[Floats], float]:
+        return lambda point: part.size(Parameters(*point[:-1].tolist()))
+
+    parts = {part.result: of_part(part) for part in parts_of(found.parameters)}
+    return _QUANTITIES | parts | (_WITH_MASS if with_mass else {})
+
+
 def _sources(found: OneMassFit, record: Record) -> dict[Source, Floats]:
-    """Shift (7,) of parameters and mass by one standard uncertainty of each stated source."""
+    """Shift (11,) of parameters and mass by one standard uncertainty of each stated source."""
     parameters, gauge = found.parameters, record.table_gauge
-    time_powers = np.array([1.0, float(found.order), -1.0, -1.0, float(found.order), 0.0, 0.0])
+    order = float(found.order)
     values = np.array([*parameters, 0.0])
-    sizes = values * np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    length_powers = np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -2.0, -2.0, -1.0, -2.0, 0.0])
+    time_powers = order * length_powers + np.array([1.0, 0.0, -1.0, -1.0, *[0.0] * 7])
     away = found.channel.value_m - parameters.offset
     share = away / max(float(np.abs(away).max()), 1e-300)
     # A deviation from the calibration line that is odd and vanishes at both ends of the range in use.
     bend = gauge.nonlinearity_m / math.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
     return {
         BudgetSource.TIME_BASE: record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
-        BudgetSource.GAUGE_1_GAIN: (gauge.gain_relative or 0.0) * sizes,
+        BudgetSource.GAUGE_1_GAIN: (gauge.gain_relative or 0.0) * length_powers * values,
         BudgetSource.GAUGE_1_NONLINEARITY: np.append(parameter_shift(found, bend), 0.0),
     }
 
@@ -245,7 +274,7 @@ def _classical_figures(
 def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:
     """When the mass comes to rest, where friction stops it within the record."""
     parameters = found.parameters
-    if not significant or parameters.damping_n_per_s < 0.0:
+    if not significant or parameters.damping_n_per_s < 0.0 or not parameters.is_linear:
         return Events()
     start = parameters.turning_s, parameters.turning
     decay = OneMassDecay(parameters.period_s, parameters.damping_n_per_s, parameters.coulomb, *start)
@@ -280,8 +309,8 @@ _QUANTITIES: Final[dict[str, Callable[[Floats], float]]] = {
     "frequency_k_rad_per_s": _k,
     _COULOMB: lambda p: float(p[4]),
 }
-"""Functions of (the six fitted parameters, mass)."""
+"""Functions of (the fitted parameters, mass)."""
 _WITH_MASS: Final[dict[str, Callable[[Floats], float]]] = {
-    "stiffness_n_per_m": lambda p: _k(p) ** 2 * float(p[6]),
-    "damping_coefficient_kg_per_s": lambda p: 2.0 * float(p[3] * p[6]),
+    "stiffness_n_per_m": lambda p: _k(p) ** 2 * float(p[-1]),
+    "damping_coefficient_kg_per_s": lambda p: 2.0 * float(p[3] * p[-1]),
 }

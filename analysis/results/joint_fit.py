@@ -70,9 +70,7 @@ def assess_model(
     effects = chosen.law.effects if isinstance(chosen.law, StandModel) else ()
     degree = (Degree.STAND if effects else Degree.IDEAL) if adequate else Degree.NONE
     parts = tuple(effect.name for effect in effects)
-    return ModelSelection(
-        chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree, parts, share
-    )
+    return ModelSelection(chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree, parts, share)
 
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:

@@ -79,7 +79,7 @@ def test_warnings_of_one_mass_give_units() -> None:
     assert "is 298 µm off and moves by " in said["moves-again"]
     assert "in steps of 100 µm:" in said["coarse-steps"]
     assert "µm)" in said["coulomb-biases-log-decrement"]
-    assert "µm of residual for " in said["model-inadequate"]
+    assert "µm of residual (" in said["model-inadequate"]
     assert "µm of noise" in said["model-inadequate"]
     assert "µm, beside" in said["second-mode"]
 

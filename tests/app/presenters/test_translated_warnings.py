@@ -24,7 +24,7 @@ SOURCES = {
     for folder in ("analysis", "app/runs")
     for path in sorted((ROOT / folder).rglob("*.py"))
 }
-WARNING = re.compile(r"\b(ResultWarning|result_warning|Symptom)\(")
+WARNING = re.compile(r"\b(ResultWarning|result_warning|Symptom|Part)\(")
 SPEAKING = {path: text for path, text in SOURCES.items() if WARNING.search(text)}
 """Modules that warn."""
 KEPT = re.compile(
