@@ -151,7 +151,7 @@ def identify(
         budget.results,
         labels,
         joint.selection,
-        budget.lines + unstated_gains(record),
+        budget.lines + unstated_gains(record, budget.results),
         fitted_quantities.build_events(joint, slip_end),
         warnings,
         joint_fit.named_parameters(joint.chosen.parameters, decay),

@@ -1,6 +1,6 @@
 """Standard uncertainties by the law of propagation (JCGM 100, 5.1.2), with contributions by source."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -97,13 +97,15 @@ def propagate_with_model_choice(
     return ParameterUncertainty(columns, noise)
 
 
-def unstated_gains(record: Record) -> list[BudgetLine]:
-    """Budget lines (NaN) of gauges whose gain has no stated uncertainty."""
+def unstated_gains(record: Record, results: Iterable[str]) -> list[BudgetLine]:
+    """Budget lines (NaN) for values of f_d in `results`, of gauges whose gain has no stated uncertainty."""
+    names = [name for name in ("friction_dynamic", "friction_dynamic_plate") if name in results]
     gauges = {BudgetSource.GAUGE_1_GAIN_NOT_STATED: record.table_gauge}
     if record.relative_displacement_m is not None:
         gauges[BudgetSource.GAUGE_2_GAIN_NOT_STATED] = record.relative_gauge
     return [
-        BudgetLine(source, "friction_dynamic", float("nan"))
+        BudgetLine(source, name, float("nan"))
+        for name in names
         for source, gauge in gauges.items()
         if gauge.gain_relative is None
     ]

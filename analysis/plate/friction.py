@@ -277,7 +277,12 @@ def _summarise(
         if chosen.cost - other.cost > _EVIDENCE_MIN:
             varying, chosen, lag_s = (number,), other, 0.0
     for number, name in enumerate(COVARIATES):
-        pooled, place = (chosen, varying.index(number)) if number in varying else (alone[number], 0)
+        if number in varying:
+            pooled, place = chosen, varying.index(number)
+        else:  # beside those in use, which would show in it
+            pooled, place = alone[number], -1
+            if varying:
+                pooled = _pool(best, path_m, (*varying, number), without_lag=lag_s != best.lag_s)
         extent = best.extents[number]
         variation[name] = Variation(
             float(pooled.slopes[place]) / extent,

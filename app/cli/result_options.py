@@ -84,9 +84,9 @@ class TableOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FiguresOptions:
-    """Draw the paper's figures 2 to 5 from runs, for print.
+    """Draw the paper's figures 2 to 5 from runs, and friction by slip, for print.
 
-    2 is f_s and f_d by contact, 3a to 5b are the motion of a run.
+    2 is f_s and f_d by contact, 3a to 5b are the motion of a run, fd-... the friction of its slips.
     Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
     """
 
@@ -97,7 +97,8 @@ class FiguresOptions:
         "--series", "Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent."
     )
     figure: list[str] | None = option(
-        "--figure", "Only this figure: 2, 3a, 3b, 4a, 4b, 5a or 5b; repeatable."
+        "--figure",
+        "Only this figure: 2, 3a, 3b, 4a, 4b, 5a, 5b, fd-velocity, fd-position or fd-time; repeatable.",
     )
     jobs: JobOptions
     force: bool = shared.force()

@@ -331,6 +331,13 @@ def test_importing_loads_no_windows_ports_or_files():
     assert out.stdout.strip() == "[]"
 
 
+def test_gains_that_are_not_stated_are_lines_of_both_values_of_friction():
+    found = identify(simulate_record(Truth(rate_hz=500.0)))
+    for name in ("friction_dynamic", "friction_dynamic_plate"):
+        absent = [line for line in found.budget if line.contribution_to == name]
+        assert sum(np.isnan(line.standard_uncertainty) for line in absent) == 2
+
+
 def test_the_budget_of_n1_has_what_a_bent_gauge_does_to_it():
     bent_m = 5e-6
     made = simulate_record(Truth(friction_static=0.2)).replace(

@@ -38,7 +38,7 @@ def write_product(folder: str, product: Product, path: str, report: ReportProgre
 
 
 def _write_figures(target: Path, runs: CollectedRuns, report: ReportProgress) -> tuple[str, ...]:
-    """Write Fig. 2 of all runs, and Figs. 3a to 5b of a representative run."""
+    """Write Fig. 2 of all runs, and the figures of a representative run."""
 
     def drawing(share: float, run: str) -> None:
         report(Progress(gettext("Drawing {run}", run=run), share))

@@ -13,13 +13,8 @@ from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
-from app.reports.figures.run_figures import (
-    CAPTION,
-    RUN_FIGURES,
-    RunFigureData,
-    contact_names,
-    friction_figure,
-)
+from app.reports.figures.plate_figures import ALL_FIGURES, PLATE_FIGURES
+from app.reports.figures.run_figures import CAPTION, RunFigureData, contact_names, friction_figure
 from app.reports.figures.style import print_style, save_figure
 from app.runs.analyze import Progress, repeat_saved_analysis
 from app.runs.disk import atomic_write, storage_error
@@ -30,7 +25,8 @@ from config.schema import Stand
 
 Format = Literal["png", "svg", "pdf"]
 FRICTION_FIGURE = "2"
-NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))  # of the paper's figures that are drawn
+NUMBERS = (FRICTION_FIGURE, *(one.number for one in ALL_FIGURES))  # the paper's, then those of slips
+_OF_SLIPS = tuple(one.number for one in PLATE_FIGURES)
 
 
 class FigureFile(msgspec.Struct, frozen=True):
@@ -63,8 +59,9 @@ class FigureFolder(msgspec.Struct, frozen=True):
                     )
 
     def file(self, number: str, stem: str = "") -> Path:
-        """Name of a figure: `fig2.png`, `1FFM0_001-fig3a.png`."""
-        return Path(self.path) / f"{stem}{'-' if stem else ''}fig{number}.{self.format}"
+        """Name of a figure: `fig2.png`, `1FFM0_001-fig3a.png`, `1FFM0_001-fd-time.png`."""
+        name = number if number in _OF_SLIPS else f"fig{number}"
+        return Path(self.path) / f"{stem}{'-' if stem else ''}{name}.{self.format}"
 
     def write(
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
@@ -110,7 +107,7 @@ def write_figures(
                 analysis.record, analysis.identification, analysis.run.metadata.unit
             )
             name = analysis.run.metadata.series or path.stem
-            for one in RUN_FIGURES:
+            for one in ALL_FIGURES:
                 if one.number not in numbers:
                     continue
                 if (figure := one.render(run)) is None:
@@ -118,9 +115,12 @@ def write_figures(
                 else:
                     caption = f"{name}. {one.caption}"
                     written.append(folder.write(one.number, figure, caption, stem=stem, run=str(path)))
-            if left_out:
-                figures = ", ".join(left_out)
-                notes.append(f"{path.name}: no law of motion was fitted, Figs. {figures} are left out")
+            for reason, missing in (
+                ("no law of motion was fitted", [one for one in left_out if one not in _OF_SLIPS]),
+                ("no slips that give friction by themselves", [one for one in left_out if one in _OF_SLIPS]),
+            ):
+                if missing:
+                    notes.append(f"{path.name}: {reason}, Figs. {', '.join(missing)} are left out")
     return written, notes
 
 

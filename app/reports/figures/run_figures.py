@@ -16,6 +16,7 @@ from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Plac
 from analysis.identification import Identification
 from analysis.laws.catalogue import fitted_law
 from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
+from analysis.plate.friction import PlateFriction
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.reports.figures.style import (
@@ -49,6 +50,8 @@ class RunFigureData:
     slip_end_s: float | None
     results: dict[str, Quantity]
     unit: str = "m"  # of the readings
+    plate: PlateFriction | None = None  # its times are those of the record, in which the release is at
+    release_s: float = 0.0
 
     @classmethod
     def from_identification(cls, record: Record, found: Identification, unit: str = "m") -> Self:
@@ -67,6 +70,8 @@ class RunFigureData:
             None if found.events.slip_end_s is None else found.events.slip_end_s - release_s,
             found.results,
             unit,
+            found.plate,
+            release_s,
         )
 
 

@@ -15,8 +15,9 @@ from analysis.catalogue import (
     Unit,
     definition,
 )
-from analysis.formatting import format_interval, format_uncertainty, typeset
+from analysis.formatting import format_interval, format_uncertainty, typeset, typeset_sentence
 from analysis.identification import Identification
+from analysis.plate.trends import velocity_statement
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.style import print_style, reading_units
@@ -29,7 +30,7 @@ from drivers.samples import Losses
 
 _BUDGETED: Final = "friction_dynamic", "friction_static", "period_s", "damping_n1_per_s", "stiffness_n_per_m"
 _HEADLINES: Final = ("friction_dynamic", "friction_static_lower", "period_s")
-_FIGURES: Final = ("3b", "4b", "5a", "5b")
+_FIGURES: Final = ("3b", "4b", "5a", "5b", "fd-velocity", "fd-position", "fd-time")
 _ENDINGS: Final = {
     "rest": "at rest",
     "enough": "when waiting would not have narrowed the results",
@@ -162,6 +163,8 @@ def _results(found: Identification) -> Iterator[blocks.Block]:
         rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
     header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
     yield blocks.Grid(header, rows, numbers=4)
+    if found.plate is not None:
+        yield Text(typeset_sentence(str(velocity_statement(found.plate))))
     if found.model is not None and found.model.tried:
         laws: list[list[Cell]] = []
         for law in found.model.tried:

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from analysis.catalogue import ACCELERATION, KILOGRAM, MICROMETRE, MILLIMETRE, Unit
 from analysis.formatting import NO_BREAK_SPACE, format_compact, format_value, format_with_prefix, typeset
 from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS
-from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
+from app.reports.figures.plate_figures import ALL_FIGURES
+from app.reports.figures.run_figures import RunFigureData
 from app.reports.figures.style import figure_svg
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.analyze import Analysis
@@ -75,7 +76,7 @@ def run_drawings(analysis: Analysis, numbers: Sequence[str], prefix: str = "") -
     """The figures of a run with these numbers, drawn in `print_style`, that it has something to show in."""
     unit = analysis.run.metadata.unit
     run = RunFigureData.from_identification(analysis.record, analysis.identification, unit)
-    made = [(one.render(run), prefix + one.caption) for one in RUN_FIGURES if one.number in numbers]
+    made = [(one.render(run), prefix + one.caption) for one in ALL_FIGURES if one.number in numbers]
     return [drawing(figure, caption) for figure, caption in made if figure is not None]
 
 

@@ -11,6 +11,7 @@ from analysis.identify import identify
 from analysis.laws.stribeck import STRIBECK_TILT
 from analysis.quantities import Quantity
 from analysis.synthetic import simulate_record
+from app.reports.figures.plate_figures import PLATE_FIGURES
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import FORMATS, print_style, save_figure
 
@@ -155,3 +156,15 @@ def test_figures_repeat_to_the_byte_and_bear_no_date(ending, drawn, tmp_path):
     assert first == (tmp_path / f"second.{ending}").read_bytes()
     for word in (b"Date", b"matplotlib.org", b"Matplotlib v"):
         assert word not in first
+
+
+def test_friction_by_slip_shows_each_slip_with_its_interval_and_the_slope(drawn, found):
+    for figure in PLATE_FIGURES:
+        with print_style():
+            (axes,) = figure.render(drawn).axes
+        (points,) = axes.containers
+        assert len(points[0].get_xdata()) == len(found.plate.friction)
+        assert "95 %" in axes.get_legend().get_texts()[0].get_text()
+    time_s = points[0].get_xdata()
+    assert 0.0 < time_s[0] < time_s[-1] < drawn.slip_end_s
+    assert PLATE_FIGURES[0].render(dataclasses.replace(drawn, plate=None)) is None

@@ -14,6 +14,7 @@ from analysis.formatting import typeset_sentence
 from app.reports.table.text import TableContent
 from app.reports.test_report.blocks import (
     Conclusion,
+    Drawings,
     Facts,
     Grid,
     Notice,
@@ -89,7 +90,7 @@ def test_report_of_a_run_that_does_not_count_says_so_first(folder):
 def test_report_of_a_run_says_what_was_found(of_run, folder):
     found = repeat_saved_analysis(folder / "a.h5").identification
     (verdict, _) = part(of_run, "Result")
-    (results, tried) = part(of_run, "Results")
+    (results, _, tried) = part(of_run, "Results")
     rows = {row[0]: row[2:4] for row in results.rows}
 
     friction = found.results["friction_dynamic"]
@@ -102,6 +103,20 @@ def test_report_of_a_run_says_what_was_found(of_run, folder):
     )
     assert [row[0] for row in tried.rows] == [law.name for law in found.model.tried]
     assert of_run.subtitle == "1FFM0, a.h5"
+
+
+def test_report_of_a_run_says_whether_friction_depends_on_velocity(of_run):
+    said = [block.text for section in of_run.sections for block in section.blocks if isinstance(block, Text)]
+
+    assert any("per 100 mm/s of sliding velocity" in text for text in said)
+    captions = [
+        item.caption
+        for section in of_run.sections
+        for block in section.blocks
+        if isinstance(block, Drawings)
+        for item in block.items
+    ]
+    assert sum("from the plate alone" in caption for caption in captions) == 3
 
 
 def test_report_holds_the_whole_budget_largest_first(of_run, folder):
