@@ -7,6 +7,8 @@ from typing import Any, ClassVar, Self, TypeAlias
 from messages.i18n import N_
 from messages.message import Message, message
 
+COVERAGE_FACTOR_95 = 1.959963984540054  # coverage factor of a 95 % interval of a normal distribution
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -20,7 +22,7 @@ class Quantity:
     @classmethod
     def normal(cls, value: float, standard_uncertainty: float, unit: str) -> "Quantity":
         """Quantity with a normal distribution: 95 % lie within 1.959964 standard uncertainties."""
-        half = 1.959963984540054 * standard_uncertainty
+        half = COVERAGE_FACTOR_95 * standard_uncertainty
         return cls(value, standard_uncertainty, (value - half, value + half), unit)
 
 

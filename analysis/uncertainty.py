@@ -26,7 +26,6 @@ _SOURCES = {
 _UNITS = {row.name: row.unit for row in CATALOGUE}
 LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5  # plane within 2 mrad, rectangular (JCGM 100, 4.3.7)
 _SHARE_MIN = 1e-3  # a law less likely than this adds less than its last digit to a standard uncertainty
-COVERAGE_FACTOR_95 = 1.959963984540054  # coverage factor of a 95 % interval of a normal distribution
 _CORRELATED = 3.5  # excess scatter of block means, in sigmas of white noise, of correlated noise
 
 

@@ -12,10 +12,9 @@ from functools import partial
 import numpy as np
 
 from analysis.identify import identify
-from analysis.quantities import Quantity
+from analysis.quantities import COVERAGE_FACTOR_95, Quantity
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, simulate_readings, simulate_record
-from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
 

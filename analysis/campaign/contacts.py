@@ -10,8 +10,7 @@ from scipy.special import stdtrit
 from analysis.campaign.pooling import PooledQuantity, pool, run_ratio
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.campaign.series import Series
-from analysis.quantities import Quantity
-from analysis.uncertainty import COVERAGE_FACTOR_95
+from analysis.quantities import COVERAGE_FACTOR_95, Quantity
 
 _RECTANGLE = 2.0 * math.sqrt(3.0)  # width of a rectangular distribution over its standard deviation
 _DYNAMIC, _STATIC = "friction_dynamic", "friction_static"

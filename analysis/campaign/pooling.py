@@ -11,8 +11,7 @@ from scipy.special import stdtrit
 
 from analysis.campaign.scatter import RepeatedValues, SeriesScatter, estimate_scatter, find_outliers
 from analysis.campaign.series import RunResult
-from analysis.quantities import BudgetLine, BudgetSource, Quantity, SharedBy, Source
-from analysis.uncertainty import COVERAGE_FACTOR_95
+from analysis.quantities import COVERAGE_FACTOR_95, BudgetLine, BudgetSource, Quantity, SharedBy, Source
 
 _SMALLEST = 1e-9  # relative uncertainty below which rounding errors decide
 _LARGEST = 1e100  # larger values have no square in double precision

@@ -14,8 +14,9 @@ from analysis.motion.one_mass import free_decay, turning_magnitude
 from analysis.one_mass.turning_points import find_turning_points, regress_half_cycles
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import DampedCosine, fit_damped_cosine
+from analysis.quantities import COVERAGE_FACTOR_95
 from analysis.record import RecordError
-from analysis.uncertainty import COVERAGE_FACTOR_95, noise_variance_factor
+from analysis.uncertainty import noise_variance_factor
 
 _STEP = 1e-30
 COULOMB, OFFSET = 4, 5  # places of x_k and of the zero among the parameters

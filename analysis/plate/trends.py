@@ -2,16 +2,18 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Floats
 from analysis.formatting import format_value
-from analysis.plate.friction import PlateFriction
-from analysis.quantities import BudgetSource
-from analysis.uncertainty import COVERAGE_FACTOR_95
+from analysis.quantities import COVERAGE_FACTOR_95, BudgetSource
 from messages.i18n import N_
 from messages.message import Message, message
+
+if TYPE_CHECKING:
+    from analysis.plate.friction import PlateFriction
 
 _PER_M_PER_S = 0.1  # slopes are told per 100 mm/s, about the velocities of the paper's stand
 _POINTS, _MARGIN = 50, 0.05  # of a drawn line, and how far it goes on at both sides
@@ -60,22 +62,42 @@ class FrictionTrend:
         return self.level + self.slope * away, COVERAGE_FACTOR_95 * deviation
 
 
-def trend_with_velocity(plate: PlateFriction) -> FrictionTrend:
+@dataclass(frozen=True, eq=False, slots=True)
+class FrictionBySlip:
+    """Trends of one run, for drawing without the analysis."""
+
+    with_velocity: FrictionTrend
+    with_position: FrictionTrend
+    with_time: FrictionTrend
+    statement: Message  # of `velocity_statement`
+
+
+def friction_by_slip(plate: "PlateFriction", release_s: float) -> FrictionBySlip:
+    """Trends of a run that was released at `release_s` of the record's time."""
+    return FrictionBySlip(
+        trend_with_velocity(plate),
+        trend_with_position(plate),
+        trend_with_time(plate, release_s),
+        velocity_statement(plate),
+    )
+
+
+def trend_with_velocity(plate: "PlateFriction") -> FrictionTrend:
     """The slope counts changes within slips too (`PlateFriction.variation`)."""
     return _trend(plate, plate.speed_m_per_s, "sliding velocity")
 
 
-def trend_with_position(plate: PlateFriction) -> FrictionTrend:
+def trend_with_position(plate: "PlateFriction") -> FrictionTrend:
     """The slope counts changes within slips too (`PlateFriction.variation`)."""
     return _trend(plate, plate.position_m, "position")
 
 
-def trend_with_time(plate: PlateFriction, origin_s: float) -> FrictionTrend:
+def trend_with_time(plate: "PlateFriction", origin_s: float) -> FrictionTrend:
     """Times count from `origin_s`. The slope is that between slips."""
     return _trend(plate, plate.time_s - origin_s, "")
 
 
-def _trend(plate: PlateFriction, at: Floats, covariate: str) -> FrictionTrend:
+def _trend(plate: "PlateFriction", at: Floats, covariate: str) -> FrictionTrend:
     deviation = np.hypot(plate.friction_standard_uncertainty, plate.scatter)
     weight = deviation**-2.0
     centre, level = (float(weight @ value / weight.sum()) for value in (at, plate.friction))
@@ -93,7 +115,7 @@ def _trend(plate: PlateFriction, at: Floats, covariate: str) -> FrictionTrend:
     return FrictionTrend(at, plate.friction, reach, slope, uncertainty, centre, level, level_uncertainty)
 
 
-def velocity_statement(plate: PlateFriction) -> Message:
+def velocity_statement(plate: "PlateFriction") -> Message:
     """Whether the run agrees with the paper, by which f_d does not depend on the sliding velocity."""
     trend = trend_with_velocity(plate)
     shown = format_value(_PER_M_PER_S * trend.slope, _PER_M_PER_S * trend.slope_standard_uncertainty)

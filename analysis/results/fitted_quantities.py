@@ -19,11 +19,10 @@ from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, StandModel
 from analysis.motion.two_mass import PEAK_RATES
 from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay
-from analysis.quantities import BudgetSource, Source
+from analysis.quantities import COVERAGE_FACTOR_95, BudgetSource, Source
 from analysis.record import AnalysisError, Record
 from analysis.results.joint_fit import FRICTION_PARAMETERS, SIGNED_PARAMETERS, DecayConstants, JointFit
 from analysis.uncertainty import (
-    COVERAGE_FACTOR_95,
     LEVELLING_UNCERTAINTY_RAD,
     UncertaintyBudget,
     numerical_gradient,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.identification import Events, ModelSelection
+from analysis.plate.trends import FrictionBySlip
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 Floats = NDArray[np.float64]
@@ -86,3 +87,4 @@ class AnalysedRun:
     kind: AnalysisKind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
+    friction_by_slip: FrictionBySlip | None = None  # None without friction from the plate alone

@@ -8,6 +8,7 @@ from analysis.identification import Identification
 from analysis.identify import warm_up as identify_once
 from analysis.laws.catalogue import fitted_law
 from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.plate.trends import FrictionBySlip, friction_by_slip
 from analysis.record import Record
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.presenters.analysed_run import AnalysedRun, AnalysisTask, Channel, Kinematics, Objective
@@ -58,6 +59,7 @@ def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         kind=task.kind,
         slips=() if motion is None else _slips(motion, found.parameters["release_s"]),
         note=run.metadata.note,
+        friction_by_slip=_friction_by_slip(found, record),
     )
 
 
@@ -107,6 +109,13 @@ def _channels(found: Identification, record: Record) -> tuple[Channel, Channel |
         return table, None
     relative_m = None if fit is None else fit.relative_displacement_m
     return table, Channel(record.relative_displacement_m, relative_m)
+
+
+def _friction_by_slip(found: Identification, record: Record) -> FrictionBySlip | None:
+    if found.plate is None:
+        return None
+    release_s = found.events.release_s
+    return friction_by_slip(found.plate, float(record.time_s[0]) if release_s is None else release_s)
 
 
 def _objective(found: Identification) -> Objective | None:

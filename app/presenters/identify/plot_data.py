@@ -1,9 +1,19 @@
 """Plot data of an analysed run: curves, lines of the fitted motion, and words about f_d set by hand."""
 
-from analysis.formatting import typeset, with_unit
+from analysis.formatting import format_value, typeset, with_unit
+from analysis.plate.trends import FrictionTrend
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
-from app.presenters.identify.state import ChannelCurves, Curves, Floats, Motion, PlotTab, PlottedQuantity
+from app.presenters.identify.state import (
+    ChannelCurves,
+    Curves,
+    Floats,
+    Motion,
+    PlotTab,
+    PlottedQuantity,
+    SlipPlot,
+    SlipPlots,
+)
 from messages.i18n import N_, gettext
 
 _TABLE, _PLATE = "u<sub>1</sub>", "u<sub>2</sub>"
@@ -77,6 +87,32 @@ def motion(run: AnalysedRun) -> Motion | None:
         ),
         PlotTab.PHASE: (line(_TABLE, "mm", found.table_m), velocity, relative, relative_velocity),
     }
+
+
+def slip_plots(run: AnalysedRun) -> SlipPlots | None:
+    """Friction of each slip; None without friction from the plate alone."""
+    found = run.friction_by_slip
+    if found is None:
+        return None
+    return SlipPlots(
+        (
+            _slip_plot(found.with_velocity, gettext("sliding velocity, mm/s"), 1e3, "100 mm/s", 0.1),
+            _slip_plot(found.with_position, gettext("position on the table, mm"), 1e3, "mm", 1e-3),
+            _slip_plot(found.with_time, gettext("time from release, s"), 1.0, "s", 1.0),
+        ),
+        results.sentence(found.statement),
+    )
+
+
+def _slip_plot(trend: FrictionTrend, axis: str, scale: float, unit: str, slope_scale: float) -> SlipPlot:
+    slope = format_value(slope_scale * trend.slope, slope_scale * trend.slope_standard_uncertainty)
+    template = (
+        N_("f<sub>d</sub>: {slope} ± {uncertainty} per {unit}, zero within 95 %")
+        if trend.includes_zero
+        else N_("f<sub>d</sub>: {slope} ± {uncertainty} per {unit}, zero outside 95 %")
+    )
+    title = gettext(template, slope=typeset(slope.value), uncertainty=slope.uncertainty, unit=unit)
+    return SlipPlot(title, axis, trend, scale)
 
 
 def manual_fit_text(friction: float, objective: Objective) -> str:

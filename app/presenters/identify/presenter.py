@@ -179,8 +179,9 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             budget=result_tables.budget_rows(run),
             missing_data=result_tables.missing_data(run),
             no_scan_reason=result_tables.no_scan_reason(run),
-            tab=self.state.tab if run.kinematics is not None else PlotTab.DISPLACEMENT,
+            tab=self._tab_of(run),
             motion=plot_data.motion(run),
+            slip_plots=plot_data.slip_plots(run),
             scan=run.objective,
             alternative_kind="one-mass" if run.kind == "two-mass" else "two-mass",
         )
@@ -189,6 +190,12 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._set_cursors(cursor_values.shift_cursors(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
             self._worker.submit(tasks.estimate_classical, shown.task, done=partial(self._on_classical, shown))
+
+    def _tab_of(self, run: AnalysedRun) -> PlotTab:
+        """The tab that is shown, where the run has something to draw there."""
+        tab = self.state.tab
+        drawn = run.friction_by_slip if tab is PlotTab.FRICTION else run.kinematics
+        return tab if drawn is not None else PlotTab.DISPLACEMENT
 
     def _on_variant(self, task: AnalysisTask, run: AnalysedRun) -> None:
         """Show another law beside those of the first analysis, or another kind of analysis."""

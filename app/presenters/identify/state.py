@@ -7,6 +7,7 @@ from enum import Enum, StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.plate.trends import FrictionTrend
 from app.presenters.analysed_run import AnalysisKind, Objective
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from app.presenters.results import Result, ResultRow
@@ -47,6 +48,7 @@ class PlotTab(StrEnum):
     ACCELERATION = N_("Acceleration")
     RELATIVE = N_("Relative acceleration")
     PHASE = N_("Phase plane")
+    FRICTION = N_("Friction by slip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,6 +80,22 @@ class ManualFit:
     friction: float
     simulations_mm: tuple[PlotLine, ...]
     residuals_um: tuple[PlotLine, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SlipPlot:
+    """Friction of slips against one covariate."""
+
+    title: str  # slope, as rich text
+    axis: str
+    trend: FrictionTrend
+    scale: float  # units of the axis in one SI unit of the trend
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SlipPlots:
+    plots: tuple[SlipPlot, ...]  # against sliding velocity, position and time
+    statement: str
 
 
 class Cursor(Enum):
@@ -154,6 +172,7 @@ class IdentifyState:
     """Why f_d cannot be varied."""
     tab: PlotTab = PlotTab.DISPLACEMENT
     motion: Motion | None = None
+    slip_plots: SlipPlots | None = None
     scan: Objective | None = None
     """Residual against f_d, all other parameters as fitted."""
     manual_fit: ManualFit | None = None

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from app.presenters.identify.state import Cursor, Cursors, Motion, PlotTab, PlottedQuantity
 from app.qt.identify.cursors import CursorLines, CursorPoints
 from app.qt.identify.curve_plots import CurvePlots
+from app.qt.identify.slip_plots import SlipPages
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column, make_row
 from app.qt.widgets.plots import PlotStack, ShadedSpans, pen, shade, value_at, value_extent
@@ -21,6 +22,7 @@ _NAMES = {
     PlotTab.ACCELERATION: N_("Accelerations of the fitted motion"),
     PlotTab.RELATIVE: N_("Relative acceleration of the fitted motion"),
     PlotTab.PHASE: N_("Phase plane of the fitted motion"),
+    PlotTab.FRICTION: N_("Friction of each slip, from the plate alone"),
 }
 _TIME_PLOTS = {
     PlotTab.VELOCITY: (
@@ -59,11 +61,12 @@ class PlotTabs(QStackedWidget):
             tab: TimePlots(theme, [(gettext(title), colours) for title, colours in plots])
             for tab, plots in _TIME_PLOTS.items()
         } | {PlotTab.PHASE: PhasePlots(theme)}
+        self.slips = SlipPages(theme)
         for tab in PlotTab:
             page = self._page(tab)
             page.setAccessibleName(gettext(_NAMES[tab]))
             self.addWidget(page)
-            if isinstance(page, CurvePlots | TimePlots):
+            if isinstance(page, CurvePlots | TimePlots | SlipPages):
                 page.cursors.moved.connect(self.cursor_moved)
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -85,8 +88,8 @@ class PlotTabs(QStackedWidget):
 
     def span(self) -> tuple[float, float] | None:
         """Visible times (s); None on the phase plane."""
-        page = self.currentWidget()
-        return page.span() if isinstance(page, CurvePlots | TimePlots) else None
+        page = self._page(list(PlotTab)[self.currentIndex()])
+        return None if isinstance(page, PhasePlots) else page.span()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         key = Qt.Key(event.key())
@@ -98,8 +101,8 @@ class PlotTabs(QStackedWidget):
         else:
             super().keyPressEvent(event)
 
-    def _page(self, tab: PlotTab) -> "CurvePlots | TimePlots | PhasePlots":
-        return self.motions.get(tab, self.curves)
+    def _page(self, tab: PlotTab) -> "CurvePlots | TimePlots | PhasePlots | SlipPages":
+        return self.slips if tab is PlotTab.FRICTION else self.motions.get(tab, self.curves)
 
 
 class TimePlots(QWidget):

@@ -23,6 +23,7 @@ from messages.i18n import N_, gettext
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
 _NO_MOTION = N_("The other tabs need the fitted motion of both masses; this run has none.")
+_NO_SLIPS = N_("Friction by slip needs three slips of gauge 2, in both directions.")
 _EMPTY = N_("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
 _OTHER_KINDS = {None: "", "one-mass": N_("Analyse as one mass"), "two-mass": N_("Analyse as two masses")}
 
@@ -89,9 +90,12 @@ class IdentifyScreen(QWidget):
             return
         self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind]))
         self._plots.curves.show_curves(state.curves)
-        for index in range(1, len(PlotTab)):
-            self._tabs.setTabEnabled(index, state.motion is not None)
-            self._tabs.setTabToolTip(index, "" if state.motion is not None else gettext(_NO_MOTION))
+        for index, tab in enumerate(PlotTab):
+            is_drawn, reason = _drawn(tab, state)
+            self._tabs.setTabEnabled(index, is_drawn)
+            self._tabs.setTabToolTip(index, "" if is_drawn else gettext(reason))
+        if state.slip_plots is not None:
+            self._plots.slips.show_plots(state.slip_plots)
         self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
             self._plots.show_motion(state.motion, state.curves.slips)
@@ -144,6 +148,13 @@ class IdentifyScreen(QWidget):
         page.setSizes([_USUAL_PLOTS, _COLUMN_WIDTH])
         persist_layout(page, "identify")
         return page
+
+
+def _drawn(tab: PlotTab, state: IdentifyState) -> tuple[bool, str]:
+    """Whether a tab has something to show, and why it may have nothing."""
+    if tab is PlotTab.FRICTION:
+        return state.slip_plots is not None, _NO_SLIPS
+    return tab is PlotTab.DISPLACEMENT or state.motion is not None, _NO_MOTION
 
 
 class _WaitingPage(QFrame):

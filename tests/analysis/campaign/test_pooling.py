@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from analysis.campaign.pooling import RunValue, SharedError, pool, run_ratio, run_value
-from analysis.quantities import BudgetLine, BudgetSource, Quantity
-from analysis.uncertainty import COVERAGE_FACTOR_95
+from analysis.quantities import COVERAGE_FACTOR_95, BudgetLine, BudgetSource, Quantity
 from tests.campaign_kit import FRICTION, run
 
 

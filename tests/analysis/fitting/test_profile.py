@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.identify import identify
+from analysis.quantities import COVERAGE_FACTOR_95
 from analysis.results.fitted_quantities import distribution
 from analysis.synthetic import Truth, simulate_record
-from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks import study_coverage
 
 SIDE = np.array([0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2]) * COVERAGE_FACTOR_95

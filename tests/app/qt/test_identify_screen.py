@@ -1,5 +1,8 @@
 """The Identify screen: record against simulation, or words for what is missing."""
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
@@ -9,7 +12,11 @@ from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker, analysed
 
 from analysis.identification import Events
+from analysis.plate.friction import estimate_plate_friction
+from analysis.plate.trends import FrictionBySlip, friction_by_slip
+from analysis.preparation.free_decay import prepare
 from analysis.quantities import BudgetLine, BudgetSource
+from analysis.synthetic import Truth, simulate_record
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
 from app.presenters.identify.presenter import IdentifyPresenter
@@ -20,6 +27,14 @@ from app.qt.widgets.plots import Plot, PlotStack
 from app.qt.widgets.shortcuts import list_shortcuts
 
 RUN = str(analysed().path)
+
+
+@cache
+def by_slip() -> FrictionBySlip:
+    record = simulate_record(Truth(friction_static=0.12, tilt_rad=1e-3))
+    plate = estimate_plate_friction(record, prepare(record))
+    assert plate is not None
+    return friction_by_slip(plate, 1.0)
 
 
 class Stage:
@@ -106,6 +121,24 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
     assert stage.curves._noise.getRegion() == pytest.approx((-40.0, 40.0))
     spans = [plot.view.viewRange()[0] for plot in stage.curves._stack.plots]
     assert spans[0] == spans[1] == spans[2] == pytest.approx([-1.0, 9.999])
+
+
+def test_friction_by_slip_has_a_tab_with_what_it_says_of_the_paper(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
+    place = list(PlotTab).index(PlotTab.FRICTION)
+    assert not stage.screen._tabs.isTabEnabled(place)
+    stage.presenter.on_analysed(analysed(friction_by_slip=by_slip()))
+    stage.screen._tabs.setCurrentIndex(place)
+    assert "this run agrees with the paper that f_d does not depend on velocity" in stage.words()
+    page = stage.screen._plots.slips
+    assert page.isVisible()
+    titles = [stack.plots[0].title.text for stack in page._stacks]
+    assert [unit for unit, title in zip(("100 mm/s", "mm", "s"), titles, strict=True) if unit in title]
+    assert all("zero within 95 %" in title for title in titles)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
+    assert stage.presenter.state.tab is PlotTab.DISPLACEMENT
 
 
 def test_zooming_one_plot_zooms_all(stage: Stage) -> None:
@@ -359,7 +392,7 @@ def test_cursors_stay_at_their_moments_when_times_are_counted_from_elsewhere(sta
 def test_in_a_small_window_nothing_is_cut_off_on_any_tab(stage: Stage, side: PlotTab) -> None:
     stage.screen.resize(932, 640)
     stage.presenter.on_opening(RUN)
-    stage.presenter.on_analysed(with_scan())
+    stage.presenter.on_analysed(replace(with_scan(), friction_by_slip=by_slip()))
     stage.presenter.toggle_cursors()
     stage.presenter.set_tab(side)
     QApplication.processEvents()
