@@ -101,7 +101,8 @@ class Identification:
     warnings: list[ResultWarning] = field(default_factory=list)  # "warnings" in the JSON
     parameters: dict[str, float] = field(default_factory=dict)
     """Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
-    damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used."""
+    damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s, the masses and gravity used, and those of
+    the chosen model alone under the names of its results."""
     curves: Callable[[Floats], Curves] | None = None  # fitted readings at given record times (n,)
     objective: Callable[[Floats], Floats] | None = None
     """Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted."""

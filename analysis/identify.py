@@ -154,7 +154,7 @@ def identify(
         budget.lines + unstated_gains(record, budget.results),
         fitted_quantities.build_events(joint, slip_end),
         warnings,
-        joint_fit.named_parameters(joint.chosen.parameters, decay),
+        joint_fit.named_parameters(joint.chosen, decay),
         joint_fit.fitted_curves(joint.chosen, decay, delays_s),
         joint_fit.friction_objective(problem, joint.chosen),
         joint_fit.friction_curves(joint.chosen, decay, delays_s),

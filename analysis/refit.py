@@ -4,22 +4,32 @@ For a slider that holds one parameter while the others follow, and for any other
 roughly where the minimum is::
 
     again = Refitter(record)
-    found = again.refit(identification.parameters, model=identification.model.name, hold="friction_dynamic")
+    chosen = identification.model
+    found = again.refit(
+        identification.parameters, model=chosen.name, parts=chosen.parts, hold="friction_dynamic"
+    )
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.search import build_problem, fit_at_minimum
+from analysis.fitting.stand_search import stand_problem
 from analysis.identification import Curves
-from analysis.laws.catalogue import law_by_name
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import StandModel, model_law
 from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
-from analysis.results.joint_fit import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
+from analysis.results.joint_fit import (
+    PARAMETER_NAMES,
+    SIGNED_PARAMETERS,
+    fitted_curves,
+    law_places,
+    named_parameters,
+)
 from messages.i18n import N_
 
 
@@ -46,33 +56,37 @@ class Refitter:
         self._delays_s = record.table_gauge.lateness_s, record.relative_gauge.lateness_s
 
     def refit(
-        self, start: Mapping[str, float], *, model: str, hold: str | None = None, steps_max: int = 12
+        self,
+        start: Mapping[str, float],
+        *,
+        model: str,
+        parts: Iterable[str] = (),
+        hold: str | None = None,
+        steps_max: int = 12,
     ) -> Refit:
         """Refine `start` in at most `steps_max` evaluations.
 
-        `start` is near a minimum, for there may be many: `Identification.parameters`, and the values of the
-        law's own parameters, which are among the results. `hold` names a parameter that stays as it is.
+        `start` is near a minimum, for there may be many: `Identification.parameters`. `parts` are the effects
+        of the stand that the model holds, `hold` names a parameter that stays as it is.
         """
-        law = law_by_name(model)
+        law = model_law(model, parts)
+        problem = stand_problem(self._problem, law) if isinstance(law, StandModel) else self._problem
         held = None if hold is None else self._held(hold, law)
-        point = _zeroed(self._problem, self._point(start, law), law)
-        minimum = self._problem.minimise(point, law, steps_max, fixed=held)
-        fit = fit_at_minimum(self._problem, law, minimum)
-        named = named_parameters(fit.parameters, self._decay)
-        own = zip((own.name for own in law.own), fit.parameters[law.own_places].tolist(), strict=True)
+        point = _zeroed(problem, self._point(start, law, problem.prior_mean.copy()), law)
+        minimum = problem.minimise(point, law, steps_max, fixed=held)
+        fit = fit_at_minimum(problem, law, minimum)
         curves = fitted_curves(fit, self._decay, self._delays_s)
-        return Refit({**named, **dict(own)}, fit.chi_square, fit.rms_m, curves, minimum.steps)
+        named = named_parameters(fit, self._decay)
+        return Refit(named, fit.chi_square, fit.rms_m, curves, minimum.steps)
 
-    def _point(self, start: Mapping[str, float], law: FrictionLaw) -> Floats:
-        own_names = [own.name for own in law.own]
-        missing = [name for name in (*PARAMETER_NAMES.values(), "release_s", *own_names) if name not in start]
+    def _point(self, start: Mapping[str, float], law: FrictionLaw, point: Floats) -> Floats:
+        names = PARAMETER_NAMES | law_places(law)
+        missing = [name for name in (*names.values(), "release_s") if name not in start]
         if missing:
             template = N_("the start of a refit lacks {missing}: hand over Identification.parameters.")
             raise AnalysisError(template, missing=", ".join(missing))
-        point = self._problem.prior_mean.copy()
-        for place, name in PARAMETER_NAMES.items():
+        for place, name in names.items():
             point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)
-        point[law.own_places] = [start[name] for name in own_names]
         point[Parameter.RELEASE] = self._decay.channels.from_record_time(start["release_s"])
         return point
 

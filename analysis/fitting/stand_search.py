@@ -245,6 +245,11 @@ def extended_problem(problem: FitProblem) -> FitProblem:
     )
 
 
+def stand_problem(problem: FitProblem, model: StandModel) -> FitProblem:
+    """The problem as a fit of this model solves it."""
+    return _open_shared(extended_problem(problem), model)
+
+
 def _open_shared(problem: FitProblem, model: FrictionLaw) -> FitProblem:
     """The problem without what is stated of lag and gain of gauge 2, where the model frees them."""
     for place in (Parameter.LAG, Parameter.RELATIVE_GAIN):

@@ -1,6 +1,5 @@
 """The friction laws that an identification can use. A new law is a file of its own and one line here."""
 
-from collections.abc import Container
 from dataclasses import replace
 
 import numpy as np
@@ -53,12 +52,6 @@ def law_by_name(name: str) -> FrictionLaw:
     raise AnalysisError(
         "model {name} is unknown. Choose one of {names}.", name=repr(name), names=[law.name for law in LAWS]
     )
-
-
-def fitted_law(name: str, results: Container[str]) -> FrictionLaw:
-    """The law of this name if its own parameters are among the results; else the widest in closed form."""
-    law = law_by_name(name)
-    return law if all(own.name in results for own in law.own) else WIDEST_LAW
 
 
 def law_without(law: FrictionLaw, parameter: Parameter) -> FrictionLaw | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled_part
-from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.catalogue import PARAMETER_COUNT, law_by_name
 from analysis.laws.closed_form import GAUGE_1, GAUGE_2_BASE
 from analysis.laws.coulomb import COULOMB
 from analysis.laws.law import FrictionLaw, Gauge, IntegratedSolver, MotionSolver
@@ -318,6 +318,20 @@ def effects_by_name(names: Iterable[str]) -> list[StandEffect]:
     """Effects in the order of `EFFECTS`; names of other versions are passed over."""
     wanted = set(names)
     return [effect for effect in EFFECTS if effect.name in wanted]
+
+
+def model_law(name: str, parts: Iterable[str] = ()) -> FrictionLaw:
+    """The law of this name, on a stand with these effects. Raises AnalysisError if there is no such law."""
+    effects = effects_by_name(parts)
+    return compose(law_by_name(name), effects) if effects else law_by_name(name)
+
+
+def simulate_fit(law: FrictionLaw, fitted: Mapping[str, float], duration_s: float) -> Motion:
+    """Motion from release to `duration_s` of a law with the parameters of an `Identification`."""
+    own = [fitted[parameter.name] for parameter in law.own]
+    if isinstance(law, StandModel):
+        return law.simulate(TwoMassParameters.from_fit(fitted), own, duration_s)
+    return law.solver.simulate(TwoMassParameters.from_fit(fitted), own, duration_s)
 
 
 def extended_point(point: Floats) -> Floats:

@@ -10,8 +10,11 @@ from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_
 from analysis.fitting.search import Fit, nonlinearity_slope_error, range_m
 from analysis.formatting import format_length
 from analysis.identification import Curves, Degree, FittedModel, ModelSelection, residual_share
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
-from analysis.laws.stand_parts import StandModel
+from analysis.laws.stand_parts import SHARED_NAMES, StandModel
+from analysis.motion.stand_motion import StandParameter
 from analysis.preparation.channels import NOISE_FLOOR_M
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.oscillation import DampedCosine, check_friction, damped_cosine, envelope_curvature
@@ -264,16 +267,30 @@ PARAMETER_NAMES = {
     Parameter.PLATE_MASS: "plate_mass_kg",
     Parameter.GRAVITY: "gravity_m_per_s2",
 }
-SIGNED_PARAMETERS = (Parameter.PULLBACK, Parameter.TILT)
+_ODD = (
+    StandParameter.RELEASE_VELOCITY,
+    StandParameter.SPRING_ASYMMETRY,
+    StandParameter.GRADIENT,
+    StandParameter.ASYMMETRY,
+)
+SIGNED_PARAMETERS = (Parameter.PULLBACK, Parameter.TILT, *(PARAMETER_COUNT + place for place in _ODD))
+"""Places of what changes its sign with the direction of the pull."""
 
 
-def named_parameters(parameters: Floats, decay: FreeDecay) -> dict[str, float]:
+def law_places(law: FrictionLaw) -> dict[int, str]:
+    """Places and names of a law's own parameters, those of the stand and the gauges among them."""
+    names = [own.name for own in law.own]
+    shared = {place: name for place, (name, _) in SHARED_NAMES.items() if place in law.extra}
+    return dict(zip(law.own_places.tolist(), names, strict=True)) | shared
+
+
+def named_parameters(fit: Fit, decay: FreeDecay) -> dict[str, float]:
     """Parameters of the motion by name, in the frame of the record; `release_s` in the record's time."""
     named = {
-        name: float(parameters[place]) * (decay.sign if place in SIGNED_PARAMETERS else 1)
-        for place, name in PARAMETER_NAMES.items()
+        name: float(fit.parameters[place]) * (decay.sign if place in SIGNED_PARAMETERS else 1)
+        for place, name in (PARAMETER_NAMES | law_places(fit.law)).items()
     }
-    return {**named, "release_s": decay.channels.to_record_time(float(parameters[Parameter.RELEASE]))}
+    return {**named, "release_s": decay.channels.to_record_time(fit.value(Parameter.RELEASE))}
 
 
 def fitted_curves(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Callable[[Floats], Curves]:

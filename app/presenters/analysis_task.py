@@ -6,8 +6,8 @@ import numpy as np
 
 from analysis.identification import Identification
 from analysis.identify import warm_up as identify_once
-from analysis.laws.catalogue import fitted_law
-from analysis.motion.two_mass import Motion, TwoMassParameters
+from analysis.laws.stand_parts import model_law, simulate_fit
+from analysis.motion.two_mass import Motion
 from analysis.plate.trends import FrictionBySlip, friction_by_slip
 from analysis.record import Record
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
@@ -132,13 +132,11 @@ def _objective(found: Identification) -> Objective | None:
 
 
 def _motion(found: Identification, record: Record) -> Motion | None:
-    """Fitted motion of both masses; None for one mass, without slip, or for an integrated law."""
+    """Fitted motion of both masses; None for one mass, or without slip."""
     if found.model is None or FRICTION.name not in found.parameters:
         return None
-    if not fitted_law(found.model.name, found.results).solver.is_closed_form:
-        return None
     duration_s = float(record.time_s[-1]) - found.parameters["release_s"]
-    return TwoMassParameters.from_fit(found.parameters).simulate(duration_s)
+    return simulate_fit(model_law(found.model.name, found.model.parts), found.parameters, duration_s)
 
 
 def _kinematics(motion: Motion, found: Identification) -> Kinematics:

@@ -1,10 +1,13 @@
 """Refits from near a minimum: they find it again, keep fixed parameters, and use the record's time."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 from synthetic import CALIBRATED, Truth, simulate_record
 
 from analysis.identify import identify
+from analysis.laws.stand_parts import stand_displacements
 from analysis.record import AnalysisError, StandMasses
 from analysis.refit import Refitter
 
@@ -51,6 +54,28 @@ def test_what_is_held_stays_and_the_others_follow(made, found):
     alone = found.objective(np.array([moved]))[0]
     free = again.refit(found.parameters, model="static+tilt").chi_square
     assert free < held.chi_square < alone
+
+
+def test_a_refit_keeps_the_effects_of_the_stand_in_the_frame_of_the_record():
+    truth = Truth(tilt_rad=1e-3, duration_s=5.0)
+    values = {"friction_gradient_per_m": 10.0}
+    made = simulate_record(truth, stand_displacements(truth.parameters(), values, 5.1))
+    turned = made.replace(
+        table_displacement_m=-made.table_displacement_m, relative_displacement_m=-made.relative_displacement_m
+    )
+    start = asdict(truth.parameters()) | {"release_s": 1.0003, "friction_static": 0.1}
+    mirrored = {name: -start[name] for name in ("pullback_m", "tilt_rad")}
+
+    found = [
+        Refitter(record).refit(
+            near | {"friction_gradient_per_m": gradient}, model="coulomb+tilt", parts=["gradient"]
+        )
+        for record, near, gradient in ((made, start, 9.0), (turned, start | mirrored, -9.0))
+    ]
+
+    for again, gradient in zip(found, (10.0, -10.0), strict=True):
+        assert again.parameters["friction_gradient_per_m"] == pytest.approx(gradient, rel=0.02)
+        assert again.rms_m == pytest.approx(truth.noise_m, rel=0.05)
 
 
 def test_a_table_pushed_the_other_way_is_refitted_in_its_own_frame():

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from analysis.campaign.contacts import ContactFriction
 from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, Unit, definition
 from analysis.identification import Identification
-from analysis.laws.catalogue import fitted_law
-from analysis.motion.two_mass import Motion, MotionSamples, TwoMassParameters
+from analysis.laws.stand_parts import model_law, simulate_fit
+from analysis.motion.two_mass import Motion, MotionSamples
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import Quantity
 from analysis.record import Record
@@ -94,9 +94,8 @@ def _fitted_motion(record: Record, found: Identification) -> Motion | None:
     if found.model is None or "release_s" not in found.parameters:
         return None
     duration_s = float(record.time_s[-1]) - found.parameters["release_s"]
-    law = fitted_law(found.model.name, found.results)
-    own = [found.results[parameter.name].value for parameter in law.own]
-    return law.solver.simulate(TwoMassParameters.from_fit(found.parameters), own, duration_s)
+    law = model_law(found.model.name, found.model.parts)
+    return simulate_fit(law, found.parameters, duration_s)
 
 
 def _times(motion: Motion, first_s: float, last_s: float, period_s: float) -> Floats:

@@ -8,8 +8,8 @@ from reports_kit import truth_of
 
 from analysis.identification import Events, Identification, ModelSelection
 from analysis.identify import identify
+from analysis.laws.stand_parts import stand_displacements
 from analysis.laws.stribeck import STRIBECK_TILT
-from analysis.quantities import Quantity
 from analysis.synthetic import simulate_record
 from app.reports.figures.plate_figures import PLATE_FIGURES
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
@@ -130,13 +130,12 @@ def test_run_without_gauge_2_shows_the_simulated_slip():
 
 
 def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
-    parameters = {**dataclasses.asdict(truth_of(friction_static=0.12).parameters()), "release_s": 1.0}
-    speed = Quantity.normal(0.005, 1e-4, "m/s")
+    own = {"release_s": 1.0, "stribeck_velocity_m_per_s": 0.005}
     found = Identification(
         "two-mass",
-        {"stribeck_velocity_m_per_s": speed},
+        {},
         model=ModelSelection("stribeck+tilt", adequate=True, residual_rms_m=2e-5, noise_rms_m=2e-5),
-        parameters=parameters,
+        parameters=dataclasses.asdict(truth_of(friction_static=0.12).parameters()) | own,
         events=Events(1.0, 4.0),
     )
     run = RunFigureData.from_identification(made, found)
@@ -144,6 +143,19 @@ def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
     exact = STRIBECK_TILT.solver.simulate(truth_of(friction_static=0.12).parameters(), [0.005], 6.0)
     _, relative = exact.sample_displacements(run.motion.time_s)
     assert run.motion.relative_displacement_m == pytest.approx(relative, abs=1e-9)
+
+
+def test_a_run_of_a_stand_with_effects_is_drawn_with_their_motion():
+    displacements = stand_displacements(TRUTH.parameters(), {"release_ramp_s": 0.01}, 7.0)
+    made = simulate_record(TRUTH, displacements)
+
+    found = identify(made)
+    run = RunFigureData.from_identification(made, found)
+
+    assert found.model.parts == ("release-ramp",)
+    assert found.parameters["release_ramp_s"] == pytest.approx(0.01, abs=5e-4)
+    expected = displacements(run.motion.time_s)[1]
+    assert run.motion.relative_displacement_m == pytest.approx(expected, abs=2e-5)
 
 
 @pytest.mark.parametrize("ending", FORMATS)
