@@ -1,7 +1,9 @@
 """Identification while the motion still dies away: running friction, period and damping.
 
 Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law
-is refined from its last minimum. When no law explains the readings any more, the search is repeated.
+is refined from its last minimum. When no law explains the readings any more, the search is repeated. As long
+as none does, friction comes from the plate alone: on a stand that is not ideal the joint fit is off by more
+than its uncertainty, and a search takes longer than an update may.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +17,7 @@ from analysis.fitting.search import Fit, Search, build_problem, fit_at_minimum, 
 from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
+from analysis.plate.friction import estimate_plate_friction
 from analysis.preparation.channels import Channel, remove_drift
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import DampedCosine, damped_cosine, refit_damped_cosine
@@ -33,8 +36,9 @@ from analysis.uncertainty import ParameterUncertainty
 _FIRST_PERIODS = 1.5
 _READINGS = 1200  # readings a channel for refining; the chosen law then sees all
 _LOST = 1.3  # mean square of the residual over that of the noise from which on the motion was lost
-_AGAIN = 1.1
-"""A search that found no law that fits is not repeated before the record is longer by this factor."""
+_AGAIN = 1.1  # a search is not repeated before the record is longer by this factor ...
+_AFTER_FAILURE = 2.0  # ... where it found no law that fits: on such a stand the next finds none either
+_AGREE_SIGMAS = 3.0  # of the plate alone: a law that is all but adequate is shown where both agree so well
 _STEPS = 3
 _ANEW_S = 0.5  # interval of full analyses once slip has ended; between them the chosen law is refined
 _SAME_START = 0.1  # tails that begin so close, in periods, are one
@@ -53,9 +57,10 @@ class LiveState:
     """In the record's time; the slip end as fitted, None while the plate still slips."""
     slip_end_s: float | None = None
     law: str | None = None  # likeliest law so far
-    friction_dynamic: Quantity | None = None
+    friction_dynamic: Quantity | None = None  # of the joint fit, once a law explains the readings
     period_s: Quantity | None = None
     damping_n1_per_s: Quantity | None = None
+    friction_dynamic_plate: Quantity | None = None  # from the plate alone, before that
     narrowing: tuple[str, ...] = (FRICTION, PERIOD, DAMPING)
     """Which of these three readings until 20 s after the release would still narrow by more than a twentieth
     of their standard uncertainty (`analysis.live`)."""
@@ -71,19 +76,23 @@ class LiveIdentification:
     def __init__(self) -> None:
         self._minima: dict[FrictionLaw, Floats] = {}
         self._searched_s = 0.0
+        self._failed_s = 0.0
+        """Length of the record, after the release, when a search last found no law that fits."""
         self._last: _LiveFit | None = None
+        self._by_plate: LiveState | None = None  # the last without an adequate law, where slip had ended
 
     def update(self, record: Record) -> LiveState:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
         record = average_record(record)
         try:
-            known = self._refine(record, now_s) or self._analyse_again(record, now_s)
+            known = self._refine(record, now_s) or self._repeat(now_s) or self._analyse_again(record, now_s)
         except (RecordError, np.linalg.LinAlgError):  # half a record may be anything
             return LiveState(now_s)
         if isinstance(known, LiveState):
+            self._last = None
             return known
-        self._last = known
+        self._last, self._by_plate = known, None
         return known.state
 
     def _refine(self, record: Record, now_s: float) -> "_LiveFit | None":
@@ -108,6 +117,32 @@ class LiveIdentification:
         )
         return replace(known, state=state, anew_s=last.anew_s)
 
+    def _repeat(self, now_s: float) -> LiveState | None:
+        """Repeat what the plate alone said after its last slip; None when a full analysis is due."""
+        known = self._by_plate
+        return known and (replace(known, time_s=now_s) if now_s < known.time_s + _ANEW_S else None)
+
+    def _analyse_by_plate(self, record: Record, decay: FreeDecay, now_s: float) -> LiveState:
+        """What is known without an adequate law: friction from the plate alone, and the tail."""
+        plate = estimate_plate_friction(record, decay)
+        friction = None
+        if plate is not None:
+            friction = Quantity.normal(plate.friction_dynamic, plate.standard_uncertainty, "1")
+        to_record = decay.channels.to_record_time
+        period, damping = None, None
+        if decay.tail is not None:
+            period, damping = _period_and_damping(constants_from_tail(record, decay))
+        state = LiveState(
+            now_s,
+            to_record(decay.release.time_s),
+            None if decay.slip_end_s is None or decay.tail is None else to_record(decay.slip_end_s),
+            friction_dynamic_plate=friction,
+            period_s=period,
+            damping_n1_per_s=damping,
+        )
+        self._by_plate = None if decay.tail is None else state
+        return state
+
     def _analyse_again(self, record: Record, now_s: float) -> "_LiveFit | LiveState":
         """Analyse the whole record again, as if it were complete."""
         decay = prepare(record)
@@ -117,14 +152,22 @@ class LiveIdentification:
             return LiveState(now_s, release_s)
         if not decay.slips:
             return _without_slip(now_s, release_s, record, decay)
+        if since_s < _AFTER_FAILURE * self._failed_s:
+            return self._analyse_by_plate(record, decay, now_s)
         problem = build_problem(record, decay)
         candidates = identifiable_fits(self._fit_laws(record, decay, problem, since_s))
         best = min(candidates, key=lambda fit: fit.bic)
         chosen = fit_at_minimum(problem, best.law, problem.minimise(best.parameters, best.law, _STEPS))
         self._minima[chosen.law] = chosen.parameters
+        if not _explains(problem, chosen) and self._searched_s == since_s:
+            self._failed_s = since_s
+        judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
+        if not judged.adequate:
+            by_plate = self._analyse_by_plate(record, decay, now_s)
+            if not (_explains(problem, chosen) and _agree(chosen, by_plate.friction_dynamic_plate)):
+                return by_plate
         known = _known(now_s, record, decay, problem, chosen, None)
         narrowing = _narrowing(known, problem)
-        judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
         state = replace(
             known.state,
             narrowing=narrowing,
@@ -294,6 +337,14 @@ def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:
 
 def _explains(problem: FitProblem, fit: Fit) -> bool:
     return fit.chi_square < _LOST * problem.sample_count
+
+
+def _agree(fit: Fit, plate: Quantity | None) -> bool:
+    """Whether the plate alone does not contradict a fit."""
+    if plate is None:
+        return True
+    difference = fit.value(Parameter.FRICTION_DYNAMIC) - plate.value
+    return abs(difference) < _AGREE_SIGMAS * plate.standard_uncertainty
 
 
 def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:

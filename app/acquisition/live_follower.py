@@ -115,4 +115,5 @@ def result_of(state: LiveState, origin_s: float) -> LiveResult:
         narrowing=state.narrowing,
         may_stop=state.may_stop,
         is_enough=state.is_enough,
+        friction_dynamic_plate=state.friction_dynamic_plate,
     )

@@ -221,6 +221,7 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     narrowing: tuple[str, ...] = ()  # quantities that waiting longer would still narrow
     may_stop: bool = False  # waiting longer does not narrow f_d
     is_enough: bool = False  # nor T, nor n1: a run without a set duration ends now
+    friction_dynamic_plate: Quantity | None = None  # before the joint fit gives f_d
     message: Message = EMPTY  # why there are no more of these, where something went wrong
 
 

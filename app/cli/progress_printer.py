@@ -161,6 +161,7 @@ def result_text(result: LiveResult) -> str:
         ("period_s", result.period),
         ("damping_n1_per_s", result.damping_n1),
         ("friction_dynamic", result.friction_dynamic),
+        ("friction_dynamic_plate", result.friction_dynamic_plate),
     )
     text = "  ".join(_value_text(name, value) for name, value in values if value and is_known(value))
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text

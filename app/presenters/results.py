@@ -48,6 +48,7 @@ class Result:
 
 
 FRICTION = definition("friction_dynamic")
+PLATE_FRICTION = definition("friction_dynamic_plate")
 STATIC_LOWER = definition("friction_static_lower")
 MAIN = (definition("period_s"), definition("damping_n1_per_s"))
 _ALL = (FRICTION, *MAIN, *(row for row in CATALOGUE if not row.is_minor and row not in (FRICTION, *MAIN)))

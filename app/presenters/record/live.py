@@ -17,7 +17,7 @@ from app.presenters import number_text, results
 from app.presenters.base import Chip, Tone
 from app.presenters.decimated_history import DecimatedHistory, Polyline
 from app.presenters.record.state import LiveEstimate, LiveReadings, Span, TraceMarks, Traces
-from app.presenters.results import FRICTION, MAIN
+from app.presenters.results import FRICTION, MAIN, PLATE_FRICTION
 from config.schema import Gauge, Gauges
 from drivers.samples import SampleStatus
 from messages.i18n import gettext
@@ -254,10 +254,10 @@ def live_estimate(result: LiveResult) -> LiveEstimate:
     """Rows of T, n1 and f_d as far as they are known, and whether waiting still narrows them."""
     if result.message:
         return LiveEstimate(note=results.sentence(result.message))
-    values = (result.period, result.damping_n1, result.friction_dynamic)
+    values = (result.period, result.damping_n1, result.friction_dynamic, result.friction_dynamic_plate)
     rows = tuple(
         results.make_row(shown, value)
-        for shown, value in zip((*MAIN, FRICTION), values, strict=True)
+        for shown, value in zip((*MAIN, FRICTION, PLATE_FRICTION), values, strict=True)
         if value is not None and is_known(value)
     )
     return LiveEstimate(rows, _stop_note(result) if result.may_stop else "")

@@ -31,6 +31,9 @@ def test_what_is_known_is_one_line():
 
 
 def test_when_to_stop_is_said():
+    by_plate = LiveResult(1.0, friction_dynamic_plate=KNOWN.friction_dynamic)
+    assert result_text(by_plate).startswith("f_dp = 0.1")
+
     stop = LiveResult(5.0, friction_dynamic=KNOWN.friction_dynamic, may_stop=True)
     assert result_text(stop) == "f_d = 0.10003 ± 0.00021  (waiting does not narrow f_d)"
 

@@ -27,6 +27,12 @@ def test_what_is_not_known_yet_is_not_shown() -> None:
     assert row.symbol == "T"
 
 
+def test_friction_comes_from_the_plate_alone_before_the_joint_fit_gives_it() -> None:
+    (row,) = live_estimate(LiveResult(2.0, friction_dynamic_plate=FRICTION)).rows
+    assert row.name == "dynamic friction, from the plate alone"
+    assert (row.value, row.uncertainty_text) == ("0.10030", "± 0.00090")
+
+
 def test_a_first_guess_is_not_shown() -> None:
     guess = Quantity.normal(0.002, 0.046, "s")
     (row,) = live_estimate(LiveResult(2.0, period=guess, friction_dynamic=FRICTION)).rows
