@@ -234,6 +234,12 @@ class FitProblem:
         table, relative = self.residuals(parameters, law)
         return float(table @ table / self.noise_m[0] ** 2 + relative @ relative / self.noise_m[1] ** 2)
 
+    def cost(self, parameters: Floats, law: FrictionLaw) -> float:
+        """Chi-square of the readings and of what is known beforehand."""
+        informed = (self.prior_deviation > 0.0) & np.isfinite(self.prior_deviation)
+        away = (parameters - self.prior_mean)[informed] / self.prior_deviation[informed]
+        return self.chi_square(parameters, law) + float(away @ away)
+
     def chi_squares(self, points: Floats, *, fit_zero: bool = False) -> Floats:
         """Chi-square of points (m, p) of laws in closed form; gauge 2's zero at its best if `fit_zero`."""
         return (chi_squares_with_fitted_zero if fit_zero else chi_squares)(points, self.readings)

@@ -32,8 +32,12 @@ _WINDOWS_PERIODS = (2.5, 6.0, 12.0)  # after the release; then the whole record
 _READINGS = 500  # a channel in a window: as many as searches for friction laws take
 _READINGS_WHOLE = 1500  # a channel of the whole record
 _EFFECTS_MOST = 4  # that explain one record: more would explain anything
-_TRIED = 4  # effects that are fitted of those that promise most
-_ALWAYS_TRIED = ("release-ramp",)  # chi-square is far from a parabola about a sudden release
+_TRIED = 3  # effects that are fitted of those that promise most
+_FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
+_BASE_HARMONICS = (2.5, 5.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
+_SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
+_EFFORT_MAX = 60_000.0
+"""Periods of motion that are simulated before a search ends with what it has: 1.5 s of a core."""
 _PROMISE_MIN = 10.0
 """Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
@@ -47,7 +51,6 @@ _FOLLOWED_BIC = 2000.0  # above the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
-_STATIC_STARTS = 2  # of them that are refined
 _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 """Places in a point of a `StandModel`."""
 _LOWEST_MODE, _HIGHEST_MODE = 0.3, 30.0  # of second modes that are looked for, over the first frequency
@@ -81,8 +84,8 @@ class StandSearch:
         self._release_s = ideal.value(Parameter.RELEASE)
         self.problem = extended_problem(search.problem)
         self._informed = _with_wide_priors(extended_problem(search.informed_problem))
-        residual = Channel(search.problem.table.time_s, ideal.table_residual_m)
-        self._second_frequency_hz = _strongest_frequency(residual, self._release_s, self._period_s)
+        self._ideal_residual = Channel(search.problem.table.time_s, ideal.table_residual_m)
+        self._effort = 0.0  # simulated periods of all motions so far
 
     def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> tuple[Fit, FitProblem]:
         """Fit the law with the effects that the record shows, from points (p,) of an ideal stand.
@@ -122,6 +125,8 @@ class StandSearch:
         while not is_enough(window, trials[0]):
             best = trials[0]
             for trial in trials[:]:
+                if self._effort > _EFFORT_MAX:
+                    return trials
                 if trial.names not in extended and len(trial.model.effects) < _EFFECTS_MOST:
                     extended.add(trial.names)
                     trials += self._extensions(window, trial)
@@ -137,6 +142,7 @@ class StandSearch:
         model = compose(self._law, effects)
         opened = _open_shared(window, model)
         minimum = opened.minimise(point, model, steps)
+        self._effort += minimum.steps * len(opened.free_parameters(model)) * self._periods(window)
         parameter_count = len(opened.model_parameters(model))
         bic = minimum.cost + parameter_count * float(np.log(opened.sample_count))
         return _Trial(model, minimum, bic + sum(effect.rarity for effect in effects))
@@ -151,35 +157,70 @@ class StandSearch:
             and (not effect.needs or effect.needs in present)
             and not set(effect.shared) & set(self._law.extra)
         ]
-        promises = self._promises(window, trial, candidates)
-        tried = sorted(candidates, key=lambda effect: -promises[effect.name])[:_TRIED]
-        tried = [effect for effect in tried if promises[effect.name] > _PROMISE_MIN]
-        tried += [effect for effect in candidates if effect.name in _ALWAYS_TRIED and effect not in tried]
         found = []
-        for effect in tried:
-            effects = (*trial.model.effects, effect)
-            starts = self._starts(window, effect, trial)
-            tries = [self._trial(window, effects, start, _STEPS_TRIAL) for start in starts]
-            best = min(tries, key=_bic_of)
-            if best.bic < trial.bic - _EVIDENCE_MIN:
-                found.append(self._trial(window, effects, best.point))
+        for effect, start in self._promising(window, trial, candidates)[:_TRIED]:
+            better = self._trial(window, (*trial.model.effects, effect), start, _STEPS_TRIAL)
+            if better.bic < trial.bic - _EVIDENCE_MIN:
+                found.append(better)
         return found
 
+    def _promising(
+        self, window: FitProblem, trial: _Trial, candidates: list[StandEffect]
+    ) -> list[tuple[StandEffect, Floats]]:
+        """Effects that lower the BIC, the best first, with the point of each from which to fit."""
+        ranked: list[tuple[float, StandEffect, Floats]] = []
+        linear = [effect for effect in candidates if not set(effect.own) & set(_FREQUENCIES)]
+        moved = self._linear_points(window, trial, linear)
+        for effect in candidates:
+            if effect in linear:
+                starts = moved[effect.name] + self._starts(window, effect, trial)
+            else:
+                starts = [
+                    point
+                    for frequency_hz in self._frequencies(window, trial, effect)
+                    for point in self._linear_points(window, trial, [effect], frequency_hz)[effect.name]
+                ]
+            if starts:
+                model = compose(self._law, (*trial.model.effects, effect))
+                costs = [_open_shared(window, model).cost(start, model) for start in starts]
+                self._effort += len(starts) * self._periods(window)
+                least = int(np.argmin(costs))
+                ranked.append((costs[least] + self._price(window, effect), effect, starts[least]))
+        ranked.sort(key=lambda one: one[0])
+        return [(effect, start) for _, effect, start in ranked]
+
+    def _frequencies(self, window: FitProblem, trial: _Trial, effect: StandEffect) -> list[float]:
+        """Frequencies (Hz) that the second oscillator of an effect may have."""
+        if StandParameter.MODE_FREQUENCY not in effect.own:
+            return [harmonic / self._period_s for harmonic in _BASE_HARMONICS]
+        residual, _ = window.residuals(trial.point, trial.model)
+        shown = Channel(window.table.time_s, residual), self._ideal_residual
+        found = [
+            frequency_hz
+            for channel in shown
+            for frequency_hz in _strongest_frequencies(channel, self._release_s, self._period_s)
+        ]
+        return list(dict.fromkeys(round(frequency_hz, 1) for frequency_hz in found))
+
+    def _price(self, window: FitProblem, effect: StandEffect) -> float:
+        count = len(effect.own) + len(effect.shared)
+        return count * float(np.log(window.sample_count)) + effect.rarity
+
+    def _periods(self, window: FitProblem) -> float:
+        return float(window.table.time_s[-1] - self._release_s) / self._period_s
+
     def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
-        """Points from which the fit of one effect more begins."""
+        """Points to begin the fit of one effect more from, where a linear step may not lead to the right one."""
         point = trial.point.copy()
-        if StandParameter.MODE_FREQUENCY in effect.own:
-            point[_PLACES[StandParameter.MODE_FREQUENCY]] = self._second_frequency_hz
-            point[[_PLACES[StandParameter.MODE_MASS], _PLACES[StandParameter.MODE_DAMPING]]] = 0.01
-            return [point]
         if effect is STATIC_FRICTION:
             model = compose(self._law, (*trial.model.effects, effect))
             points = np.tile(point, (len(_STATIC_RATIOS), 1))
             points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * point[Parameter.FRICTION_DYNAMIC]
             costs = [window.chi_square(one, model) for one in points]
-            return [points[index] for index in np.argsort(costs)[:_STATIC_STARTS]]
+            self._effort += len(points) * self._periods(window)
+            return [points[int(np.argmin(costs))]]
         starts = []
-        for probe in effect.probes or ((0.0,) * len(effect.own),):
+        for probe in effect.probes:
             starts.append(point.copy())
             starts[-1][[_PLACES[place] for place in effect.own]] = probe
         return starts
@@ -198,33 +239,37 @@ class StandSearch:
                 trial = without
         return trial
 
-    def _promises(self, window: FitProblem, trial: _Trial, candidates: list[StandEffect]) -> dict[str, float]:
-        """Fall of the BIC that a linear motion about the trial would give each of the effects."""
+    def _linear_points(
+        self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
+    ) -> dict[str, list[Floats]]:
+        """Where a motion linear about the trial has its minimum with each of the effects, if the BIC falls."""
         point = trial.point.copy()
-        modes = [effect for effect in candidates if StandParameter.MODE_FREQUENCY in effect.own]
-        if modes:
-            point[_PLACES[StandParameter.MODE_FREQUENCY]] = self._second_frequency_hz
-            point[_PLACES[StandParameter.MODE_DAMPING]] = 0.01
+        fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
+        point[fixed] = frequency_hz
         model = compose(self._law, (*trial.model.effects, *candidates))
         opened = _open_shared(window, model)
         free = opened.free_parameters(model)
-        fixed = {StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING} if modes else set()
-        free = free[~np.isin(free, [_PLACES[place] for place in fixed])]
-        base = set(trial.model.free_parameters) | set(window.free_parameters(trial.model).tolist())
+        free = free[~np.isin(free, [*fixed, *(_PLACES[place] for place in _SECOND_ORDER)])]
+        base = set(window.free_parameters(trial.model).tolist())
         quadratic = GaussNewton(opened, model, free).evaluate(point)
+        self._effort += len(free) * self._periods(window)
         own = np.array([place in base for place in free.tolist()])
         inverse, _ = covariance(quadratic.normal[np.ix_(own, own)])
-        found = {}
+        points: dict[str, list[Floats]] = {}
         for effect in candidates:
-            places = [_PLACES[place] for place in effect.own if place not in fixed]
-            places += [int(place) for place in effect.shared]
-            mine = np.isin(free, places)
+            mine = np.isin(free, [*(_PLACES[place] for place in effect.own), *effect.shared])
             cross = quadratic.normal[np.ix_(mine, own)]
             left = quadratic.normal[np.ix_(mine, mine)] - cross @ inverse @ cross.T
             pull = quadratic.descent[mine] - cross @ inverse @ quadratic.descent[own]
-            gain = float(pull @ np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull)
-            found[effect.name] = gain - len(effect.own + effect.shared) * float(np.log(window.sample_count))
-        return found
+            amount = np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull
+            points[effect.name] = []
+            if float(pull @ amount) - self._price(window, effect) > _PROMISE_MIN:
+                moved = point.copy()
+                moved[free[mine]] += amount
+                moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ amount)
+                compose(self._law, (*trial.model.effects, effect)).apply_bounds(moved)
+                points[effect.name].append(moved)
+        return points
 
     def _finish(self, trial: _Trial) -> Fit:
         problem = _open_shared(self.problem, trial.model)
@@ -294,15 +339,15 @@ def _bic_of(trial: _Trial) -> float:
     return trial.bic
 
 
-def _strongest_frequency(channel: Channel, release_s: float, period_s: float) -> float:
-    """Frequency (Hz) of the strongest line in the spectrum of `channel` away from the fundamental."""
+def _strongest_frequencies(channel: Channel, release_s: float, period_s: float) -> list[float]:
+    """Frequencies (Hz) of the strongest lines away from the fundamental, of displacement and of velocity."""
     after = channel.between(release_s, np.inf)
     count = len(after)
     time_s, step_s = np.linspace(after.time_s[0], after.time_s[-1], count, retstep=True)
     value_m = np.interp(time_s, after.time_s, after.value_m)
     frequencies = np.fft.rfftfreq(4 * count, step_s)
-    power = np.abs(np.fft.rfft((value_m - value_m.mean()) * np.hanning(count), 4 * count))
+    power = np.abs(np.fft.rfft((value_m - value_m.mean()) * np.hanning(2 * count)[count:], 4 * count))
     harmonics = frequencies * period_s
     power[(np.abs(harmonics - 1.0) < _FUNDAMENTAL) | (harmonics < _LOWEST_MODE)] = 0.0
     power[harmonics > _HIGHEST_MODE] = 0.0
-    return float(frequencies[np.argmax(power)])
+    return [float(frequencies[np.argmax(power * frequencies**order)]) for order in (0, 1)]

@@ -62,6 +62,11 @@ STAND_PARAMETERS = {
     StandParameter.BEND_1: OwnParameter("gauge_1_bend", "1", 0.0, -0.2, 0.2),
     StandParameter.BEND_2: OwnParameter("gauge_2_bend", "1", 0.0, -0.2, 0.2),
     StandParameter.CROSS_TALK: OwnParameter("cross_talk", "1", 0.0, -0.2, 0.2),
+    StandParameter.SQUARE_1: OwnParameter("gauge_1_square", "1", 0.0, -0.2, 0.2),
+    StandParameter.SQUARE_2: OwnParameter("gauge_2_square", "1", 0.0, -0.2, 0.2),
+    StandParameter.CROSS_TALK_1: OwnParameter("cross_talk_1", "1", 0.0, -0.2, 0.2),
+    StandParameter.BASE_COMPLIANCE: OwnParameter("base_compliance", "1", 0.0, 0.0, 0.3),
+    StandParameter.BASE_FREQUENCY: OwnParameter("base_frequency_hz", "Hz", 0.0, 2.0, 100.0),
     StandParameter.FILTER_DAMPING: OwnParameter("filter_damping", "1", 0.0, -0.4, 1.0),
 }
 """Names, units and bounds; at zero the stand is ideal. The bounds are beyond what a stand that still serves
@@ -109,15 +114,20 @@ EFFECTS = (
         (StandParameter.MODE_MASS, StandParameter.MODE_FREQUENCY, StandParameter.MODE_DAMPING),
         bends_tail=True,
     ),
+    StandEffect(
+        "base",
+        (StandParameter.BASE_COMPLIANCE, StandParameter.BASE_FREQUENCY),
+        bends_tail=True,
+    ),
     StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE, varies_friction=True),
     StandEffect("gradient", (StandParameter.GRADIENT,), varies_friction=True),
     StandEffect("wear", (StandParameter.WEAR,), varies_friction=True),
     StandEffect("filter", (StandParameter.FILTER,)),
     StandEffect("filter-damping", (StandParameter.FILTER_DAMPING,), needs="filter", rarity=_RARE),
     StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE),
-    StandEffect("gauge-1-bend", (StandParameter.BEND_1,), rarity=_RARE),
-    StandEffect("gauge-2-bend", (StandParameter.BEND_2,), rarity=_RARE),
-    StandEffect("cross-talk", (StandParameter.CROSS_TALK,), rarity=_RARE),
+    StandEffect("gauge-1-bend", (StandParameter.SQUARE_1, StandParameter.BEND_1), rarity=_RARE),
+    StandEffect("gauge-2-bend", (StandParameter.SQUARE_2, StandParameter.BEND_2), rarity=_RARE),
+    StandEffect("cross-talk", (StandParameter.CROSS_TALK, StandParameter.CROSS_TALK_1), rarity=_RARE),
 )
 
 

@@ -57,6 +57,11 @@ class StandParameter(IntEnum):
     BEND_2 = 22  # the same of gauge 2
     CROSS_TALK = 23  # share of u1 in the readings of gauge 2
     FILTER_DAMPING = 24  # damping ratio of the filters less 1
+    SQUARE_1 = 25  # relative deviation of gauge 1 from a line at the pullback, even in the displacement
+    SQUARE_2 = 26  # the same of gauge 2
+    CROSS_TALK_1 = 27  # share of u2 - u1 in the readings of gauge 1
+    BASE_COMPLIANCE = 28  # stiffness of the springs over that under the base
+    BASE_FREQUENCY = 29  # own frequency of the base (Hz)
 
 
 STAND_PARAMETER_COUNT = len(StandParameter)
@@ -86,15 +91,21 @@ STAND_PARAMETER_COUNT = len(StandParameter)
     BEND_2,
     CROSS_TALK,
     FILTER_DAMPING,
+    SQUARE_1,
+    SQUARE_2,
+    CROSS_TALK_1,
+    BASE_COMPLIANCE,
+    BASE_FREQUENCY,
 ) = range(STAND_PARAMETER_COUNT)
 """The same places for compiled functions, which take no enumerations."""
 
 _LOGARITHMIC_VELOCITY_M_PER_S = 1e-3  # unit of the logarithm: slips of the stands reach some 100 mm/s
 _HELD_S = 60.0  # before the release: the time in which an operator pulls and waits
 _DWELL_S = 0.1  # unit of the logarithm: sticks last some tenths of a second
-_STEP_RAD = 0.1  # of the slipping table's motion: local errors of 1e-7 of the swing
+_BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
+_STEP_RAD = 0.14  # of the slipping table's motion: local errors of 1e-7 of the swing
 _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
-_REVERSAL_SHARE = 1e-3
+_REVERSAL_SHARE = 3e-4
 """Speed below which friction of the stand is proportional to speed, over the largest speed of the table."""
 _STIFF = 0.5  # largest share of that speed by which friction of the stand changes it in one step
 _NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
@@ -105,7 +116,10 @@ _ESCAPE, _ESCAPE_M = 10.0, 0.1
 TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE = range(7)
 """Columns of a node: time since release, u1 with its derivatives, and u2 - u1 with its derivatives."""
 FIRST_NODE = 5  # column of a phase beside those of `events`: row of its first node
-_STATE = 6  # u1, u1', u2' - u1', u2 - u1, and the second mode's displacement on the table and its velocity
+_STATE = 8
+"""u1, u1', u2' - u1', u2 - u1, then displacement and velocity of the second mode on the table and of the
+base."""
+_PLAIN = 4  # of them without second mode and moving base
 
 
 @compiled_part
@@ -183,7 +197,15 @@ def slope(
         inertia = table + both * arc * arc * u * u - plate * friction * arc * u
         acceleration = (force + plate * load) / inertia
         rate = -load - friction * arc * u * acceleration - acceleration
-    out[0], out[1], out[2], out[3] = v, acceleration, rate, slip
+    base = 0.0
+    if parts[BASE_COMPLIANCE] != 0.0:
+        w = 2.0 * math.pi * parts[BASE_FREQUENCY]
+        mass = parameters[STIFFNESS] / (parts[BASE_COMPLIANCE] * w * w)
+        base = -force / mass - w * w * state[6] - 2.0 * _BASE_DAMPING * w * state[7]
+        out[6] = state[7]
+    else:
+        out[6] = 0.0
+    out[0], out[1], out[2], out[3], out[7] = v, acceleration - base, rate, slip, base
     if parts[MODE_MASS] != 0.0:
         w = 2.0 * math.pi * parts[MODE_FREQUENCY]
         out[4] = state[5]
@@ -205,18 +227,22 @@ def _step(
     trial: Floats,
     slopes: Floats,
     step: float,
+    size: int,
 ) -> None:
-    """Write the state after `step` into `trial`; `slopes` (5, n) holds the first slope in row 0."""
-    for i in range(_STATE):
+    """Write the state after `step` into `trial`; `slopes` (5, n) holds the first slope in row 0.
+
+    `size` is how many of the state's values move.
+    """
+    for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[0, i]
     slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[1])
-    for i in range(_STATE):
+    for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[1, i]
     slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[2])
-    for i in range(_STATE):
+    for i in range(size):
         trial[i] = state[i] + step * slopes[2, i]
     slope(parameters, parts, sign, time + step, path, reversal, trial, slopes[3])
-    for i in range(_STATE):
+    for i in range(size):
         rise = slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]
         trial[i] = state[i] + step / 6.0 * rise
 
@@ -236,7 +262,7 @@ def demand(
     Overwrites `rates`.
     """
     vertical = slope(parameters, parts, 0.0, time, 0.0, reversal, state, rates)
-    wanted = rates[1] - parameters[GRAVITY] * parameters[TILT]
+    wanted = rates[1] + rates[7] - parameters[GRAVITY] * parameters[TILT]
     direction = -1.0 if wanted > 0.0 else 1.0
     static = max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
     if parts[DWELL] != 0.0:
@@ -253,13 +279,16 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     parts = parameters[len(parameters) - STAND_PARAMETER_COUNT :]
     frequency = math.sqrt(parameters[STIFFNESS] / parameters[TABLE_MASS])
     longest = _STEP_RAD / frequency
+    size = _STATE if parts[MODE_MASS] != 0.0 or parts[BASE_COMPLIANCE] != 0.0 else _PLAIN
+    if parts[BASE_COMPLIANCE] != 0.0:
+        longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[BASE_FREQUENCY]))
     if parts[MODE_MASS] != 0.0:
         longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[MODE_FREQUENCY]))
     pull = abs(parameters[PULLBACK])
     dry = (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * pull) * frequency * frequency
     reversal = max(_REVERSAL_SHARE * frequency * pull, longest * abs(dry) / _STIFF, 1e-9)
     phases, nodes = np.empty((64, 6)), np.empty((2 * int(duration_s / longest) + 256, 7))
-    state, trial, slopes = np.zeros(_STATE), np.empty(_STATE), np.empty((5, _STATE))
+    state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
     excess, direction = demand(parameters, parts, 0.0, _HELD_S, 0.0, reversal, state, slopes[4])
@@ -278,7 +307,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
         step = min(longest, duration_s - time)
         if time < parts[RAMP]:
             step = min(step, max(parts[RAMP] - time, 1e-9))
-        _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+        _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
         last = _event(
             parameters, parts, sign, time + step, time + step - began, path, reversal, trial, slopes[4]
         )
@@ -286,7 +315,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
             if sign != 0.0 and state[2] * sign <= 0.0:
                 for _ in range(_GRAZING_DIVISIONS):
                     step *= 0.25
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
                     last = -sign * trial[2]
                     if last < 0.0:
                         break
@@ -301,7 +330,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                     step = high - (high - low) * high_value / (high_value - low_value)
                     if not low < step < high:
                         step = 0.5 * (low + high)
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
                     value = _event(
                         parameters,
                         parts,
@@ -321,13 +350,13 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                         break
                 if high - step > 0.0 and step == low:
                     step = high
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step)
+                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
                 new_phase = True
         unchecked = False
         time += step
         if sign != 0.0:
             path += sign * (trial[3] - state[3])
-        for i in range(_STATE):
+        for i in range(size):
             state[i] = trial[i]
         slope(parameters, parts, sign, time, path - sign * state[3], reversal, state, slopes[0])
         nodes = _append_node(nodes, node, time, state, slopes[0])
@@ -474,9 +503,15 @@ def gauge_readings(
         table, relative = (_low_pass(row, constants[0], damping, step_s) for row in moved)
         relative = _low_pass(relative, constants[1], damping, step_s)
         read = np.stack([np.interp(times_s, grid, row) for row in (table, relative)])
-    read[1] += parts[CROSS_TALK] * (read[0] - vector[PULLBACK])
-    bends = parts[BEND_1 : BEND_2 + 1, None]
-    return read if not bends.any() else read + bends * read**3 / pull**2
+    if parts[CROSS_TALK] != 0.0 or parts[CROSS_TALK_1] != 0.0:
+        mixing = np.array([[1.0, parts[CROSS_TALK_1]], [parts[CROSS_TALK], 1.0]])
+        read = mixing @ read
+        read[1] -= parts[CROSS_TALK] * vector[PULLBACK]
+    bends, squares = parts[BEND_1 : BEND_2 + 1, None], parts[SQUARE_1 : SQUARE_2 + 1, None]
+    if bends.any() or squares.any():
+        share = read / pull
+        read = read * (1.0 + (squares + bends * share) * share)
+    return read
 
 
 @compiled

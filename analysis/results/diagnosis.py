@@ -43,11 +43,16 @@ SENTENCES = {
     "gauge-2-filter": N_("a filter of {size} before gauge 2 rounds its readings: raise its corner."),
     "gauge-1-bend": N_("gauge 1 is bent by {size} at the pullback: calibrate it over its whole range."),
     "gauge-2-bend": N_("gauge 2 is bent by {size} at the pullback: calibrate it over its whole range."),
-    "cross-talk": N_("gauge 2 shows {size} of gauge 1: separate their cables, and check their mounting."),
+    "cross-talk": N_(
+        "a gauge shows {size} of the other one: separate their cables, and check their mounting."
+    ),
+    "base": N_("the base gives way by {size} of what the springs do: fix it to the ground."),
     "filter-damping": "",
     "static-friction": "",
 }
 """By name of the effect, which is the code of the warning; those without one are told by other results."""
+
+_SAME_KIND = ("gauge-1-bend", "gauge-2-bend", "cross-talk")  # the larger of their two parameters is told
 
 
 def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> list[ResultWarning]:
@@ -58,11 +63,15 @@ def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> 
         names += [SHARED_NAMES[place][0] for place in effect.shared if place in SHARED_NAMES]
         shown = {name: _text(results, CORNER_NAMES.get(name, name)) for name in names}
         if SENTENCES[effect.name] and all(shown.values()):
-            values = {"size": shown[names[0]]}
+            values = {"size": shown[_largest(names, results) if effect.name in _SAME_KIND else names[0]]}
             if "second_mode_frequency_hz" in shown:
                 values["frequency"] = shown["second_mode_frequency_hz"]
             warnings.append(result_warning(effect.name, SENTENCES[effect.name], **values))
     return warnings
+
+
+def _largest(names: list[str], results: dict[str, Quantity]) -> str:
+    return max(names, key=lambda name: abs(results[name].value))
 
 
 def _text(results: dict[str, Quantity], name: str) -> str:
