@@ -208,7 +208,7 @@ def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats)
     simple = next(fit for fit in fits if fit.law is FIRST_SLIP_LAW)
     if not simple.determines(Parameter.TILT):
         simple = next(fit for fit in fits if fit.law is COMPARED_LAWS[0])
-    stand = StandSearch(search, simple.law, min(fits, key=lambda fit: fit.bic))
+    stand = StandSearch(search, simple.law, min(fits, key=lambda fit: fit.bic), decay.tail)
     starts = [project_to_bounds(point, simple.law) for point in (start, simple.parameters)]
     return stand.fit(starts, lambda fit: _is_adequate(search.problem, decay, [fit]))
 

@@ -27,6 +27,7 @@ from analysis.laws.stand_parts import (
 )
 from analysis.motion.stand_motion import STAND_PARAMETER_COUNT, StandParameter
 from analysis.preparation.channels import Channel
+from analysis.preparation.oscillation import DampedCosine
 
 _WINDOWS_PERIODS = (2.5, 6.0, 12.0)  # after the release; then the whole record
 _READINGS = 500  # a channel in a window: as many as searches for friction laws take
@@ -34,7 +35,7 @@ _READINGS_WHOLE = 1500  # a channel of the whole record
 _EFFECTS_MOST = 4  # that explain one record: more would explain anything
 _TRIED = 3  # effects that are fitted of those that promise most
 _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
-_BASE_HARMONICS = (2.5, 5.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
+_BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
 _SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
 _EFFORT_MAX = 60_000.0
 """Periods of motion that are simulated before a search ends with what it has: 1.5 s of a core."""
@@ -53,7 +54,8 @@ _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
 _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 """Places in a point of a `StandModel`."""
-_LOWEST_MODE, _HIGHEST_MODE = 0.3, 30.0  # of second modes that are looked for, over the first frequency
+_HIGHEST_MODE = 30.0  # of second modes that are looked for, over the first frequency
+_LINES = 3  # of the residual's spectrum that are tried as second modes
 _FUNDAMENTAL = 0.2  # a second mode differs from the first by this share of its frequency at the least
 
 
@@ -79,12 +81,17 @@ class StandSearch:
     one of those that explain all.
     """
 
-    def __init__(self, search: Search, law: FrictionLaw, ideal: Fit) -> None:
+    def __init__(
+        self, search: Search, law: FrictionLaw, ideal: Fit, tail: DampedCosine | None = None
+    ) -> None:
         self._law, self._period_s, self._slip_end_s = law, search.period_s, search.slip_end_s
         self._release_s = ideal.value(Parameter.RELEASE)
         self.problem = extended_problem(search.problem)
         self._informed = _with_wide_priors(extended_problem(search.informed_problem))
-        self._ideal_residual = Channel(search.problem.table.time_s, ideal.table_residual_m)
+        self._left_by_ideal = [Channel(search.problem.table.time_s, ideal.table_residual_m)]
+        if tail is not None:
+            time_s = np.linspace(tail.start_s, tail.end_s, len(tail.residual_m))
+            self._left_by_ideal.append(Channel(time_s, tail.residual_m))
         self._effort = 0.0  # simulated periods of all motions so far
 
     def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> tuple[Fit, FitProblem]:
@@ -194,12 +201,11 @@ class StandSearch:
         if StandParameter.MODE_FREQUENCY not in effect.own:
             return [harmonic / self._period_s for harmonic in _BASE_HARMONICS]
         residual, _ = window.residuals(trial.point, trial.model)
-        shown = Channel(window.table.time_s, residual), self._ideal_residual
-        found = [
-            frequency_hz
-            for channel in shown
-            for frequency_hz in _strongest_frequencies(channel, self._release_s, self._period_s)
-        ]
+        found = _strongest_frequencies(
+            Channel(window.table.time_s, residual), self._release_s, self._period_s, _LINES
+        )
+        for channel in self._left_by_ideal:
+            found += _strongest_frequencies(channel, self._release_s, self._period_s, 1)
         return list(dict.fromkeys(round(frequency_hz, 1) for frequency_hz in found))
 
     def _price(self, window: FitProblem, effect: StandEffect) -> float:
@@ -210,7 +216,7 @@ class StandSearch:
         return float(window.table.time_s[-1] - self._release_s) / self._period_s
 
     def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
-        """Points to begin the fit of one effect more from, where a linear step may not lead to the right one."""
+        """Points to begin the fit of one effect more from, where a linear step may lead elsewhere."""
         point = trial.point.copy()
         if effect is STATIC_FRICTION:
             model = compose(self._law, (*trial.model.effects, effect))
@@ -242,7 +248,7 @@ class StandSearch:
     def _linear_points(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
     ) -> dict[str, list[Floats]]:
-        """Where a motion linear about the trial has its minimum with each of the effects, if the BIC falls."""
+        """Minimum of a motion linear about the trial with each of the effects, if the BIC falls."""
         point = trial.point.copy()
         fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
         point[fixed] = frequency_hz
@@ -327,7 +333,11 @@ def _lowest(trials: list[_Trial]) -> list[_Trial]:
     found: dict[frozenset[str], _Trial] = {}
     for trial in sorted(trials, key=_bic_of):
         found.setdefault(trial.names, trial)
-    best, *others = found.values()
+    best, *others = (
+        trial
+        for trial in found.values()
+        if not any(less.names < trial.names and less.bic <= trial.bic for less in found.values())
+    )
     return [best, *(trial for trial in others if trial.bic < best.bic + _FOLLOWED_BIC)][:_FOLLOWED]
 
 
@@ -339,15 +349,18 @@ def _bic_of(trial: _Trial) -> float:
     return trial.bic
 
 
-def _strongest_frequencies(channel: Channel, release_s: float, period_s: float) -> list[float]:
-    """Frequencies (Hz) of the strongest lines away from the fundamental, of displacement and of velocity."""
+def _strongest_frequencies(channel: Channel, release_s: float, period_s: float, count: int) -> list[float]:
+    """Frequencies (Hz) of the strongest few lines of a spectrum above the fundamental."""
     after = channel.between(release_s, np.inf)
-    count = len(after)
-    time_s, step_s = np.linspace(after.time_s[0], after.time_s[-1], count, retstep=True)
+    length = len(after)
+    time_s, step_s = np.linspace(after.time_s[0], after.time_s[-1], length, retstep=True)
     value_m = np.interp(time_s, after.time_s, after.value_m)
-    frequencies = np.fft.rfftfreq(4 * count, step_s)
-    power = np.abs(np.fft.rfft((value_m - value_m.mean()) * np.hanning(2 * count)[count:], 4 * count))
-    harmonics = frequencies * period_s
-    power[(np.abs(harmonics - 1.0) < _FUNDAMENTAL) | (harmonics < _LOWEST_MODE)] = 0.0
-    power[harmonics > _HIGHEST_MODE] = 0.0
-    return [float(frequencies[np.argmax(power * frequencies**order)]) for order in (0, 1)]
+    frequencies = np.fft.rfftfreq(4 * length, step_s)
+    power = np.abs(np.fft.rfft((value_m - value_m.mean()) * np.hanning(2 * length)[length:], 4 * length))
+    inner = frequencies[1:-1]
+    is_line = (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
+    is_line &= (inner * period_s > 1.0 + _FUNDAMENTAL) & (inner * period_s < _HIGHEST_MODE)
+    lines, sizes = inner[is_line], power[1:-1][is_line]
+    return lines[
+        np.argsort(-sizes * np.sqrt(lines))[:count]
+    ].tolist()  # a residual of slips falls with frequency
