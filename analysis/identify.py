@@ -14,7 +14,7 @@ from analysis.fitting.search import (
     initial_points,
     may_be_friction,
 )
-from analysis.fitting.stand_search import StandSearch
+from analysis.fitting.stand_search import StandFit, StandSearch
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import (
@@ -26,7 +26,7 @@ from analysis.laws.catalogue import (
     law_without,
 )
 from analysis.laws.parameters import Parameter
-from analysis.laws.stand_parts import StandModel
+from analysis.laws.stand_parts import StandEffect, StandModel
 from analysis.plate.friction import estimate_plate_friction
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
@@ -45,6 +45,11 @@ from messages.message import message
 
 _EVIDENCE_MIN = 10.0
 """Fall of the BIC below which a friction law on an ideal stand is preferred to effects of the stand."""
+_CERTAIN_MIN = 30.0
+"""Rise of the BIC without an effect from which on it is named: others that may take its place explain as much
+but for some ten."""
+_DOMINANT_SHARE = 0.2
+"""Of what friction laws leave: what an effect explains to be named where not all is explained."""
 _LEFT_MAX = 0.1
 """Share of what no law explains that effects may leave: with more, others must be at work, and what these
 effects explain is theirs."""
@@ -96,19 +101,19 @@ def identify(
 
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
-    stand: tuple[Fit, FitProblem] | None = None
+    stand: StandFit | None = None
     if model == "auto" and not _is_adequate(problem, decay, fits) and may_be_friction(problem, fits):
         report(0.7, "looking for effects of the stand")
         stand = _fit_stand(search, decay, fits, start)
-        if _may_be_other_law(*stand, decay):
+        if _may_be_other_law(stand, decay):
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
                 report(0.75, f"fitting {law.name}")
                 fits.append(search.fit_fallback(law, widest))
 
     report(0.8, "uncertainty")
-    if stand is not None and _explains_more(*stand, decay, fits):
-        joint = joint_fit.choose_stand(record, decay, *stand, fits)
+    if stand is not None and _explains_more(stand, decay, fits):
+        joint = joint_fit.choose_stand(record, decay, stand.fit, stand.problem, fits)
     else:
         joint = joint_fit.choose_law(record, decay, problem, fits)
     adequate = joint.selection.adequate
@@ -129,13 +134,13 @@ def identify(
     fitted_quantities.add_static_friction_bounds(joint, budget)
     if plate is not None:
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
-    joint, verdict_warnings = judge(joint, plate, budget)
+    joint, verdict_warnings = judge(joint, plate, budget, min(fits, key=lambda fit: fit.bic))
     warnings = [
         *verdict_warnings,
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
         *(joint_fit.tail_warnings(decay) if has_plain_tail else []),
         *([] if decay.tail is not None else [_no_tail_warning()]),
-        *diagnose(effects, budget.results),
+        *diagnose(_certain_effects(stand, joint, fits), budget.results),
         *joint_fit.identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
         *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
         *([] if adequate else [joint_fit.inadequate_warning(joint.selection), *mass_warnings(joint)]),
@@ -203,7 +208,7 @@ def _is_adequate(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool
     return joint_fit.assess_model(problem, best, fits, counts, decay.period_s).adequate
 
 
-def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats) -> tuple[Fit, FitProblem]:
+def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats) -> StandFit:
     """Fit the simplest law with the effects of the stand that the record shows."""
     simple = next(fit for fit in fits if fit.law is FIRST_SLIP_LAW)
     if not simple.determines(Parameter.TILT):
@@ -213,20 +218,37 @@ def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats)
     return stand.fit(starts, lambda fit: _is_adequate(search.problem, decay, [fit]))
 
 
-def _may_be_other_law(fit: Fit, problem: FitProblem, decay: FreeDecay) -> bool:
+def _may_be_other_law(stand: StandFit, decay: FreeDecay) -> bool:
     """Whether friction that falls with velocity may explain what `fit` explains by other effects."""
-    if not _is_adequate(problem, decay, [fit]):
+    if not _is_adequate(stand.problem, decay, [stand.fit]):
         return True
-    return isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects)
+    law = stand.fit.law
+    return isinstance(law, StandModel) and any(effect.varies_friction for effect in law.effects)
 
 
-def _explains_more(stand: Fit, problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
+def _explains_more(stand: StandFit, decay: FreeDecay, fits: list[Fit]) -> bool:
     """Whether effects of the stand explain the record, or most of what the friction laws leave."""
     best = min(fits, key=lambda fit: fit.bic)
-    if stand.bic > best.bic - _EVIDENCE_MIN or not isinstance(stand.law, StandModel) or not stand.law.effects:
+    fit = stand.fit
+    if fit.bic > best.bic - _EVIDENCE_MIN or not isinstance(fit.law, StandModel) or not fit.law.effects:
         return False
-    excess, left = (fit.chi_square - problem.sample_count for fit in (best, stand))
-    return left < _LEFT_MAX * excess or _is_adequate(problem, decay, [stand])
+    excess, left = _excess(best, stand.problem), _excess(fit, stand.problem)
+    return left < _LEFT_MAX * excess or _is_adequate(stand.problem, decay, [fit])
+
+
+def _excess(fit: Fit, problem: FitProblem) -> float:
+    """Chi-square beyond that of the noise."""
+    return fit.chi_square - problem.sample_count
+
+
+def _certain_effects(stand: StandFit | None, joint: JointFit, fits: list[Fit]) -> tuple[StandEffect, ...]:
+    """Effects of the chosen model that can be named: others may stand for something else."""
+    if stand is None or joint.chosen is not stand.fit or not isinstance(stand.fit.law, StandModel):
+        return ()
+    least = _CERTAIN_MIN
+    if not joint.selection.adequate:
+        least = max(least, _DOMINANT_SHARE * _excess(min(fits, key=lambda fit: fit.bic), stand.problem))
+    return tuple(effect for effect in stand.fit.law.effects if stand.evidence.get(effect.name, 0.0) >= least)
 
 
 def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[ResultWarning]:

@@ -18,7 +18,9 @@ import numpy as np
 
 from analysis.identification import Identification
 from analysis.identify import identify, warm_up
+from analysis.laws.stand_parts import EFFECTS as STAND_EFFECTS
 from analysis.record import AnalysisError
+from analysis.results.diagnosis import SENTENCES
 from benchmarks.real_effects import EFFECTS, STATIC, draw_scene
 from benchmarks.real_record import simulate
 from benchmarks.studies import each_outcome, option_parser, percent, table
@@ -146,10 +148,12 @@ def _degree(found: Identification) -> str:
 
 
 def _named(found: Identification) -> tuple[set[str], set[str]]:
-    """Parts of the stand that the identification names, and of the friction law."""
+    """Effects of the stand that the identification names by a warning, and parts of its friction law."""
     if found.model is None:
         return set(), set()
-    return set(getattr(found.model, "parts", ())), set(found.model.name.split("+"))
+    named = {warning.code for warning in found.warnings} & {effect.name for effect in STAND_EFFECTS}
+    silent = set(found.model.parts) & {code for code, sentence in SENTENCES.items() if not sentence}
+    return named | silent, set(found.model.name.split("+"))
 
 
 # Summary

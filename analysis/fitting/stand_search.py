@@ -36,6 +36,8 @@ _EFFECTS_MOST = 4  # that explain one record: more would explain anything
 _TRIED = 3  # effects that are fitted of those that promise most
 _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
 _BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
+_MODE_DAMPING = 0.01  # damping ratio of a bolted joint
+_STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
 _SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
 _EFFORT_MAX = 60_000.0
 """Periods of motion that are simulated before a search ends with what it has: 1.5 s of a core."""
@@ -57,6 +59,16 @@ _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 _HIGHEST_MODE = 30.0  # of second modes that are looked for, over the first frequency
 _LINES = 3  # of the residual's spectrum that are tried as second modes
 _FUNDAMENTAL = 0.2  # a second mode differs from the first by this share of its frequency at the least
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StandFit:
+    """A law with effects of the stand, fitted to a record."""
+
+    fit: Fit
+    problem: FitProblem
+    evidence: dict[str, float]
+    """Rise of the BIC without each of the effects that stands on its own, by name."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -94,11 +106,8 @@ class StandSearch:
             self._left_by_ideal.append(Channel(time_s, tail.residual_m))
         self._effort = 0.0  # simulated periods of all motions so far
 
-    def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> tuple[Fit, FitProblem]:
-        """Fit the law with the effects that the record shows, from points (p,) of an ideal stand.
-
-        The problem that the fit solves comes with it.
-        """
+    def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> StandFit:
+        """Fit the law with the effects that the record shows, from points (p,) of an ideal stand."""
         points = [extended_point(start) for start in starts]
         first = self._window(_WINDOWS_PERIODS[0])
         trials = [min((self._trial(first, (), point) for point in points), key=_bic_of)]
@@ -110,8 +119,9 @@ class StandSearch:
         window = self.problem.before(end_s).decimated(_READINGS_WHOLE, self._slip_end_s)
         trials = self._continue(window, trials)[:1]
         trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
-        fit = self._finish(self._without_needless(window, trials[0]))
-        return fit, _open_shared(self.problem, fit.law)
+        trial, evidence = self._without_needless(window, trials[0])
+        fit = self._finish(trial)
+        return StandFit(fit, _open_shared(self.problem, fit.law), evidence)
 
     def _continue(self, window: FitProblem, trials: list[_Trial]) -> list[_Trial]:
         """Refit trials of a shorter window, also with an f_s, which matters only once a stick has ended."""
@@ -231,8 +241,9 @@ class StandSearch:
             starts[-1][[_PLACES[place] for place in effect.own]] = probe
         return starts
 
-    def _without_needless(self, window: FitProblem, trial: _Trial) -> _Trial:
-        """The trial without the effects that the others make needless."""
+    def _without_needless(self, window: FitProblem, trial: _Trial) -> tuple[_Trial, dict[str, float]]:
+        """The trial without the effects that the others make needless; rise of the BIC without each other."""
+        evidence: dict[str, float] = {}
         for effect in trial.model.effects:
             if any(other.needs == effect.name for other in trial.model.effects):
                 continue
@@ -240,10 +251,12 @@ class StandSearch:
             point = trial.point.copy()
             point[[_PLACES[place] for place in effect.own]] = 0.0
             point[[place for place in effect.shared if place != Parameter.FRICTION_STATIC]] = 0.0
-            without = self._trial(window, effects, point)
+            without = self._trial(window, effects, point, _STEPS_LAST)
             if without.bic < trial.bic + _EVIDENCE_MIN:
                 trial = without
-        return trial
+            else:
+                evidence[effect.name] = without.bic - trial.bic
+        return trial, evidence
 
     def _linear_points(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
@@ -252,6 +265,8 @@ class StandSearch:
         point = trial.point.copy()
         fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
         point[fixed] = frequency_hz
+        if _PLACES[StandParameter.MODE_FREQUENCY] in fixed:
+            point[_PLACES[StandParameter.MODE_DAMPING]] = _MODE_DAMPING
         model = compose(self._law, (*trial.model.effects, *candidates))
         opened = _open_shared(window, model)
         free = opened.free_parameters(model)
@@ -269,11 +284,16 @@ class StandSearch:
             pull = quadratic.descent[mine] - cross @ inverse @ quadratic.descent[own]
             amount = np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull
             points[effect.name] = []
-            if float(pull @ amount) - self._price(window, effect) > _PROMISE_MIN:
+            if float(pull @ amount) - self._price(window, effect) < _PROMISE_MIN:
+                continue
+            extended = compose(self._law, (*trial.model.effects, effect))
+            for share in _STEP_SHARES:
                 moved = point.copy()
-                moved[free[mine]] += amount
-                moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ amount)
-                compose(self._law, (*trial.model.effects, effect)).apply_bounds(moved)
+                moved[free[mine]] += share * amount
+                extended.apply_bounds(moved)
+                taken = moved[free[mine]] - point[free[mine]]
+                moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ taken)
+                extended.apply_bounds(moved)
                 points[effect.name].append(moved)
         return points
 
@@ -361,6 +381,5 @@ def _strongest_frequencies(channel: Channel, release_s: float, period_s: float, 
     is_line = (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
     is_line &= (inner * period_s > 1.0 + _FUNDAMENTAL) & (inner * period_s < _HIGHEST_MODE)
     lines, sizes = inner[is_line], power[1:-1][is_line]
-    return lines[
-        np.argsort(-sizes * np.sqrt(lines))[:count]
-    ].tolist()  # a residual of slips falls with frequency
+    likeliest = np.argsort(-sizes * np.sqrt(lines))  # what is left of slips falls with frequency
+    return [float(lines[index]) for index in likeliest[:count]]

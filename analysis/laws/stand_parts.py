@@ -220,7 +220,12 @@ def _constant_friction(_speed: float, parameters: Floats) -> float:
 _LAG_STEP_S = 1e-6
 _STEP_SHARE = 1e-5
 """Step of differences over the range of a parameter of the stand, or over the value of one of the motion."""
-_FILTER_STEP_S2 = 2.5e-5  # a time constant of 5 ms: less is lost in the interpolation of filtered readings
+_OWN_STEPS = {
+    StandParameter.FILTER: 2.5e-5,  # a time constant of 5 ms: less is lost in interpolating filtered readings
+    StandParameter.FILTER_2: 2.5e-5,
+    StandParameter.MODE_MASS: 1e-3,  # less is lost in the errors of shorter steps of integration
+    StandParameter.BASE_COMPLIANCE: 1e-3,
+}
 _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
 
@@ -232,7 +237,8 @@ def _step(vector: Floats, direction: Floats) -> float:
     for place in np.flatnonzero(direction).tolist():
         if place >= first:
             own = STAND_PARAMETERS[StandParameter(place - first)]
-            steps.append(_FILTER_STEP_S2 if own.unit == "s2" else _STEP_SHARE * (own.upper - own.lower))
+            usual = _STEP_SHARE * (own.upper - own.lower)
+            steps.append(_OWN_STEPS.get(StandParameter(place - first), usual))
         elif place in _ADDITIVE:
             steps.append(_ADDITIVE_STEP)
         else:

@@ -42,7 +42,7 @@ class StandParameter(IntEnum):
     DRAG = 7  # deceleration over the square of the table's velocity (1/m)
     LOSS_FACTOR = 8  # of the springs: a force against the velocity, proportional to the displacement
     ARC = 9  # curvature of the table's path on its leaf springs (1/m)
-    MODE_MASS = 10  # mass on a spring on the table, as a share of the table's
+    MODE_MASS = 10  # share of the table's mass that hangs on it by a spring
     MODE_FREQUENCY = 11  # its own frequency (Hz)
     MODE_DAMPING = 12  # its damping ratio
     FILM = 13  # relative rise of friction with the sliding velocity (s/m)
@@ -181,8 +181,9 @@ def slope(
     `path` is the slid path before the phase, less `sign` times u2 - u1 at its start.
     """
     u, v, slip, relative = state[0], state[1], state[2], state[3]
-    gravity, plate, table = parameters[GRAVITY], parameters[PLATE_MASS], parameters[TABLE_MASS]
-    arc, both = parts[ARC], parameters[PLATE_MASS] + parameters[TABLE_MASS]
+    gravity, plate, arc = parameters[GRAVITY], parameters[PLATE_MASS], parts[ARC]
+    table = parameters[TABLE_MASS] * (1.0 - parts[MODE_MASS])
+    both = plate + table
     force = table_force(parameters, parts, time, state, reversal) - both * arc * arc * u * v * v
     if sign == 0.0:
         acceleration = force / (both * (1.0 + arc * arc * u * u))

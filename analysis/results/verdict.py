@@ -8,7 +8,9 @@ unexplained does not bear on f_d.
 import math
 from dataclasses import replace
 
+from analysis.fitting.search import Fit
 from analysis.identification import Degree
+from analysis.laws.parameters import Parameter
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, result_warning
 from analysis.results.joint_fit import JointFit
@@ -18,14 +20,19 @@ from messages.i18n import N_
 _NAME = "friction_dynamic"
 _SIGMAS = 3.0  # estimates that differ by more standard uncertainties of the plate's own contradict each other
 _SPREAD_MAX = 0.02  # of f_d: estimates of a failed model that differ by more leave f_d open
+_LEFT_MAX = 0.05  # share of what the ideal stand leaves: with more, other effects are as large as those found
+_SPREAD_OF_MODEL_MAX = 0.005  # of f_d, see `_spread_of_model`
 _MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
 _CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however small the uncertainties are
 
 
 def judge(
-    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget
+    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget, ideal: Fit
 ) -> tuple[JointFit, list[ResultWarning]]:
-    """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for."""
+    """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for.
+
+    `ideal` is the likeliest fit on an ideal stand.
+    """
     selection, results = joint.selection, budget.results
     own = results.get(_NAME)
     if own is None:
@@ -37,11 +44,27 @@ def judge(
         _add_model_spread(budget, own, abs(difference))
         return joint, [_disagreement(own, plate)]
     if plate is None or plate.misfit > _MISFIT_MAX or abs(difference) > _SPREAD_MAX * plate.friction_dynamic:
-        return _with_degree(joint, Degree.NONE), []
+        spread = _spread_of_model(joint, ideal)
+        if spread > _SPREAD_OF_MODEL_MAX * own.value:
+            return _with_degree(joint, Degree.NONE), []
+        _add_model_spread(budget, own, spread)
+        return _with_degree(joint, Degree.FRICTION), []
     budget.remove(_NAME)
     shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: abs(difference)}
     budget.add(_NAME, plate.friction_dynamic, shares)
     return _with_degree(joint, Degree.FRICTION), []
+
+
+def _spread_of_model(joint: JointFit, ideal: Fit) -> float:
+    """By how much f_d may still move: as the effects found moved it, in proportion to what is left."""
+    if joint.chosen is ideal or joint.chosen.law is ideal.law:
+        return math.inf
+    count = joint.problem.sample_count
+    left = (joint.chosen.chi_square - count) / max(ideal.chi_square - count, 1.0)
+    if not 0.0 < left < _LEFT_MAX:
+        return math.inf
+    place = Parameter.FRICTION_DYNAMIC
+    return abs(joint.chosen.value(place) - ideal.value(place)) * math.sqrt(left)
 
 
 def _agree(own: Quantity, plate: PlateFriction) -> bool:
