@@ -170,6 +170,7 @@ CATALOGUE: Final = (
                             missing=N_("Nothing slipped, or no law could be fitted: f_d is not known."))),
     _Row("friction_dynamic_plate", Symbol("f", "dp"), "1", N_("dynamic friction, from the plate alone"),
          _NUMBER),
+    _Row("friction_path_mean", Symbol("f", "m"), "1", N_("mean friction over the slid path"), _NUMBER),
     _Row("friction_static", Symbol("f", "s"), "1", N_("static friction"), _NUMBER,
          column=TableColumn(7, "friction_static", missing=N_("No stick ended in a slip: f_s has no value."))),
     _Row("friction_static_lower", Symbol("f", "s", relation="≥"), "1", N_("static friction, at least"),

@@ -119,9 +119,10 @@ def run(number: int, effects: tuple[int, ...], cache: Path | None) -> Outcome:
     seconds = time.process_time() - begun
     parts, laws = _named(found)
     true_names = effect.named.union(*(other.named for other in others))
+    friction = "friction_path_mean" if "friction_path_mean" in found.results else "friction_dynamic"
     values = [
         (quantity.value, quantity.standard_uncertainty) if quantity else (math.nan, math.nan)
-        for quantity in map(found.results.get, ("friction_dynamic", "friction_dynamic_plate"))
+        for quantity in map(found.results.get, (friction, "friction_dynamic_plate"))
     ]
     model = found.model
     return truth(

@@ -22,7 +22,14 @@ from analysis.laws.parameters import (
     Parameter,
 )
 from analysis.motion.events import DURATION_MIN_S, integrate_events
-from analysis.motion.integration import Friction, IntegratedKernels, integrated_kernels
+from analysis.motion.integration import (
+    FIRST_NODE,
+    NODE_SLIP,
+    NODE_TAU,
+    Friction,
+    IntegratedKernels,
+    integrated_kernels,
+)
 from analysis.motion.sampling import EXACT, MotionKernels, phase_responses
 from analysis.motion.two_mass import Motion, TwoMassParameters, simulate_kernels
 
@@ -96,6 +103,18 @@ class IntegratedSolver(MotionSolver):
 
     def __init__(self, friction: Friction, name: str) -> None:
         self.friction, self.kernels = friction, integrated_kernels(friction, name)
+
+    def mean_friction(self, vector: Floats, duration_s: float) -> float:
+        """Mean of the coefficient of friction over the slid path."""
+        phases, nodes = self.kernels.integrate(vector, duration_s)
+        speeds = np.abs(nodes[:, NODE_SLIP])
+        friction = np.array([self.friction(speed, vector) for speed in speeds.tolist()])
+        steps_s = np.diff(nodes[:, NODE_TAU])
+        begins = phases[:, FIRST_NODE].astype(np.intp)
+        steps_s[begins[(begins > 0) & (begins < len(nodes))] - 1] = 0.0  # from one slip to the next
+        path = float(steps_s @ (speeds[1:] + speeds[:-1]))
+        work = friction * speeds
+        return float(steps_s @ (work[1:] + work[:-1])) / path if path > 0.0 else float("nan")
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]

@@ -13,7 +13,7 @@ from analysis.fitting.problem import FitProblem, covariance, motion_phases, proj
 from analysis.fitting.search import Fit
 from analysis.identification import Events
 from analysis.laws.catalogue import compared_law
-from analysis.laws.law import FrictionLaw
+from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
 from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, StandModel
 from analysis.motion.two_mass import PEAK_RATES
@@ -59,6 +59,8 @@ def add_fitted_quantities(
             budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach)
     if isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects):
         _add_mean_friction(joint, fit.law, budget)
+    if isinstance(fit.law.solver, IntegratedSolver):
+        _add_path_mean(joint, fit.law.solver, budget)
     if slip_ended:
         _add_residual_displacement(joint, budget)
     _add_peak_rates(joint, budget)
@@ -90,6 +92,17 @@ def _add_mean_friction(joint: JointFit, model: StandModel, budget: UncertaintyBu
     gradient = numerical_gradient(mean, point, fit.free)
     budget.remove("friction_dynamic")
     _add_finite(joint, budget, [("friction_dynamic", mean(point), gradient)])
+
+
+def _add_path_mean(joint: JointFit, solver: IntegratedSolver, budget: UncertaintyBudget) -> None:
+    """Add the mean friction over the slid path of a law whose f_d is that at infinite velocity."""
+    fit, duration_s = joint.chosen, joint.duration_s
+
+    def mean(parameters: Floats) -> float:
+        return solver.mean_friction(fit.law.vector(project_to_bounds(parameters, fit.law)), duration_s)
+
+    gradient = numerical_gradient(mean, fit.parameters, fit.free)
+    _add_finite(joint, budget, [("friction_path_mean", mean(fit.parameters), gradient)])
 
 
 def _by_profile(
