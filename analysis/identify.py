@@ -102,9 +102,12 @@ def identify(
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
     stand: StandFit | None = None
-    if model == "auto" and not _is_adequate(problem, decay, fits) and may_be_friction(problem, fits):
+    best = min(fits, key=lambda fit: fit.bic)
+    stand_search = _stand_search(search, decay, fits)
+    fails = not _is_adequate(problem, decay, fits)
+    if model == "auto" and may_be_friction(problem, fits) and (fails or stand_search.shows_effects(best)):
         report(0.7, "looking for effects of the stand")
-        stand = _fit_stand(search, decay, fits, start)
+        stand = _fit_stand(stand_search, decay, fits, start)
         if _may_be_other_law(stand, decay):
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
@@ -208,14 +211,25 @@ def _is_adequate(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool
     return joint_fit.assess_model(problem, best, fits, counts, decay.period_s).adequate
 
 
-def _fit_stand(search: Search, decay: FreeDecay, fits: list[Fit], start: Floats) -> StandFit:
-    """Fit the simplest law with the effects of the stand that the record shows."""
+def _stand_search(search: Search, decay: FreeDecay, fits: list[Fit]) -> StandSearch:
+    """Search for effects of the stand beside the simplest law."""
+    simple = _simplest(fits)
+    return StandSearch(search, simple.law, min(fits, key=lambda fit: fit.bic), decay.tail)
+
+
+def _simplest(fits: list[Fit]) -> Fit:
+    """The fit with one coefficient of friction, and a tilt where the record tells it."""
     simple = next(fit for fit in fits if fit.law is FIRST_SLIP_LAW)
     if not simple.determines(Parameter.TILT):
         simple = next(fit for fit in fits if fit.law is COMPARED_LAWS[0])
-    stand = StandSearch(search, simple.law, min(fits, key=lambda fit: fit.bic), decay.tail)
+    return simple
+
+
+def _fit_stand(search: StandSearch, decay: FreeDecay, fits: list[Fit], start: Floats) -> StandFit:
+    """Fit the simplest law with the effects of the stand that the record shows."""
+    simple = _simplest(fits)
     starts = [project_to_bounds(point, simple.law) for point in (start, simple.parameters)]
-    return stand.fit(starts, lambda fit: _is_adequate(search.problem, decay, [fit]))
+    return search.fit(starts, lambda fit: _is_adequate(search.problem, decay, [fit]))
 
 
 def _may_be_other_law(stand: StandFit, decay: FreeDecay) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.problem import FitProblem, GaussNewton, Minimum, covariance
+from analysis.fitting.problem import FitProblem, GaussNewton, Minimum, QuadraticModel, covariance
 from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
@@ -33,14 +33,15 @@ _WINDOWS_PERIODS = (2.5, 6.0, 12.0)  # after the release; then the whole record
 _READINGS = 500  # a channel in a window: as many as searches for friction laws take
 _READINGS_WHOLE = 1500  # a channel of the whole record
 _EFFECTS_MOST = 4  # that explain one record: more would explain anything
-_TRIED = 3  # effects that are fitted of those that promise most
+_TRIED = 2  # effects that are fitted of those whose start points are best
+_TRIED_BY_PROMISE = 2  # the same of those that a linear motion promises most of
 _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
 _BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
 _MODE_DAMPING = 0.01  # damping ratio of a bolted joint
 _STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
 _SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
-_EFFORT_MAX = 60_000.0
-"""Periods of motion that are simulated before a search ends with what it has: 1.5 s of a core."""
+_EFFORT_MAX = 40_000.0
+"""Periods of motion that are simulated before a search ends with what it has: 1 s of a core."""
 _PROMISE_MIN = 10.0
 """Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
@@ -54,6 +55,7 @@ _FOLLOWED_BIC = 2000.0  # above the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
+_NOTHING = QuadraticModel(0.0, np.empty(0), np.empty((0, 0)))
 _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 """Places in a point of a `StandModel`."""
 _HIGHEST_MODE = 30.0  # of second modes that are looked for, over the first frequency
@@ -106,6 +108,19 @@ class StandSearch:
             self._left_by_ideal.append(Channel(time_s, tail.residual_m))
         self._effort = 0.0  # simulated periods of all motions so far
 
+    def shows_effects(self, ideal: Fit) -> bool:
+        """Whether an effect would lower the BIC of a fit on an ideal stand that leaves nothing but noise.
+
+        Tests of size and colour of the residual let smooth deviations through that a score test sees.
+        """
+        window = self._whole().decimated(_READINGS, self._slip_end_s)
+        model = compose(ideal.law, ())
+        minimum = Minimum(extended_point(ideal.parameters), _NOTHING, 0, converged=True)
+        trial = _Trial(model, minimum, 0.0)
+        candidates = [effect for effect in EFFECTS if not effect.needs and effect is not STATIC_FRICTION]
+        linear = [effect for effect in candidates if not set(effect.own) & set(_FREQUENCIES)]
+        return any(self._linear_points(window, trial, linear)[0].values())
+
     def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> StandFit:
         """Fit the law with the effects that the record shows, from points (p,) of an ideal stand."""
         points = [extended_point(start) for start in starts]
@@ -115,8 +130,7 @@ class StandSearch:
             window = self._window(periods)
             trials = self._continue(window, trials)
             trials = self._extend_while(window, trials, _explains)
-        end_s = self._slip_end_s + _TAIL_PERIODS * self._period_s
-        window = self.problem.before(end_s).decimated(_READINGS_WHOLE, self._slip_end_s)
+        window = self._whole().decimated(_READINGS_WHOLE, self._slip_end_s)
         trials = self._continue(window, trials)[:1]
         trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
         trial, evidence = self._without_needless(window, trials[0])
@@ -175,7 +189,7 @@ class StandSearch:
             and not set(effect.shared) & set(self._law.extra)
         ]
         found = []
-        for effect, start in self._promising(window, trial, candidates)[:_TRIED]:
+        for effect, start in self._promising(window, trial, candidates):
             better = self._trial(window, (*trial.model.effects, effect), start, _STEPS_TRIAL)
             if better.bic < trial.bic - _EVIDENCE_MIN:
                 found.append(better)
@@ -187,7 +201,7 @@ class StandSearch:
         """Effects that lower the BIC, the best first, with the point of each from which to fit."""
         ranked: list[tuple[float, StandEffect, Floats]] = []
         linear = [effect for effect in candidates if not set(effect.own) & set(_FREQUENCIES)]
-        moved = self._linear_points(window, trial, linear)
+        moved, promises = self._linear_points(window, trial, linear)
         for effect in candidates:
             if effect in linear:
                 starts = moved[effect.name] + self._starts(window, effect, trial)
@@ -195,7 +209,7 @@ class StandSearch:
                 starts = [
                     point
                     for frequency_hz in self._frequencies(window, trial, effect)
-                    for point in self._linear_points(window, trial, [effect], frequency_hz)[effect.name]
+                    for point in self._linear_points(window, trial, [effect], frequency_hz)[0][effect.name]
                 ]
             if starts:
                 model = compose(self._law, (*trial.model.effects, effect))
@@ -204,7 +218,9 @@ class StandSearch:
                 least = int(np.argmin(costs))
                 ranked.append((costs[least] + self._price(window, effect), effect, starts[least]))
         ranked.sort(key=lambda one: one[0])
-        return [(effect, start) for _, effect, start in ranked]
+        best = [effect for _, effect, _ in ranked[:_TRIED]]
+        best += sorted(linear, key=lambda effect: -promises[effect.name])[:_TRIED_BY_PROMISE]
+        return [(effect, start) for _, effect, start in ranked if effect in best]
 
     def _frequencies(self, window: FitProblem, trial: _Trial, effect: StandEffect) -> list[float]:
         """Frequencies (Hz) that the second oscillator of an effect may have."""
@@ -260,8 +276,8 @@ class StandSearch:
 
     def _linear_points(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
-    ) -> dict[str, list[Floats]]:
-        """Minimum of a motion linear about the trial with each of the effects, if the BIC falls."""
+    ) -> tuple[dict[str, list[Floats]], dict[str, float]]:
+        """Minimum of a motion linear about the trial with each of the effects that lower the BIC; and its falls."""
         point = trial.point.copy()
         fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
         point[fixed] = frequency_hz
@@ -277,6 +293,7 @@ class StandSearch:
         own = np.array([place in base for place in free.tolist()])
         inverse, _ = covariance(quadratic.normal[np.ix_(own, own)])
         points: dict[str, list[Floats]] = {}
+        promises: dict[str, float] = {}
         for effect in candidates:
             mine = np.isin(free, [*(_PLACES[place] for place in effect.own), *effect.shared])
             cross = quadratic.normal[np.ix_(mine, own)]
@@ -284,7 +301,8 @@ class StandSearch:
             pull = quadratic.descent[mine] - cross @ inverse @ quadratic.descent[own]
             amount = np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull
             points[effect.name] = []
-            if float(pull @ amount) - self._price(window, effect) < _PROMISE_MIN:
+            promises[effect.name] = float(pull @ amount) - self._price(window, effect)
+            if promises[effect.name] < _PROMISE_MIN:
                 continue
             extended = compose(self._law, (*trial.model.effects, effect))
             for share in _STEP_SHARES:
@@ -295,12 +313,16 @@ class StandSearch:
                 moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ taken)
                 extended.apply_bounds(moved)
                 points[effect.name].append(moved)
-        return points
+        return points, promises
 
     def _finish(self, trial: _Trial) -> Fit:
         problem = _open_shared(self.problem, trial.model)
         last = problem.minimise(trial.point, trial.model, _STEPS_LAST)
         return fit_at_minimum(problem, trial.model, last)
+
+    def _whole(self) -> FitProblem:
+        """The record without most of its tail."""
+        return self.problem.before(self._slip_end_s + _TAIL_PERIODS * self._period_s)
 
     def _window(self, periods: float) -> FitProblem:
         end_s = self._release_s + periods * self._period_s

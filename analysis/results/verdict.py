@@ -22,6 +22,9 @@ _SIGMAS = 3.0  # estimates that differ by more standard uncertainties of the pla
 _SPREAD_MAX = 0.02  # of f_d: estimates of a failed model that differ by more leave f_d open
 _LEFT_MAX = 0.05  # share of what the ideal stand leaves: with more, other effects are as large as those found
 _SPREAD_OF_MODEL_MAX = 0.005  # of f_d, see `_spread_of_model`
+_SPREAD_OF_MODEL_MIN = 0.003  # of f_d; benchmarks/study_real_stand.py: what is left moves f_d by as much
+_DESCRIPTION = 0.02  # of the shift of f_d by effects: so far their description is off, by the same study
+_FLOOR = 3e-4  # of f_d: what effects below detection move it by beside those found, by the same study
 _MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
 _CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however small the uncertainties are
 
@@ -37,22 +40,34 @@ def judge(
     own = results.get(_NAME)
     if own is None:
         return _with_degree(joint, Degree.NONE), []
-    difference = math.inf if plate is None else plate.friction_dynamic - own.value
+    difference = math.inf if plate is None else abs(plate.friction_dynamic - own.value)
     if selection.adequate:
-        if plate is None or selection.degree is Degree.IDEAL or _agree(own, plate):
+        if selection.degree is Degree.IDEAL:
             return joint, []
-        _add_model_spread(budget, own, abs(difference))
+        spread = math.hypot(_DESCRIPTION * _shift(joint, ideal), _FLOOR * own.value)
+        if plate is None or _agree(own, plate):
+            _add_model_spread(budget, own, spread)
+            return joint, []
+        _add_model_spread(budget, own, math.hypot(spread, difference))
         return joint, [_disagreement(own, plate)]
-    if plate is None or plate.misfit > _MISFIT_MAX or abs(difference) > _SPREAD_MAX * plate.friction_dynamic:
-        spread = _spread_of_model(joint, ideal)
-        if spread > _SPREAD_OF_MODEL_MAX * own.value:
-            return _with_degree(joint, Degree.NONE), []
-        _add_model_spread(budget, own, spread)
+    if plate is not None and plate.misfit < _MISFIT_MAX and difference < _SPREAD_MAX * own.value:
+        budget.remove(_NAME)
+        shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: difference}
+        budget.add(_NAME, plate.friction_dynamic, shares)
         return _with_degree(joint, Degree.FRICTION), []
-    budget.remove(_NAME)
-    shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: abs(difference)}
-    budget.add(_NAME, plate.friction_dynamic, shares)
-    return _with_degree(joint, Degree.FRICTION), []
+    spread = _spread_of_model(joint, ideal)
+    if spread < _SPREAD_OF_MODEL_MAX * own.value:
+        _add_model_spread(budget, own, max(spread, _SPREAD_OF_MODEL_MIN * own.value))
+        return _with_degree(joint, Degree.FRICTION), []
+    if plate is not None:
+        _add_model_spread(budget, own, max(difference, _SPREAD_MAX * own.value))
+    return _with_degree(joint, Degree.NONE), []
+
+
+def _shift(joint: JointFit, ideal: Fit) -> float:
+    """By how much the effects found move f_d."""
+    place = Parameter.FRICTION_DYNAMIC
+    return abs(joint.chosen.value(place) - ideal.value(place))
 
 
 def _spread_of_model(joint: JointFit, ideal: Fit) -> float:
@@ -63,8 +78,7 @@ def _spread_of_model(joint: JointFit, ideal: Fit) -> float:
     left = (joint.chosen.chi_square - count) / max(ideal.chi_square - count, 1.0)
     if not 0.0 < left < _LEFT_MAX:
         return math.inf
-    place = Parameter.FRICTION_DYNAMIC
-    return abs(joint.chosen.value(place) - ideal.value(place)) * math.sqrt(left)
+    return _shift(joint, ideal) * math.sqrt(left)
 
 
 def _agree(own: Quantity, plate: PlateFriction) -> bool:
