@@ -27,6 +27,7 @@ from analysis.laws.catalogue import (
 )
 from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import StandEffect, StandModel
+from analysis.motion.stand_motion import INTEGRATION_ERROR_M
 from analysis.plate.friction import estimate_plate_friction
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.preparation.oscillation import pullback_warnings
@@ -102,12 +103,9 @@ def identify(
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
     stand: StandFit | None = None
-    best = min(fits, key=lambda fit: fit.bic)
-    stand_search = _stand_search(search, decay, fits)
-    fails = not _is_adequate(problem, decay, fits)
-    if model == "auto" and may_be_friction(problem, fits) and (fails or stand_search.shows_effects(best)):
+    if model == "auto" and may_be_friction(problem, fits) and _may_be_stand(search, decay, fits):
         report(0.7, "looking for effects of the stand")
-        stand = _fit_stand(stand_search, decay, fits, start)
+        stand = _fit_stand(_stand_search(search, decay, fits), decay, fits, start)
         if _may_be_other_law(stand, decay):
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
@@ -209,6 +207,14 @@ def _is_adequate(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool
     best = min(fits, key=lambda fit: fit.bic)
     counts = decay.noise_reading_counts
     return joint_fit.assess_model(problem, best, fits, counts, decay.period_s).adequate
+
+
+def _may_be_stand(search: Search, decay: FreeDecay, fits: list[Fit]) -> bool:
+    """Whether friction laws leave more than noise, or something that an effect of the stand explains."""
+    if not _is_adequate(search.problem, decay, fits):
+        return True
+    best = min(fits, key=lambda fit: fit.bic)
+    return min(decay.noise_m) > INTEGRATION_ERROR_M and _stand_search(search, decay, fits).shows_effects(best)
 
 
 def _stand_search(search: Search, decay: FreeDecay, fits: list[Fit]) -> StandSearch:

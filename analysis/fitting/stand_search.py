@@ -277,7 +277,7 @@ class StandSearch:
     def _linear_points(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
     ) -> tuple[dict[str, list[Floats]], dict[str, float]]:
-        """Minimum of a motion linear about the trial with each of the effects that lower the BIC; and its falls."""
+        """Minimum of a linear motion with each of the effects that lower the BIC, and fall of the BIC."""
         point = trial.point.copy()
         fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
         point[fixed] = frequency_hz

@@ -108,6 +108,7 @@ _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of t
 _REVERSAL_SHARE = 3e-4
 """Speed below which friction of the stand is proportional to speed, over the largest speed of the table."""
 _STIFF = 0.5  # largest share of that speed by which friction of the stand changes it in one step
+INTEGRATION_ERROR_M = 1e-6  # of displacements, against motions in closed form
 _NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
 _EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halved at the least every other
 _GRAZING_DIVISIONS = 4  # of a first step of a slip that seems to end within it, each to a quarter
@@ -288,7 +289,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     pull = abs(parameters[PULLBACK])
     dry = (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * pull) * frequency * frequency
     reversal = max(_REVERSAL_SHARE * frequency * pull, longest * abs(dry) / _STIFF, 1e-9)
-    phases, nodes = np.empty((64, 6)), np.empty((2 * int(duration_s / longest) + 256, 7))
+    phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 7))
     state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
