@@ -259,16 +259,19 @@ class FitProblem:
         free = free if fixed is None else free[free != fixed]
         if not len(self.table) or (self.relative is not None and not len(self.relative)):
             raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
-        earliest_s, latest_s = self.earliest_release_s, float(self.table.time_s[-1])
 
         def project(parameters: Floats) -> Floats:
-            point = parameters.copy()
-            point[_RELEASE] = min(max(point[_RELEASE], earliest_s), latest_s)
-            _apply_prior_bounds(point, free, self.prior_mean, self.prior_deviation)
-            _apply_bounds(point, law, self.stand)
-            return point
+            return self.project(parameters, law, free)
 
         return minimise(GaussNewton(self, law, free).evaluate, project, start, free, steps_max)
+
+    def project(self, parameters: Floats, law: FrictionLaw, free: Indices) -> Floats:
+        """The nearest point that law and stand allow, not far from what is known of the `free` parameters."""
+        point, latest_s = parameters.copy(), float(self.table.time_s[-1])
+        point[_RELEASE] = min(max(point[_RELEASE], self.earliest_release_s), latest_s)
+        _apply_prior_bounds(point, free, self.prior_mean, self.prior_deviation)
+        _apply_bounds(point, law, self.stand)
+        return point
 
     def gauges(self) -> list[Gauge]:
         gauges = [(self.table.time_s, self.table.value_m, GAUGE_1, self.noise_m[0])]

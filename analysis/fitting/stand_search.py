@@ -39,6 +39,7 @@ _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
 _BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
 _MODE_DAMPING = 0.01  # damping ratio of a bolted joint
 _STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
+_MASSES = [Parameter.TABLE_MASS, Parameter.PLATE_MASS]
 _SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
 _EFFORT_MAX = 40_000.0
 """Periods of motion that are simulated before a search ends with what it has: 1 s of a core."""
@@ -311,8 +312,9 @@ class StandSearch:
                 extended.apply_bounds(moved)
                 taken = moved[free[mine]] - point[free[mine]]
                 moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ taken)
-                extended.apply_bounds(moved)
-                points[effect.name].append(moved)
+                moved = opened.project(moved, extended, free)
+                if moved[_MASSES].min() > 0.0:
+                    points[effect.name].append(moved)
         return points, promises
 
     def _finish(self, trial: _Trial) -> Fit:
