@@ -5,6 +5,7 @@ row; with `column` it is also a column of the campaign's table.
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -108,6 +109,7 @@ class TableColumn:
     is_proportional: bool = True  # runs differ by a share of the value rather than by an amount
     is_of_stand: bool = False  # a property of the stand: its scatter does not depend on the contact
     missing: str = ""  # reason why no run may have determined it
+    is_optional: bool = False  # shown only where asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +171,7 @@ CATALOGUE: Final = (
          column=TableColumn(8, "friction_dynamic",
                             missing=N_("Nothing slipped, or no law could be fitted: f_d is not known."))),
     _Row("friction_dynamic_plate", Symbol("f", "dp"), "1", N_("dynamic friction, from the plate alone"),
-         _NUMBER),
+         _NUMBER, column=TableColumn(11, is_optional=True, missing=N_("Too few slips, or no second gauge."))),
     _Row("friction_path_mean", Symbol("f", "m"), "1", N_("mean friction over the slid path"), _NUMBER),
     _Row("friction_static", Symbol("f", "s"), "1", N_("static friction"), _NUMBER,
          column=TableColumn(7, "friction_static", missing=N_("No stick ended in a slip: f_s has no value."))),
@@ -289,7 +291,16 @@ def definition(name: str) -> QuantityDefinition:
     raise KeyError(name)
 
 
-def table_columns() -> tuple[tuple[QuantityDefinition, TableColumn], ...]:
-    """Quantities of the campaign's table with their rules, in the paper's order."""
-    columns = [(row, row.column) for row in CATALOGUE if row.column is not None]
+def optional_columns() -> tuple[str, ...]:
+    """Names of the columns that the table shows only where they are asked for."""
+    return tuple(row.name for row in CATALOGUE if row.column is not None and row.column.is_optional)
+
+
+def table_columns(optional: Collection[str] = ()) -> tuple[tuple[QuantityDefinition, TableColumn], ...]:
+    """Quantities of the campaign's table with their rules, in the paper's order, then those of `optional`."""
+    columns = [
+        (row, row.column)
+        for row in CATALOGUE
+        if row.column is not None and (not row.column.is_optional or row.name in optional)
+    ]
     return tuple(sorted(columns, key=lambda pair: pair[1].position))

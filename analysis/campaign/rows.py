@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from analysis.campaign.pooling import PooledQuantity, is_fully_stated, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
-from analysis.catalogue import TableColumn, table_columns
+from analysis.catalogue import TableColumn, optional_columns, table_columns
 from analysis.quantities import Quantity, ResultWarning, result_warning
 from analysis.results.fitted_quantities import msk64_degree
 from messages.i18n import N_
@@ -38,7 +38,8 @@ def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     Series of one contact share their scatter; for properties of the stand, all series do.
     """
     quantities = {each.label: {_MASS: _plate_mass(each)} for each in series}
-    of_runs = [(row.name, column) for row, column in table_columns() if row.name != _MASS]
+    columns = table_columns(optional_columns())
+    of_runs = [(row.name, column) for row, column in columns if row.name != _MASS]
     for name, column in (*of_runs, (STATIC_LOWER, TableColumn(0)), (STATIC_UPPER, TableColumn(0))):
         values = [[one for run in each.runs if (one := run_value(run, name)) is not None] for each in series]
         found = [(each, some) for each, some in zip(series, values, strict=True) if some]

@@ -74,6 +74,9 @@ class TableOptions:
     format_name: str = choice("--format", TABLE_FORMATS, "Format of the table.", "text")
     published: bool = flag("--published", "Beside the paper's Table 1, with the audit's flags.")
     repeats: bool = flag("--repeats", "Text, Markdown: show how the runs of each series differ.")
+    column: list[str] | None = option(
+        "--column", "Also this column: friction_dynamic_plate, f_d from the plate alone; repeatable."
+    )
     exclude: list[str] | None = shared.exclude()
     save: bool = flag("--save", "Keep new analyses in their runs.")
     output: Path | None = option("-o --output", "File to write; xlsx needs one.")

@@ -9,6 +9,7 @@ import msgspec
 
 from analysis.audit import PublishedRow, audit
 from analysis.campaign.campaign import Campaign, compare_with_published
+from analysis.catalogue import optional_columns
 from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
@@ -23,8 +24,10 @@ _WIDTH_MIN, _UNLIMITED = 40, 1_000_000  # columns of a narrow terminal, and of a
 def table(options: TableOptions) -> None:
     name = _format(options.format_name, options.output, as_json=options.as_json)
     target = out.output_file(options.output, options.force) if options.output else None
+    columns = _columns(options.column)
     runs = load_campaign(options.paths, options.jobs, exclude=options.exclude, save=options.save)
     content = TableContent.of_runs(runs, _published(runs.campaign()) if options.published else None)
+    content = replace(content, columns=columns)
     if target is not None:
         write_table(content, target, name, with_repeats=options.repeats, replace=options.force)
         out.print_line(str(target))
@@ -45,6 +48,13 @@ def _format(name: str, output: Path | None, *, as_json: bool) -> str:
     if name == "xlsx" and output is None:
         raise CommandError("--format xlsx is a file. Say where it goes: -o TABLE.xlsx")
     return name
+
+
+def _columns(wanted: list[str] | None) -> tuple[str, ...]:
+    for name in wanted or []:
+        if name not in optional_columns():
+            raise CommandError(f"--column {name!r} is not known. Use {', '.join(optional_columns())}")
+    return tuple(wanted or ())
 
 
 def _published(campaign: Campaign) -> dict[str, PublishedRowComparison]:

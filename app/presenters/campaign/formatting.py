@@ -11,7 +11,7 @@ from analysis.campaign.effects import Effect
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
-from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn, table_columns
+from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn
 from analysis.formatting import typeset, with_unit
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.plan import plan
@@ -28,6 +28,7 @@ from app.presenters.campaign.state import (
     RepeatabilityRow,
     RunRow,
     TableRow,
+    all_columns,
     row_without_runs,
 )
 from app.presenters.results import in_words, sentence
@@ -156,7 +157,7 @@ def _row(row: SeriesRow, runs: Mapping[str, RunResult]) -> TableRow:
         row.label,
         row.series.code,
         tuple(_run_row(runs[name], is_outlier=name in outliers) for name in row.runs),
-        tuple(_cell(row, *column) for column in table_columns()),
+        tuple(_cell(row, *column) for column in all_columns()),
         _mark(row),
     )
 

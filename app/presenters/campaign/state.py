@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from analysis.catalogue import Place, table_columns
+from analysis.catalogue import Place, QuantityDefinition, TableColumn, optional_columns, table_columns
 from analysis.quantities import Quantity
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from messages.i18n import gettext
@@ -31,12 +31,23 @@ class TableRow:
 
 def row_without_runs(code: str) -> TableRow:
     empty = Cell(hint=gettext("No run of {series} yet.", series=code))
-    return TableRow(code, code, (), (empty,) * len(table_columns()))
+    return TableRow(code, code, (), (empty,) * len(all_columns()))
 
 
 def column_titles() -> tuple[tuple[str, str], ...]:
     """Symbol and unit of each column, in the paper's order."""
-    return tuple((row.symbol.plain, row.unit_at(Place.WINDOW).symbol) for row, _ in table_columns())
+    return tuple((row.symbol.plain, row.unit_at(Place.WINDOW).symbol) for row, _ in all_columns())
+
+
+def all_columns() -> tuple[tuple[QuantityDefinition, TableColumn], ...]:
+    """Columns of the table, then those that are hidden at first."""
+    return table_columns(optional_columns())
+
+
+def hidden_columns() -> dict[int, str]:
+    """Places and descriptions of columns that are hidden at first."""
+    places = enumerate(all_columns())
+    return {place: gettext(row.description) for place, (row, column) in places if column.is_optional}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Table 1 as it fills: a row a series, each cell a value above its uncertainty."""
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
+from PySide6.QtGui import QAction, QColor, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from app.presenters.campaign.state import Cell, TableRow
+from app.presenters.campaign.state import Cell, TableRow, hidden_columns
 from app.qt.theme import TextRole, Theme, font
 from messages.i18n import gettext, ngettext
 
@@ -59,6 +59,22 @@ class SeriesTable(QTableWidget):
             side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
             head.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
             self.setHorizontalHeaderItem(column, head)
+        for place, name in hidden_columns().items():
+            self.setColumnHidden(1 + place, True)
+            self._offer_column(1 + place, name)
+
+    def _offer_column(self, column: int, name: str) -> None:
+        """Let the context menus of table and header show and hide a column."""
+        action = QAction(gettext("Column: {name}", name=name), self)
+        action.setCheckable(True)
+        action.toggled.connect(lambda shown: self._show_column(column, shown=shown))
+        for widget in (self, self.horizontalHeader()):
+            widget.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+            widget.addAction(action)
+
+    def _show_column(self, column: int, *, shown: bool) -> None:
+        self.setColumnHidden(column, not shown)
+        self._fit()
 
     def show_rows(self, rows: tuple[TableRow, ...]) -> None:
         chosen = self._chosen()
@@ -88,9 +104,10 @@ class SeriesTable(QTableWidget):
 
     def _fit(self) -> None:
         header, count = self.horizontalHeader(), self.columnCount()
-        hints = [max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in range(count)]
-        spare = max(0, self.viewport().width() - sum(hints)) // max(1, count)
-        for column, hint in enumerate(hints):
+        shown = [c for c in range(count) if not self.isColumnHidden(c)]
+        hints = {c: max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in shown}
+        spare = max(0, self.viewport().width() - sum(hints.values())) // max(1, len(hints))
+        for column, hint in hints.items():
             header.resizeSection(column, hint + spare)
 
     def _chosen(self) -> str:

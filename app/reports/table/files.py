@@ -76,7 +76,7 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
     """
     notes = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {
-        "Table 1": (table_headers(), [row_cells(row) for row in content.campaign.rows]),
+        "Table 1": _main_grid(content),
         "Numbers": flat_table(content),
         "Repeats": repeats_grid(content),
         "Notes": (("about", "sentence"), notes),
@@ -87,8 +87,12 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
         write_sheets(sheets, made)
 
 
+def _main_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    return table_headers(content.columns), [row_cells(row, content.columns) for row in content.campaign.rows]
+
+
 def _markdown(content: TableContent, with_repeats: bool) -> str:
-    lines = [*_markdown_table(table_headers(), [row_cells(row) for row in content.campaign.rows]), "", LEGEND]
+    lines = [*_markdown_table(*_main_grid(content)), "", LEGEND]
     if with_repeats:
         lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
     if content.published is not None:
@@ -109,7 +113,7 @@ def _marked(text: str) -> str:
 
 
 def _latex(content: TableContent) -> str:
-    columns = [column.latex_heading(Place.TABLE) for column in table_quantities()]
+    columns = [column.latex_heading(Place.TABLE) for column in table_quantities(content.columns)]
     lines = [
         "% by slipstand, for \\usepackage{booktabs}; in parentheses: standard uncertainty of the last digits",
         "% as wide as a page of A4 is high: for \\usepackage{rotating} and \\begin{sidewaystable}",
@@ -118,7 +122,7 @@ def _latex(content: TableContent) -> str:
         r"\toprule",
         " & ".join(("Series", "$n$", *columns)) + r" \\",
         r"\midrule",
-        *(" & ".join(_latex_cell(one) for one in row_cells(row)) + r" \\" for row in content.campaign.rows),
+        *(" & ".join(map(_latex_cell, cells)) + r" \\" for cells in _main_grid(content)[1]),
         r"\bottomrule",
         r"\end{tabular}",
         r"\endgroup",
@@ -145,21 +149,21 @@ _LEADING: Final = ("series", "contact", "pullback_m", "table_mass_kg", "runs")
 
 def flat_table(content: TableContent) -> tuple[list[str], list[list[Any]]]:
     """Header and rows of plain numbers in SI; None where undetermined."""
-    names = [f"{name}{fact}" for name in _names() for fact in _SUFFIXES]
+    names = [f"{name}{fact}" for name in _names(content) for fact in _SUFFIXES]
     header = [*_LEADING, *names, "msk64_degree", "warnings"]
     if content.published is not None:
         header += [f"{column.name}{fact}" for column in table_quantities() for fact in _PUBLISHED] + ["flags"]
     return header, [list(_flat_row(row, content)) for row in content.campaign.rows]
 
 
-def _names() -> tuple[str, ...]:
-    return (*(row.name for row in table_quantities()), STATIC_LOWER, STATIC_UPPER)
+def _names(content: TableContent) -> tuple[str, ...]:
+    return (*(row.name for row in table_quantities(content.columns)), STATIC_LOWER, STATIC_UPPER)
 
 
 def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
     key = row.series
     yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
-    for pooled in (row.quantities.get(name) for name in _names()):
+    for pooled in (row.quantities.get(name) for name in _names(content)):
         if pooled is None:
             yield from [None] * len(_SUFFIXES)
         else:

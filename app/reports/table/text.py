@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -36,6 +36,7 @@ class TableContent:
     failures: tuple[tuple[str, str], ...] = ()
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
     """By the labels of the rows; None where not asked for."""
+    columns: tuple[str, ...] = ()  # optional ones that are shown
 
     @classmethod
     def of_runs(
@@ -56,21 +57,21 @@ def has_inadequate_run(row: SeriesRow) -> bool:
 OUTLIER, INADEQUATE = "*", "!"
 
 
-def table_quantities() -> tuple[QuantityDefinition, ...]:
-    return tuple(row for row, _ in table_columns())
+def table_quantities(optional: Collection[str] = ()) -> tuple[QuantityDefinition, ...]:
+    return tuple(row for row, _ in table_columns(optional))
 
 
-def table_headers() -> tuple[str, ...]:
-    return ("series", "n", *(row.heading(Place.TABLE) for row in table_quantities()))
+def table_headers(optional: Collection[str] = ()) -> tuple[str, ...]:
+    return ("series", "n", *(row.heading(Place.TABLE) for row in table_quantities(optional)))
 
 
-def row_cells(row: SeriesRow) -> tuple[str, ...]:
+def row_cells(row: SeriesRow, optional: Collection[str] = ()) -> tuple[str, ...]:
     """Cells of a row, `0.10030(64)`, bounds for f_s without a value, "" where undetermined.
 
     `*` marks a quantity with an outlier, `!` a series with a run that no law fits.
     """
     doubt = INADEQUATE if has_inadequate_run(row) else ""
-    values = (_cell(row, column) for column in table_quantities())
+    values = (_cell(row, column) for column in table_quantities(optional))
     return (row.label + doubt, str(len(row.runs)), *values)
 
 
@@ -130,8 +131,8 @@ _PUBLISHED_LEGEND: Final = "Measured minus published, with the published c read 
 
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
     """Lines of the table and its notes, of at most `width` characters where words allow it."""
-    rows = [row_cells(row) for row in content.campaign.rows]
-    yield from blocks(table_headers(), rows, width)
+    rows = [row_cells(row, content.columns) for row in content.campaign.rows]
+    yield from blocks(table_headers(content.columns), rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
         yield from ("", *_wrapped(REPEATS_LEGEND, width), "")
@@ -220,7 +221,7 @@ def ratio_sentence(ratio: ContactRatio) -> str:
 
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    columns, rows = table_quantities()[1:], []
+    columns, rows = table_quantities(content.columns)[1:], []
     for row in content.campaign.rows:
         cells = (repeats(row.quantities[one.name]) if one.name in row.quantities else "" for one in columns)
         rows.append((row.label, *cells))

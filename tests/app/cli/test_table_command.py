@@ -144,3 +144,19 @@ def test_what_cannot_be_is_refused_in_one_line(slipstand, folder, options, fault
     assert fault in said.err
     assert said.err.count("\n") == 1
     assert said.out == ""
+
+
+def test_friction_of_the_plate_alone_is_a_column_that_is_asked_for(slipstand, folder):
+    plain, wider = (
+        next(csv.reader(io.StringIO(slipstand("table", folder, "--format", "csv", *more).out)))
+        for more in ((), ("--column", "friction_dynamic_plate"))
+    )
+    assert "friction_dynamic_plate" not in plain
+    assert "friction_dynamic_plate" in wider
+    assert "f_dp" in slipstand("table", folder, "--column", "friction_dynamic_plate").out
+    first = slipstand("table", folder, "--json").json["rows"][0]
+    found, other = first["friction_dynamic_plate"], first["friction_dynamic"]
+    assert found["value"] == pytest.approx(other["value"], abs=4.0 * found["standard_uncertainty"])
+    refused = slipstand("table", folder, "--column", "period_s")
+    assert refused.code == 1
+    assert "--column 'period_s' is not known. Use friction_dynamic_plate" in refused.err

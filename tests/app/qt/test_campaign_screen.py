@@ -138,3 +138,12 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], qtbot: QtBot) -
     stage.gathered(found(unsaved=3))
     stage.screen._table.selectRow(0)
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
+
+
+def test_friction_of_the_plate_alone_is_hidden_until_it_is_chosen(stage: Stage) -> None:
+    table = stage.screen._table
+    (column,) = [place for place in range(table.columnCount()) if table.isColumnHidden(place)]
+    assert table.horizontalHeaderItem(column).text().startswith("f_dp")
+    (action,) = table.horizontalHeader().actions()
+    action.trigger()
+    assert not table.isColumnHidden(column)
