@@ -13,12 +13,17 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 @dataclass(frozen=True, slots=True)
 class FittedModel:
-    """One friction law as fitted."""
+    """One friction law as fitted, on an ideal stand or with effects of the stand."""
 
     name: str
     bic: float
     residual_rms_m: float
     friction_dynamic: float
+    parts: tuple[str, ...] = ()  # names of the effects
+
+    @property
+    def full_name(self) -> str:
+        return " + ".join((self.name, *self.parts))
 
 
 class Degree(Enum):
@@ -42,6 +47,10 @@ class ModelSelection:
     degree: Degree = Degree.NONE
     parts: tuple[str, ...] = ()  # names of the effects of the stand in the chosen model
     residual_share: float | None = None  # residual_rms_m over the largest swing of gauge 1 (1)
+
+    @property
+    def full_name(self) -> str:
+        return " + ".join((self.name, *self.parts))
 
 
 def residual_share(residual_rms: float, readings: Floats) -> float:

@@ -100,7 +100,10 @@ def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> Iterator
             series=label,
             quantities=differing,
         )
-    if wrong := [run for run in series.runs if run.adequate is False]:
+    if holding := [run for run in series.runs if run.friction_holds]:
+        template = N_("{label}: no model explains {run_names}, but f_d holds: joint fit and plate agree")
+        yield result_warning("friction-holds", template, label=label, run_names=run_names(holding))
+    if wrong := [run for run in series.runs if run.adequate is False and not run.friction_holds]:
         template = N_("{label}: no friction law explains {run_names}. Look at it: slipstand analyze")
         yield result_warning("not-adequate", template, label=label, run_names=run_names(wrong))
     if friction is None:

@@ -45,6 +45,7 @@ class RunResult:
     calibration_id: str = ""  # runs with the same calibrations share their errors
     stand_id: str = ""  # runs on the same stand share the errors of masses, gravity and clock
     adequate: bool | None = None  # the friction law explains the record; None where no law was fitted
+    friction_holds: bool = False  # no model does, but independent estimates of f_d agree
     msk64_degree: str = ""  # "" where unknown
     excluded: str = ""  # why the run does not count; "" when it does
     warnings: tuple[ResultWarning, ...] = ()

@@ -66,14 +66,19 @@ def assess_model(
         if len(residual):
             white = _white(residual / noise, channel.time_s, period_s)
             adequate &= _small_enough(residual, noise, readings) and white
-    tried = tuple(FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    tried = tuple(
+        FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0]), _parts(f.law)) for f in fits
+    )
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
     share = residual_share(chosen.rms_m, problem.table.value_m)
-    effects = chosen.law.effects if isinstance(chosen.law, StandModel) else ()
-    degree = (Degree.STAND if effects else Degree.IDEAL) if adequate else Degree.NONE
-    parts = tuple(effect.name for effect in effects)
+    parts = _parts(chosen.law)
+    degree = (Degree.STAND if parts else Degree.IDEAL) if adequate else Degree.NONE
     return ModelSelection(chosen.law.name, bool(adequate), chosen.rms_m, noise, tried, degree, parts, share)
+
+
+def _parts(law: FrictionLaw) -> tuple[str, ...]:
+    return tuple(effect.name for effect in law.effects) if isinstance(law, StandModel) else ()
 
 
 def inadequate_warning(judged: ModelSelection) -> ResultWarning:

@@ -6,8 +6,9 @@ from typing import Any, Final
 from analysis.catalogue import ACCELERATION, CATALOGUE, METRES_PER_SECOND, Place, definition
 from analysis.formatting import format_value
 from analysis.motion.two_mass import PEAK_RATES
+from analysis.verdict_text import EFFECT_TITLES, describe_verdict
 from app.cli import output as out
-from app.runs.analysis_json import read_quantity
+from app.runs.analysis_json import read_model, read_quantity
 
 _BODIES: Final = ("table", "plate")
 _LARGEST: Final = ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
@@ -26,8 +27,8 @@ def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
         f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"
     )
     _print_rows(_result_rows(results, document["events"]))
-    if model := document["model"]:
-        _print_model(model, scale, unit)
+    if document["model"]:
+        _print_model(document, scale, unit)
     if shares := budget_shares(document["budget"]):
         _print_rows([("± of f_d", ", ".join(shares))])
     classical = document.get("classical") or {}
@@ -37,8 +38,14 @@ def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
         _print_rows(_monte_carlo_rows(drawn))
     warned = {warning["message"] for warning in document["warnings"]}
     _print_rows(("note", note) for note in classical.get("notes", ()) if note not in warned)
+    of_stand = [warning for warning in document["warnings"] if warning["code"] in EFFECT_TITLES]
+    if of_stand:
+        out.print_line("  about the stand:")
+    for warning in of_stand:
+        out.print_line(f"    {warning['code']}: {warning['message']}")
     for warning in document["warnings"]:
-        out.print_line(f"  warning {warning['code']}: {warning['message']}")
+        if warning not in of_stand:
+            out.print_line(f"  warning {warning['code']}: {warning['message']}")
 
 
 def _print_rows(rows: Iterable[tuple[str, object]]) -> None:
@@ -77,17 +84,19 @@ def _result_rows(results: dict[str, Any], events: dict[str, Any]) -> Iterator[tu
         yield "slip ended", f"{format_value(since_s, uncertainty_s)} s after the release"
 
 
-def _print_model(model: dict[str, Any], scale: float, unit: str) -> None:
-    """The chosen law and its verdict, then every law that was tried."""
-    verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
+def _print_model(document: dict[str, Any], scale: float, unit: str) -> None:
+    """The verdict on the chosen model, then every law that was tried."""
+    model, chosen = document["model"], read_model(document)
     residual, noise = model["residual_rms_m"] * scale, model["noise_rms_m"] * scale
     sizes = f"residual {residual:.3g} {unit}, noise {noise:.3g} {unit}"
-    if (share := model.get("residual_share")) is not None:
+    if (share := model.get("residual_share")) is not None and model["adequate"]:
         sizes += f"; {100.0 * share:.2g} % of the swing is left"
-    out.print_line(f"  the model {model['name']} {verdict} ({sizes})")
+    if chosen is not None:
+        out.print_line(f"  {describe_verdict(chosen, document['kind'])} ({sizes})")
     if len(model["tried"]) > 1:
         tried = (
-            f"{law['name']} (BIC {law['bic']:.1f}, residual {law['residual_rms_m'] * scale:.3g} {unit})"
+            f"{' + '.join([law['name'], *law.get('parts', ())])} (BIC {law['bic']:.1f},"
+            f" residual {law['residual_rms_m'] * scale:.3g} {unit})"
             for law in model["tried"]
         )
         _print_rows([("tried", ", ".join(tried))])

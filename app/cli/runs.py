@@ -62,7 +62,8 @@ def _friction_text(run: RunSummary) -> str:
     if run.friction_dynamic is None:
         return ""
     marks = ["stale"] if run.stale else []
-    marks += ["model does not fit"] if run.adequate is False else []
+    unfit = "model does not fit, f_d holds" if run.friction_holds else "model does not fit"
+    marks += [unfit] if run.adequate is False else []
     marks += ["left out"] if run.excluded else []
     shown = str(format_value(run.friction_dynamic, run.friction_dynamic_uncertainty))
     return f"{shown} ({', '.join(marks)})" if marks else shown

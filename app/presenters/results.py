@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 from analysis.catalogue import CATALOGUE, MICROMETRE, Place, QuantityDefinition, definition
 from analysis.formatting import typeset, with_unit
-from analysis.identification import ModelSelection
+from analysis.identification import Degree, ModelSelection
 from analysis.quantities import Quantity, ResultWarning
+from analysis.verdict_text import EFFECT_TITLES, describe_verdict
 from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -44,6 +45,7 @@ class Result:
     comparison: str = ""
     end_status: Chip = EMPTY_CHIP
     warnings: tuple[str, ...] = ()
+    about_stand: tuple[str, ...] = ()  # effects of the stand with their sizes and remedies
     path: str = ""
 
 
@@ -67,7 +69,6 @@ _REMEDIES = {
     "model-inadequate": N_("Look for a pattern in the residual, and compare other laws."),
     "pullback-unlike-series": N_("Check the series of the run and the unit of the readings."),
     "released-twice": N_("Repeat the run if the release was not clean."),
-    "second-mode": N_("Look for something loose on the table."),
     "spikes": N_("Check the cables for loose contacts."),
     "static-not-identified": N_("A longer pullback may make the plate stick and slip again."),
     "tail-too-short": N_("Record longer."),
@@ -99,10 +100,11 @@ def make_result(run: AnalysedRun, true_friction: float | None = None) -> Result:
         headline=_headline(run),
         model_status=model_status(run.model),
         rows=_rows(run, MAIN),
-        fit=_fit(run.model),
+        fit=_fit(run),
         comparison=_comparison(run, true_friction),
         end_status=end_status(run.ended),
-        warnings=tuple(_warning(warning) for warning in run.warnings),
+        warnings=tuple(_warning(warning) for warning in run.warnings if warning.code not in EFFECT_TITLES),
+        about_stand=tuple(_warning(warning) for warning in run.warnings if warning.code in EFFECT_TITLES),
         path=str(run.path),
     )
 
@@ -135,16 +137,14 @@ def model_status(model: ModelSelection | None) -> Chip:
     if model is None:
         return Chip(gettext("No motion to fit"), Tone.WARN)
     if model.adequate:
-        return Chip(
-            gettext("Model fits"),
-            Tone.OK,
-            gettext("What the model leaves over is no more than the gauges' noise."),
-        )
-    return Chip(
-        gettext("Model does not fit"),
-        Tone.BAD,
-        gettext("The record holds more than the model explains: do not rely on the uncertainty of f_d."),
-    )
+        hint = gettext("What the model leaves over is no more than the gauges' noise.")
+        shown = gettext("Model fits, with effects of the stand") if model.parts else gettext("Model fits")
+        return Chip(shown, Tone.OK, hint)
+    if model.degree is Degree.FRICTION:
+        hint = gettext("The record holds more than the model explains, but two estimates of f_d agree.")
+        return Chip(gettext("Model does not fit, but f_d holds"), Tone.WARN, hint)
+    hint = gettext("The record holds more than the model explains: do not rely on the uncertainty of f_d.")
+    return Chip(gettext("Model does not fit"), Tone.BAD, hint)
 
 
 def end_status(reason: str) -> Chip:
@@ -203,12 +203,13 @@ def _rows(run: AnalysedRun, shown: tuple[QuantityDefinition, ...]) -> tuple[Resu
     return tuple(make_row(item, run.results[item.name]) for item in shown if item.name in run.results)
 
 
-def _fit(model: ModelSelection | None) -> str:
+def _fit(run: AnalysedRun) -> str:
+    model = run.model
     if model is None:
         return ""
     return gettext(
-        "{law}, residual {residual}, noise {noise}",
-        law=model.name,
+        "{verdict}; residual {residual}, noise {noise}",
+        verdict=sentence(describe_verdict(model, run.kind)),
         residual=format_micrometres(model.residual_rms_m),
         noise=format_micrometres(model.noise_rms_m),
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from analysis.identification import Identification, MonteCarlo
+from analysis.identification import Identification, ModelSelection, MonteCarlo
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
 from analysis.record import Record, StandMasses
@@ -93,6 +93,15 @@ def read_warning(document: dict[str, Any]) -> ResultWarning:
     if "template" not in document:
         return ResultWarning(document["code"], Message(document["message"]))
     return ResultWarning(document["code"], msgspec.convert(document, Message))
+
+
+def read_model(document: dict[str, Any]) -> ModelSelection | None:
+    """The chosen model of an analysis without those tried; degrees of old ones follow from `adequate`."""
+    model = document["model"]
+    if model is None:
+        return None
+    own = {"degree": "ideal" if model["adequate"] else "none"} | model | {"tried": ()}
+    return msgspec.convert(own, ModelSelection)
 
 
 def json_values(value: Any) -> Any:

@@ -169,9 +169,9 @@ def _write_values(group: h5py.Group, values: dict[str, Any]) -> None:
 
 
 def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
-    """One column a key; numbers that are absent are NaN."""
+    """One column a key; numbers that are absent are NaN, words of a list stand in one text."""
     for name in rows[0] if rows else ():
-        column = [row[name] for row in rows]
+        column = [", ".join(x) if isinstance(x := row[name], list) else x for row in rows]
         if isinstance(column[0], str):
             data = [text.encode() for text in column]
             kind = h5py.string_dtype("utf-8", max(1, *map(len, data)))

@@ -5,6 +5,7 @@ import datetime
 import h5py
 import msgspec
 
+from analysis.identification import Degree
 from app.runs import schema
 from app.runs.columns import stored_rows
 from app.runs.fields import read_text
@@ -40,6 +41,7 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     stale: bool = False
     """Masses, calibration or pullback have been changed since the newest saved analysis."""
     adequate: bool | None = None  # whether its model fits; None where it has none
+    friction_holds: bool = False  # it does not, but independent estimates of f_d agree
     identifier: str = ""  # UUID given when it was recorded: the same under every name
     edits: int = 0
     conditions: Conditions = Conditions()
@@ -59,6 +61,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
     rows = stored_rows(file)
     analyses = read_analyses(file)
     friction = analyses[-1].document["results"].get("friction_dynamic", {}) if analyses else {}
+    model = (analyses[-1].document["model"] or {}) if analyses else {}
     return RunSummary(
         path=file.filename,
         **{name: getattr(metadata, name) for name in _OF_METADATA},
@@ -69,7 +72,8 @@ def summarize_file(file: h5py.File) -> RunSummary:
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
         stale=bool(analyses) and analyses[-1].metadata_hash != metadata_hash(file, metadata),
-        adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
+        adequate=model.get("adequate"),
+        friction_holds=model.get("degree") == Degree.FRICTION.value,
         identifier=read_identifier(file),
         edits=len(file[schema.HISTORY]),
     )

@@ -44,6 +44,7 @@ _LOWER, _UPPER = "friction_static_lower", "friction_static_upper"
 _MARKS = (
     ("not-adequate", Tone.BAD, N_("law does not fit")),
     ("outlying-run", Tone.WARN, N_("outlier")),
+    ("friction-holds", Tone.WARN, N_("law does not fit, f_d holds")),
     ("runs-differ", Tone.WARN, N_("runs differ")),
     ("no-friction", Tone.WARN, N_("no f_d")),
     ("gain-not-stated", Tone.WARN, N_("gain not stated")),
@@ -224,7 +225,9 @@ def _spread_mark(row: SeriesRow) -> Chip:
 def _run_row(run: RunResult, *, is_outlier: bool = False) -> RunRow:
     friction, status = run.results.get(_FRICTION), EMPTY_CHIP
     value, uncertainty = ("–", "") if friction is None else number_text.format_uncertain(friction)
-    if run.adequate is False:
+    if run.friction_holds:
+        status = Chip(gettext("law does not fit, f_d holds"), Tone.WARN)
+    elif run.adequate is False:
         status = Chip(gettext("law does not fit"), Tone.BAD)
     elif is_outlier:
         status = Chip(gettext("outlier"), Tone.WARN)

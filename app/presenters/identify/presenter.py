@@ -245,7 +245,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
 
 def _model_of(run: AnalysedRun) -> str:
-    return "" if run.model is None else run.model.name
+    return "" if run.model is None else run.model.full_name
 
 
 def _model_note(shown: _Shown) -> Chip:

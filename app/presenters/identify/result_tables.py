@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import uncertainty_decimals, with_unit
-from analysis.identification import FittedModel, ModelSelection
+from analysis.identification import Degree, FittedModel, ModelSelection
 from analysis.quantities import BudgetLine, Quantity
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
@@ -31,16 +31,16 @@ def model_rows(first: AnalysedRun, run: AnalysedRun) -> tuple[ModelRow, ...]:
     model, shown = first.model, run.model
     if model is None or shown is None or run.kind != "two-mass":
         return ()
-    anew = {tried.name: tried for tried in shown.tried}
-    all_tried = [anew.get(tried.name, tried) for tried in model.tried]
+    anew = {tried.full_name: tried for tried in shown.tried}
+    all_tried = [anew.get(tried.full_name, tried) for tried in model.tried]
     best = min((tried.bic for tried in all_tried), default=0.0)
     return tuple(
         ModelRow(
-            name=tried.name,
+            name=tried.full_name,
             friction=number_text.format_fixed(tried.friction_dynamic, 5),
             ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
             status=_judged(tried, tried.bic - best, model),
-            is_shown=tried.name == shown.name,
+            is_shown=tried.full_name == shown.full_name,
         )
         for tried in sorted(all_tried, key=lambda tried: tried.bic)
     )
@@ -117,7 +117,9 @@ def no_scan_reason(run: AnalysedRun) -> str:
 
 def _judged(tried: FittedModel, above_best: float, model: ModelSelection) -> Chip:
     """Whether the selected law fits, and how likely the others are."""
-    if tried.name == model.name:
+    if tried.full_name == model.full_name:
+        if model.degree is Degree.FRICTION:
+            return Chip(gettext("does not fit, f_d holds"), Tone.WARN)
         return Chip(gettext("fits"), Tone.OK) if model.adequate else Chip(gettext("does not fit"), Tone.BAD)
     if not math.isfinite(above_best):
         return Chip("–")

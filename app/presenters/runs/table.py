@@ -133,6 +133,8 @@ def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
         return "▲ " + gettext("no motion to fit"), Tone.WARN, ""
     if run.adequate:
         return "✓ " + gettext("fits"), Tone.OK, ""
+    if run.friction_holds:
+        return "▲ " + gettext("does not fit, f_d holds"), Tone.WARN, ""
     return "■ " + gettext("does not fit"), Tone.BAD, ""
 
 

@@ -75,6 +75,11 @@ def _add_headline(layout: QVBoxLayout, state: IdentifyState, result: Result) -> 
     for chip in (state.model_note, state.missing_data, *(Chip(text, Tone.WARN) for text in result.warnings)):
         if chip.text:
             layout.addWidget(_chip(chip, TextRole.TEXT))
+    if result.about_stand:
+        layout.addSpacing(8)
+        layout.addWidget(label(gettext("About the stand"), TextRole.HEADING))
+    for text in result.about_stand:
+        layout.addWidget(_chip(Chip(text, Tone.WARN), TextRole.TEXT))
 
 
 def _add_section(layout: QVBoxLayout, title: str, grid: QGridLayout) -> None:

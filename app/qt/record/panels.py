@@ -214,7 +214,8 @@ class ResultPanel(QWidget):
         show_chip(self._end_status, result.end_status)
         for target, row in zip(self._rows, padded(result.rows, _RESULT_ROWS_MAX, None), strict=True):
             target.show_row(row)
-        for warning, text in zip(self._warnings, padded(result.warnings, _WARNINGS_MAX, ""), strict=True):
+        texts = padded((*result.about_stand, *result.warnings), _WARNINGS_MAX, "")
+        for warning, text in zip(self._warnings, texts, strict=True):
             show_chip(warning, Chip(text, Tone.WARN))
 
 

@@ -159,6 +159,7 @@ def _nearest(row: SeriesRow, runs: dict[str, RunResult]) -> str:
     def distance(name: str) -> tuple[bool, float]:
         run = runs[name]
         found = run.results.get(_FRICTION)
-        return run.adequate is False, float("inf") if found is None else abs(found.value - mean)
+        off = float("inf") if found is None else abs(found.value - mean)
+        return run.adequate is False and not run.friction_holds, off
 
     return min(row.runs, key=distance)

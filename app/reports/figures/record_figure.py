@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.catalogue import Place, Unit, definition
-from analysis.identification import Identification
+from analysis.identification import Degree, Identification
 from analysis.record import Record
 from app.reports.figures.style import (
     PLATE,
@@ -115,6 +115,8 @@ def figure_title(title: str, identification: Identification) -> str:
     """Title with f_d, or T, n and x_k of one mass, and the verdict on the fitted law."""
     found, model = identification.results.get("friction_dynamic"), identification.model
     verdict = "model fits" if model and model.adequate else "model does not fit"
+    if model and model.degree is Degree.FRICTION:
+        verdict = "model does not fit, $f_d$ holds"
     if identification.kind == "one-mass":
         shown = [(definition(name), identification.results[name]) for name in _ONE_MASS]
         values = [f"{row.symbol.latex} = {row.format(one, Place.REPORT).in_print}" for row, one in shown]

@@ -54,7 +54,7 @@ def has_inadequate_run(row: SeriesRow) -> bool:
     return any(caution.code == "not-adequate" for caution in row.warnings)
 
 
-OUTLIER, INADEQUATE = "*", "!"
+OUTLIER, INADEQUATE, FRICTION_HOLDS = "*", "!", "~"
 
 
 def table_quantities(optional: Collection[str] = ()) -> tuple[QuantityDefinition, ...]:
@@ -68,9 +68,11 @@ def table_headers(optional: Collection[str] = ()) -> tuple[str, ...]:
 def row_cells(row: SeriesRow, optional: Collection[str] = ()) -> tuple[str, ...]:
     """Cells of a row, `0.10030(64)`, bounds for f_s without a value, "" where undetermined.
 
-    `*` marks a quantity with an outlier, `!` a series with a run that no law fits.
+    `*` marks a quantity with an outlier, `!` a series with a run that no law fits, `~` one with
+    a run that no law fits, but whose f_d holds.
     """
-    doubt = INADEQUATE if has_inadequate_run(row) else ""
+    holds = any(caution.code == "friction-holds" for caution in row.warnings)
+    doubt = INADEQUATE if has_inadequate_run(row) else FRICTION_HOLDS if holds else ""
     values = (_cell(row, column) for column in table_quantities(optional))
     return (row.label + doubt, str(len(row.runs)), *values)
 

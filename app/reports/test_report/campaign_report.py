@@ -155,6 +155,7 @@ def _runs(material: CampaignReportInput) -> blocks.Grid:
         metadata, found = material.gathered.details[run.name].metadata, run.results.get(_FRICTION)
         name, begun = _local(run.name, material), metadata.start_time.strftime("%Y-%m-%d %H:%M")
         law = "left out" if run.excluded else _VERDICTS[run.adequate]
+        law = "does not fit, f_d holds" if run.friction_holds and not run.excluded else law
         value = "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print
         texts = metadata.operator, metadata.conditions.as_text(), metadata.note
         rows.append([name, run.series.label, begun, *texts, law, value])

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, Literal
 
 from analysis.catalogue import (
     CATALOGUE,
@@ -16,9 +16,10 @@ from analysis.catalogue import (
     definition,
 )
 from analysis.formatting import format_interval, format_uncertainty, typeset, typeset_sentence
-from analysis.identification import Identification
+from analysis.identification import Degree, Identification
 from analysis.plate.trends import velocity_statement
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
+from analysis.verdict_text import EFFECT_TITLES, describe_verdict
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.style import print_style, reading_units
 from app.reports.test_report import blocks, shared
@@ -42,7 +43,11 @@ _ENDINGS: Final = {
 def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str = "") -> list[Section]:
     """All sections of the report of one run; `excluded` is why it does not count."""
     found, run = analysis.identification, analysis.run
-    warnings = [f"{warning.message} ({warning.code})" for warning in found.warnings]
+    of_stand: list[str] = []
+    warnings: list[str] = []
+    for warning in found.warnings:
+        texts = of_stand if warning.code in EFFECT_TITLES else warnings
+        texts.append(f"{warning.message} ({warning.code})")
     sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
     columns = [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
     return [
@@ -53,6 +58,7 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         shared.gauges_section([run.metadata.gauges]),
         shared.PROCEDURE,
         Section("Results", list(_results(found))),
+        *([Section("About the stand", [blocks.Points(of_stand)])] if of_stand else []),
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
         Section("Warnings", [blocks.Points(warnings) if warnings else Text("None.")]),
@@ -90,9 +96,10 @@ def _result(found: Identification, unit: str) -> Iterator[blocks.Block]:
         f"{shown.scale * size:.3g} {shown.symbol}"
         for size in (found.model.residual_rms_m, found.model.noise_rms_m)
     )
-    fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
-    text = f"The law {found.model.name} {fits} (residual {residual}, noise {noise})."
-    yield blocks.Conclusion(symbol, value, text, "ok" if found.model.adequate else "bad")
+    verdict = str(describe_verdict(found.model, found.kind))
+    text = f"{verdict[0].upper()}{verdict[1:]} (residual {residual}, noise {noise})."
+    holds: Literal["warn", "bad"] = "warn" if found.model.degree is Degree.FRICTION else "bad"
+    yield blocks.Conclusion(symbol, value, text, "ok" if found.model.adequate else holds)
     yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(row, quantity)}.")
 
 

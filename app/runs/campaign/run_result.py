@@ -9,6 +9,7 @@ import h5py
 import msgspec
 
 from analysis.campaign.series import RunResult, SeriesKey
+from analysis.identification import Degree
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import Progress, analyze_run
@@ -103,6 +104,7 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
             [stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number]
         ),
         adequate=(document["model"] or {}).get("adequate"),
+        friction_holds=(document["model"] or {}).get("degree") == Degree.FRICTION.value,
         msk64_degree=document["results"].get("msk64_degree", ""),
         warnings=tuple(map(read_warning, document["warnings"])),
     )

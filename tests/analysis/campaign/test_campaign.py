@@ -10,6 +10,7 @@ from analysis.audit import KILOGRAM_FORCE_N
 from analysis.campaign.campaign import compare_with_published, summarize
 from analysis.campaign.series import SeriesKey
 from analysis.quantities import BudgetLine, BudgetSource, ResultWarning
+from app.reports.table.text import row_cells
 from config.files import published_table
 from messages.message import message
 from tests.campaign_kit import FRICTION, VELOCITY, friction_run, key_of, run
@@ -161,6 +162,14 @@ def test_doubts_of_a_row_are_said():
         "not-adequate", "single-run", "gain-not-stated",
     ]  # fmt: skip
     assert [caution.code for caution in campaign.rows[1].warnings] == ["no-friction"]
+
+
+def test_a_run_whose_friction_holds_without_a_model_is_marked_otherwise_than_one_without():
+    holds = replace(friction_run("a", "1FFM0", 0.1), adequate=False, friction_holds=True)
+    campaign = summarize([holds])
+
+    assert next(caution.code for caution in campaign.rows[0].warnings) == "friction-holds"
+    assert row_cells(campaign.rows[0])[0] == "1FFM0~"
 
 
 def test_ratio_of_static_to_dynamic_friction_by_contact():

@@ -3,12 +3,15 @@
 import pytest
 from stage import analysed
 
-from analysis.identification import ModelSelection
+from analysis.identification import Degree, ModelSelection
+from analysis.laws.stand_parts import EFFECTS
+from analysis.one_mass.parts import PARTS
 from analysis.quantities import Quantity, ResultWarning
+from analysis.verdict_text import EFFECT_TITLES, describe_verdict
 from app.acquisition.messages import EndReason
 from app.presenters import results
 from app.presenters.base import Tone
-from messages.message import message
+from messages.message import Message, message
 
 
 def test_friction_stands_first_with_its_uncertainty() -> None:
@@ -18,7 +21,7 @@ def test_friction_stands_first_with_its_uncertainty() -> None:
         ("T", "319.942", "± 0.048\u202fms"),
         ("n<sub>1</sub>", "0.1203", "± 0.0042\u00a01/s"),
     ]
-    assert result.fit == "coulomb+tilt, residual 21\u202fµm, noise 20\u202fµm"
+    assert result.fit == "coulomb+tilt explains the record; residual 21\u202fµm, noise 20\u202fµm"
     assert result.comparison == "True value 0.10000: found +0.30\u202f%"
     assert result.model_status.text == "Model fits"
 
@@ -27,8 +30,35 @@ def test_a_model_that_does_not_fit_is_said_so_in_words() -> None:
     bad = ModelSelection("coulomb", False, 4.2e-4, 2.0e-5)
     result = results.make_result(analysed(model=bad))
     assert (result.model_status.text, result.model_status.tone) == ("Model does not fit", Tone.BAD)
-    assert result.fit == "coulomb, residual 420\u202fµm, noise 20\u202fµm"
+    assert result.fit == (
+        "No model explains the record (the residual exceeds the noise): f_d cannot be told; "
+        "residual 420\u202fµm, noise 20\u202fµm"
+    )
     assert result.comparison == ""
+
+
+def test_friction_that_holds_is_told_from_a_record_that_tells_none() -> None:
+    holds = ModelSelection(
+        "coulomb", False, 4.2e-4, 2.0e-5, degree=Degree.FRICTION, parts=("arc",), residual_share=0.0025
+    )
+    warnings = (ResultWarning("arc", Message("the table moves on an arc")), ResultWarning("x", Message("y")))
+
+    result = results.make_result(analysed(model=holds, warnings=warnings))
+
+    assert result.model_status.tone is Tone.WARN
+    assert result.fit.startswith("No model explains the record (0.25 % of the swing is left), but f_d holds")
+    assert result.about_stand == ("The table moves on an arc",)
+    assert result.warnings == ("Y",)
+
+
+def test_effects_of_the_stand_are_named_in_the_verdict() -> None:
+    stand = ModelSelection(
+        "coulomb+tilt", True, 2e-5, 2e-5, degree=Degree.STAND, parts=("release-ramp", "film")
+    )
+    assert str(describe_verdict(stand)) == (
+        "coulomb+tilt on a stand with a slow release + a viscous film explains the record"
+    )
+    assert {effect.name for effect in EFFECTS} | {part.name for part in PARTS} <= set(EFFECT_TITLES)
 
 
 def test_without_slip_the_bound_of_static_friction_takes_the_first_place() -> None:

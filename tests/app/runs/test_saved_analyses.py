@@ -62,7 +62,7 @@ def test_document_is_that_of_the_interface(run_path):
     assert document["results"]["friction_static"]["standard_uncertainty"] is None
     assert document["model"]["name"] == "coulomb"
     assert document["model"]["tried"][1] == {
-        "name": "static", "bic": None, "residual_rms_m": 2e-5, "friction_dynamic": 0.1,
+        "name": "static", "bic": None, "residual_rms_m": 2e-5, "friction_dynamic": 0.1, "parts": [],
     }  # fmt: skip
     assert document["budget"][0]["source"] == "gauge 1 gain"
     assert document["events"] == {
