@@ -87,7 +87,7 @@ class TableOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FiguresOptions:
-    """Draw the paper's figures 2 to 5 from runs, and friction by slip, for print.
+    """Draw the paper's figures 2 to 5, and friction by slip.
 
     2 is f_s and f_d by contact, 3a to 5b are the motion of a run, fd-... the friction of its slips.
     Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
