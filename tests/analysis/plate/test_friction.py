@@ -105,3 +105,13 @@ def test_friction_of_slips_scatters_about_the_mean_by_its_uncertainty() -> None:
     assert np.median(found.friction_standard_uncertainty) < 1e-3
     assert (np.diff(found.time_s) > 0.0).all()
     assert found.path_m.sum() > abs(found.position_m[-1])
+
+
+def test_slips_in_one_direction_alone_give_nothing() -> None:
+    """Friction and tilt cannot be told apart; on a slope the plate always slides downhill."""
+    truth = _TRUTH.replace(friction_dynamic=0.36, friction_static=0.38, tilt_rad=0.1)
+    signs = truth.parameters().simulate(truth.duration_s).phase_signs
+    assert set(signs[signs != 0]) == {1}
+    assert (signs == 1).sum() > 3
+    record = simulate_record(truth)
+    assert estimate_plate_friction(record, prepare(record)) is None
