@@ -135,6 +135,8 @@ def identify(
     fitted_quantities.add_static_friction_bounds(joint, budget)
     if plate is not None:
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
+    own = budget.results.get("friction_dynamic")
+    fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
     joint, verdict_warnings = judge(joint, plate, budget, min(fits, key=lambda fit: fit.bic))
     warnings = [
         *verdict_warnings,
@@ -162,8 +164,8 @@ def identify(
         warnings,
         joint_fit.named_parameters(joint.chosen, decay),
         joint_fit.fitted_curves(joint.chosen, decay, delays_s),
-        joint_fit.friction_objective(problem, joint.chosen),
-        joint_fit.friction_curves(joint.chosen, decay, delays_s),
+        joint_fit.friction_objective(joint.problem, joint.chosen, fitted_friction),
+        joint_fit.friction_curves(joint.chosen, fitted_friction, decay, delays_s),
         drawn,
         plate,
     )

@@ -315,32 +315,35 @@ def fitted_curves(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> 
     return curves
 
 
-def friction_objective(problem: FitProblem, fit: Fit) -> Callable[[Floats], Floats]:
-    """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted."""
+def friction_objective(problem: FitProblem, fit: Fit, fitted: float) -> Callable[[Floats], Floats]:
+    """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted.
+
+    `fitted` is f_d of the fit, which is a mean where friction varies.
+    """
 
     def objective(friction_dynamic: Floats) -> Floats:
-        points = [_with_friction(fit, friction) for friction in friction_dynamic.tolist()]
+        points = [_with_friction(fit, friction / fitted) for friction in friction_dynamic.tolist()]
         return np.array([problem.chi_square(point, fit.law) for point in points])
 
     return objective
 
 
 def friction_curves(
-    fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]
+    fit: Fit, fitted: float, decay: FreeDecay, delays_s: tuple[float, float]
 ) -> Callable[[float, Floats], Curves]:
-    """What both gauges would read with another f_d, f_s in the fitted ratio to it and all else as fitted."""
+    """What both gauges would read with another f_d, all else as for `friction_objective`."""
 
     def curves(friction_dynamic: float, time_s: Floats) -> Curves:
-        moved = replace(fit, parameters=_with_friction(fit, friction_dynamic))
+        moved = replace(fit, parameters=_with_friction(fit, friction_dynamic / fitted))
         return fitted_curves(moved, decay, delays_s)(time_s)
 
     return curves
 
 
-def _with_friction(fit: Fit, friction_dynamic: float) -> Floats:
+def _with_friction(fit: Fit, ratio: float) -> Floats:
     both = [Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC]
     point = fit.parameters.copy()
-    point[both] *= friction_dynamic / fit.value(Parameter.FRICTION_DYNAMIC)
+    point[both] *= ratio
     return project_to_bounds(point, fit.law)
 
 

@@ -126,8 +126,7 @@ def _objective(found: Identification) -> Objective | None:
     scanned = np.linspace(max(friction.value - reach, 1e-4), friction.value + reach, _SCANNED)
     scanned = np.sort(np.append(scanned, friction.value))
     costs = found.objective(scanned)
-    best = found.objective(np.array([found.parameters[FRICTION.name]]))[0]
-    residual_m = found.model.residual_rms_m * np.sqrt(costs / best)
+    residual_m = found.model.residual_rms_m * np.sqrt(costs / costs.min())
     return Objective(scanned, residual_m, friction.value, friction.interval_95)
 
 

@@ -78,6 +78,22 @@ def test_a_refit_keeps_the_effects_of_the_stand_in_the_frame_of_the_record():
         assert again.rms_m == pytest.approx(truth.noise_m, rel=0.05)
 
 
+def test_friction_that_varies_is_moved_about_its_mean():
+    truth = Truth(tilt_rad=1e-3, duration_s=5.0)
+    values = {"friction_gradient_per_m": 20.0}
+    made = simulate_record(truth, stand_displacements(truth.parameters(), values, 5.1))
+
+    found = identify(made)
+
+    assert found.model.parts == ("gradient",)
+    mean = found.results["friction_dynamic"].value
+    assert mean != pytest.approx(found.parameters["friction_dynamic"], rel=0.01)
+    costs = found.objective(mean * np.array([0.99, 1.0, 1.01]))
+    assert costs.argmin() == 1
+    as_fitted = found.curves(made.time_s).relative_displacement_m
+    assert found.curves_by_friction(mean, made.time_s).relative_displacement_m == pytest.approx(as_fitted)
+
+
 def test_a_table_pushed_the_other_way_is_refitted_in_its_own_frame():
     truth = Truth(tilt_rad=1e-3, duration_s=5.0)
     made = simulate_record(truth)
