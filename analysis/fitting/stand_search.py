@@ -25,7 +25,7 @@ from analysis.laws.stand_parts import (
     compose,
     extended_point,
 )
-from analysis.motion.stand_motion import STAND_PARAMETER_COUNT, StandParameter
+from analysis.motion.stand_motion import INTEGRATION_ERROR_M, STAND_PARAMETER_COUNT, StandParameter
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import DampedCosine
 
@@ -52,7 +52,7 @@ _EXPLAINED_SHARE_MIN = 0.2
 """Share of what is not explained by which an effect lowers the BIC at the least: one of four does, and an
 effect that does less is not what is wrong with the record."""
 _TAIL_PERIODS = 8.0  # of the stick tail in which effects are looked for
-_FOLLOWED_BIC = 2000.0  # above the best: sets farther off are given up
+_FOLLOWED_BIC = 2000.0  # above twice the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
@@ -332,9 +332,13 @@ class StandSearch:
 
 
 def extended_problem(problem: FitProblem) -> FitProblem:
-    """The problem with the parameters of the stand, of which nothing is known."""
+    """The problem with the parameters of the stand, of which nothing is known.
+
+    Its noise is at least the error of integrated motions.
+    """
     return replace(
         problem,
+        noise_m=(max(problem.noise_m[0], INTEGRATION_ERROR_M), max(problem.noise_m[1], INTEGRATION_ERROR_M)),
         prior_mean=extended_point(problem.prior_mean),
         prior_deviation=np.concatenate((problem.prior_deviation, np.full(STAND_PARAMETER_COUNT, np.inf))),
     )
@@ -382,7 +386,9 @@ def _lowest(trials: list[_Trial]) -> list[_Trial]:
         for trial in found.values()
         if not any(less.names < trial.names and less.bic <= trial.bic for less in found.values())
     )
-    return [best, *(trial for trial in others if trial.bic < best.bic + _FOLLOWED_BIC)][:_FOLLOWED]
+    return [best, *(trial for trial in others if trial.bic < best.bic + best.minimum.cost + _FOLLOWED_BIC)][
+        :_FOLLOWED
+    ]
 
 
 def _explains(window: FitProblem, trial: _Trial) -> bool:

@@ -9,7 +9,7 @@ from app.presenters.identify.state import SlipPlot, SlipPlots
 from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.plots import PlotStack, pen, shade
+from app.qt.widgets.plots import Plot, PlotStack, pen, shade
 from app.qt.widgets.text import label
 
 _POINT = 5  # in pixels
@@ -26,7 +26,7 @@ class SlipPages(QWidget):
         self._statement = label(wrap=True)
         self._statement.setContentsMargins(16, 4, 16, 0)
         self._stacks = [PlotStack(theme, (("", "channel_2"),), interactive=False) for _ in range(3)]
-        self._items: list[Any] = []
+        self._items: list[tuple[Plot, Any]] = []
         self.cursors = CursorLines(self._stacks[-1].plots)
         make_column(self._statement, *((stack, 1) for stack in self._stacks), of=self)
         theme.changed.connect(self._draw)
@@ -47,15 +47,16 @@ class SlipPages(QWidget):
         return self._stacks[-1].time_range()
 
     def _draw(self) -> None:
-        for item in self._items:
-            item.getViewBox().removeItem(item)
+        for pane, item in self._items:
+            pane.view.removeItem(item)
         self._items = []
         self.cursors.restyle(self._theme.tokens)
         for stack in self._stacks:
             stack.restyle()
         for stack, plot in zip(self._stacks, () if self._shown is None else self._shown.plots, strict=False):
             stack.set_time_title(plot.axis)
-            self._items += [stack.plots[0].add(item) for item in self._items_of(plot)]
+            pane = stack.plots[0]
+            self._items += [(pane, pane.add(item)) for item in self._items_of(plot)]
 
     def _items_of(self, plot: SlipPlot) -> list[Any]:
         tokens, trend = self._theme.tokens, plot.trend
