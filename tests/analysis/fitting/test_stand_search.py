@@ -1,0 +1,49 @@
+"""Effects of a stand, found in records of an independent integrator."""
+
+import pytest
+from synthetic import Truth, simulate_record
+
+from analysis.identification import Degree
+from analysis.identify import identify
+from benchmarks.real_stand import REL, RealStand, U
+
+KINDS = {
+    "release ramp": ({"release_ramp_s": 0.011}, "release-ramp", "release_ramp_s", 0.011),
+    "hardening": ({"spring_hardening": 0.011}, "spring-hardening", "spring_hardening", 0.011),
+    "dry friction of the stand": ({"stand_friction_m": 3e-5}, "stand-friction", "stand_friction_m", 3e-5),
+    "film": ({"film_s_per_m": 1.0}, "film", "film_s_per_m", 1.0),
+    "second mode": (
+        {"second_mode_frequency_hz": 8.2, "second_mode_share": 0.01},
+        "second-mode", "second_mode_frequency_hz", 8.2,
+    ),
+}  # fmt: skip
+
+
+def record_of(stand: RealStand):
+    motion = stand.simulate(10.5)
+
+    def displacements(since_s):
+        state = motion.sample(since_s.clip(0.0))
+        return state[U], state[REL]
+
+    return simulate_record(Truth(), displacements), motion.friction_dynamic
+
+
+@pytest.mark.parametrize(("changes", "effect", "name", "size"), KINDS.values(), ids=KINDS)
+def test_the_effect_is_named_with_its_size_and_f_d_holds(changes, effect, name, size):
+    record, friction = record_of(RealStand(**changes))
+    found = identify(record)
+
+    assert found.model.degree is Degree.STAND
+    assert found.model.parts == (effect,)
+    assert effect in [warning.code for warning in found.warnings]
+    assert found.results[name].value == pytest.approx(size, rel=0.05)
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+def test_an_ideal_stand_shows_no_effect():
+    record, friction = record_of(RealStand())
+    found = identify(record)
+
+    assert (found.model.degree, found.model.parts) == (Degree.IDEAL, ())
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=1e-3)

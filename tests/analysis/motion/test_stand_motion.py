@@ -1,0 +1,53 @@
+"""Motion on stands that are not ideal, against the closed form and against an independent integrator."""
+
+import numpy as np
+import pytest
+
+from analysis.laws.stand_parts import stand_displacements
+from analysis.motion.stand_motion import INTEGRATION_ERROR_M
+from analysis.motion.two_mass import TwoMassParameters
+from benchmarks.real_stand import REL, RealStand, U
+
+TIMES_S = np.linspace(-0.1, 5.0, 2041)
+STANDS = {
+    "release ramp": ({"release_ramp_s": 0.011}, {"release_ramp_s": 0.011}),
+    "push": ({"release_velocity_m_per_s": 0.01}, {"release_velocity_m_per_s": 0.01}),
+    "hardening": ({"spring_hardening": 0.02}, {"spring_hardening": 0.02}),
+    "asymmetry of the springs": ({"spring_asymmetry": 0.01}, {"spring_asymmetry": 0.01}),
+    "drag": ({"drag_per_m": 0.3}, {"drag_per_m": 0.3}),
+    "film": ({"film_s_per_m": 1.0}, {"film_s_per_m": 1.0}),
+    "gradient": ({"friction_gradient_per_m": 3.0}, {"friction_gradient_per_m": 3.0}),
+    "wear": ({"friction_wear_per_m": -0.5}, {"friction_wear_per_m": -0.5}),
+    "asymmetry of friction": ({"friction_asymmetry": 0.03}, {"friction_asymmetry": 0.03}),
+    "arc": ({"arc_per_m": 2.0}, {"arc_per_m": -2.0}),
+}
+
+
+def parameters(static: float = 0.13) -> TwoMassParameters:
+    return TwoMassParameters.from_free_decay(
+        period_s=0.32, damping_n1_per_s=0.12, table_mass_kg=131.6, plate_mass_kg=22.4, friction_dynamic=0.1,
+        friction_static=static, pullback_m=0.012,
+    )  # fmt: skip
+
+
+def test_without_effects_it_is_the_motion_in_closed_form():
+    exact = parameters().simulate(5.1).sample_displacements(TIMES_S)
+    for one, other in zip(stand_displacements(parameters(), {}, 5.1)(TIMES_S), exact, strict=True):
+        np.testing.assert_allclose(one, other, atol=INTEGRATION_ERROR_M)
+
+
+@pytest.mark.parametrize(("effects", "real"), STANDS.values(), ids=STANDS)
+def test_it_is_the_motion_of_an_independent_integrator(effects, real):
+    moving = TIMES_S >= 0.0
+    state = RealStand(friction_static_ratio=1.3, **real).simulate(5.1).sample(TIMES_S[moving])
+    table, relative = stand_displacements(parameters(), effects, 5.1)(TIMES_S)
+    np.testing.assert_allclose(table[moving], state[U], atol=INTEGRATION_ERROR_M)
+    np.testing.assert_allclose(relative[moving], state[REL], atol=INTEGRATION_ERROR_M)
+
+
+def test_dry_friction_of_the_stand_is_smoothed_by_micrometres_only():
+    moving = TIMES_S >= 0.0
+    state = RealStand(friction_static_ratio=1.3, stand_friction_m=3e-5).simulate(5.1).sample(TIMES_S[moving])
+    table, relative = stand_displacements(parameters(), {"stand_friction_m": 3e-5}, 5.1)(TIMES_S)
+    np.testing.assert_allclose(table[moving], state[U], atol=5e-6)
+    np.testing.assert_allclose(relative[moving], state[REL], atol=5e-6)
