@@ -105,9 +105,7 @@ _DWELL_S = 0.1  # unit of the logarithm: sticks last some tenths of a second
 _BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
 _STEP_RAD = 0.14  # of the slipping table's motion: local errors of 1e-7 of the swing
 _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
-_REVERSAL_SHARE = 3e-4
-"""Speed below which friction of the stand is proportional to speed, over the largest speed of the table."""
-_STIFF = 0.5  # largest share of that speed by which friction of the stand changes it in one step
+_TURN_STEPS = 4  # of the search for the time at which the table turns; its velocity is nearly a line there
 INTEGRATION_ERROR_M = 1e-6  # of displacements, against motions in closed form
 _NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
 _EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halved at the least every other
@@ -150,14 +148,21 @@ def track_factor(parts: Floats, direction: float, relative: float, path: float) 
 
 
 @compiled_part
-def table_force(parameters: Floats, parts: Floats, time: float, state: Floats, reversal: float) -> float:
+def dry_force(parameters: Floats, parts: Floats, displacement: float, heading: float, force: float) -> float:
+    """Dry friction of the stand (N), against the table's `heading`, or at rest (0) the other `force`."""
+    limit: float = parameters[STIFFNESS] * (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * abs(displacement))
+    if heading != 0.0:
+        return -heading * limit
+    return -force if abs(force) <= limit else -math.copysign(limit, force)
+
+
+@compiled_part
+def table_force(parameters: Floats, parts: Floats, time: float, state: Floats) -> float:
     """Force of springs, damping, hook and second mode on the table (N)."""
-    u, v, c = state[0], state[1], parameters[STIFFNESS]
+    u, v = state[0], state[1]
     mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
     force: float = -spring_force(parameters, parts, u) - parameters[DAMPING] * v
     force -= mass * parts[DRAG] * abs(v) * v
-    if parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0:
-        force -= c * (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * abs(u)) * math.tanh(v / reversal)
     if time < parts[RAMP]:
         force += hold_share(parts, time) * spring_force(parameters, parts, parameters[PULLBACK])
     if parts[MODE_MASS] != 0.0:
@@ -173,20 +178,24 @@ def slope(
     sign: float,
     time: float,
     path: float,
-    reversal: float,
+    heading: float,
     state: Floats,
     out: Floats,
 ) -> float:
     """Write the derivative of `state` in a phase into `out`; return the plate's vertical acceleration.
 
-    `path` is the slid path before the phase, less `sign` times u2 - u1 at its start.
+    `path` is the slid path before the phase, less `sign` times u2 - u1 at its start; `heading` is the sign of
+    u1', 0 at a turning point.
     """
     u, v, slip, relative = state[0], state[1], state[2], state[3]
     gravity, plate, arc = parameters[GRAVITY], parameters[PLATE_MASS], parts[ARC]
     table = parameters[TABLE_MASS] * (1.0 - parts[MODE_MASS])
     both = plate + table
-    force = table_force(parameters, parts, time, state, reversal) - both * arc * arc * u * v * v
+    is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
+    force = table_force(parameters, parts, time, state) - both * arc * arc * u * v * v
     if sign == 0.0:
+        if is_dry:
+            force += dry_force(parameters, parts, u, heading, force)
         acceleration = force / (both * (1.0 + arc * arc * u * u))
         rate = 0.0
     else:
@@ -196,6 +205,8 @@ def slope(
             friction *= 1.0 + parts[LOGARITHMIC] * math.log(1.0 + speed / _LOGARITHMIC_VELOCITY_M_PER_S)
         friction *= sign * track_factor(parts, sign, relative, path + sign * relative)
         load = gravity * (friction - parameters[TILT]) + friction * arc * v * v
+        if is_dry:
+            force += dry_force(parameters, parts, u, heading, force + plate * load)
         inertia = table + both * arc * arc * u * u - plate * friction * arc * u
         acceleration = (force + plate * load) / inertia
         rate = -load - friction * arc * u * acceleration - acceleration
@@ -224,7 +235,7 @@ def _step(
     sign: float,
     time: float,
     path: float,
-    reversal: float,
+    heading: float,
     state: Floats,
     trial: Floats,
     slopes: Floats,
@@ -237,13 +248,13 @@ def _step(
     """
     for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[0, i]
-    slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[1])
+    slope(parameters, parts, sign, time + 0.5 * step, path, heading, trial, slopes[1])
     for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[1, i]
-    slope(parameters, parts, sign, time + 0.5 * step, path, reversal, trial, slopes[2])
+    slope(parameters, parts, sign, time + 0.5 * step, path, heading, trial, slopes[2])
     for i in range(size):
         trial[i] = state[i] + step * slopes[2, i]
-    slope(parameters, parts, sign, time + step, path, reversal, trial, slopes[3])
+    slope(parameters, parts, sign, time + step, path, heading, trial, slopes[3])
     for i in range(size):
         rise = slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]
         trial[i] = state[i] + step / 6.0 * rise
@@ -255,7 +266,7 @@ def demand(
     time: float,
     stuck_s: float,
     path: float,
-    reversal: float,
+    heading: float,
     state: Floats,
     rates: Floats,
 ) -> tuple[float, float]:
@@ -263,7 +274,7 @@ def demand(
 
     Overwrites `rates`.
     """
-    vertical = slope(parameters, parts, 0.0, time, 0.0, reversal, state, rates)
+    vertical = slope(parameters, parts, 0.0, time, 0.0, heading, state, rates)
     wanted = rates[1] + rates[7] - parameters[GRAVITY] * parameters[TILT]
     direction = -1.0 if wanted > 0.0 else 1.0
     static = max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
@@ -287,13 +298,13 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     if parts[MODE_MASS] != 0.0:
         longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[MODE_FREQUENCY]))
     pull = abs(parameters[PULLBACK])
-    dry = (parts[STAND_FRICTION] + parts[LOSS_FACTOR] * pull) * frequency * frequency
-    reversal = max(_REVERSAL_SHARE * frequency * pull, longest * abs(dry) / _STIFF, 1e-9)
+    is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
     phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 7))
     state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
-    excess, direction = demand(parameters, parts, 0.0, _HELD_S, 0.0, reversal, state, slopes[4])
+    heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
+    excess, direction = demand(parameters, parts, 0.0, _HELD_S, 0.0, heading, state, slopes[4])
     sign = direction if excess > 0.0 else 0.0
     new_phase, unchecked = True, False
     while time < duration_s and node < _NODES_MOST and abs(state[0]) < _ESCAPE * pull + _ESCAPE_M:
@@ -303,21 +314,21 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                 phases = _doubled(phases)
             row = phases[count]
             row[0], row[1], row[2], row[3], row[4], row[5] = time, sign, state[0], state[1], state[3], node
-            slope(parameters, parts, sign, time, along, reversal, state, slopes[0])
+            slope(parameters, parts, sign, time, along, heading, state, slopes[0])
             nodes = _append_node(nodes, node, time, state, slopes[0])
             count, node, new_phase, began = count + 1, node + 1, False, time
         step = min(longest, duration_s - time)
         if time < parts[RAMP]:
             step = min(step, max(parts[RAMP] - time, 1e-9))
-        _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
+        _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
         last = _event(
-            parameters, parts, sign, time + step, time + step - began, path, reversal, trial, slopes[4]
+            parameters, parts, sign, time + step, time + step - began, path, heading, trial, slopes[4]
         )
         if last > 0.0 and not unchecked:
             if sign != 0.0 and state[2] * sign <= 0.0:
                 for _ in range(_GRAZING_DIVISIONS):
                     step *= 0.25
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
+                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
                     last = -sign * trial[2]
                     if last < 0.0:
                         break
@@ -326,13 +337,13 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                     state[2] = 0.0
                     continue
             else:
-                first = _event(parameters, parts, sign, time, time - began, path, reversal, state, slopes[4])
+                first = _event(parameters, parts, sign, time, time - began, path, heading, state, slopes[4])
                 low, high, low_value, high_value = 0.0, step, min(first, 0.0), last
                 for _ in range(_EVENT_STEPS):
                     step = high - (high - low) * high_value / (high_value - low_value)
                     if not low < step < high:
                         step = 0.5 * (low + high)
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
+                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
                     value = _event(
                         parameters,
                         parts,
@@ -340,7 +351,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                         time + step,
                         time + step - began,
                         path,
-                        reversal,
+                        heading,
                         trial,
                         slopes[4],
                     )
@@ -352,20 +363,31 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                         break
                 if high - step > 0.0 and step == low:
                     step = high
-                    _step(parameters, parts, sign, time, along, reversal, state, trial, slopes, step, size)
+                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
                 new_phase = True
+        if is_dry and heading * trial[1] < 0.0:  # the table turns within the step
+            low, high, low_value, high_value = 0.0, step, heading * state[1], heading * trial[1]
+            for _ in range(_TURN_STEPS):
+                step = low + (high - low) * low_value / (low_value - high_value)
+                _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
+                if heading * trial[1] > 0.0:
+                    low, low_value = step, heading * trial[1]
+                else:
+                    high, high_value = step, heading * trial[1]
+            trial[1], new_phase = 0.0, False
         unchecked = False
         time += step
         if sign != 0.0:
             path += sign * (trial[3] - state[3])
         for i in range(size):
             state[i] = trial[i]
-        slope(parameters, parts, sign, time, path - sign * state[3], reversal, state, slopes[0])
+        heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
+        slope(parameters, parts, sign, time, path - sign * state[3], heading, state, slopes[0])
         nodes = _append_node(nodes, node, time, state, slopes[0])
         node += 1
         if new_phase:
             stuck_s = time - began if sign == 0.0 else 0.0
-            excess, direction = demand(parameters, parts, time, stuck_s, path, reversal, state, slopes[4])
+            excess, direction = demand(parameters, parts, time, stuck_s, path, heading, state, slopes[4])
             if sign != 0.0:
                 state[2] = 0.0
                 sign = direction if excess > 0.0 else 0.0
@@ -381,7 +403,7 @@ def _event(
     time: float,
     since_s: float,
     path: float,
-    reversal: float,
+    heading: float,
     state: Floats,
     rates: Floats,
 ) -> float:
@@ -389,7 +411,7 @@ def _event(
     if sign != 0.0:
         overrun: float = -sign * state[2]
         return overrun
-    excess, _ = demand(parameters, parts, time, since_s, path, reversal, state, rates)
+    excess, _ = demand(parameters, parts, time, since_s, path, heading, state, rates)
     return excess
 
 
