@@ -137,7 +137,9 @@ def identify(
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     own = budget.results.get("friction_dynamic")
     fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
-    joint, verdict_warnings = judge(joint, plate, budget, min(fits, key=lambda fit: fit.bic))
+    joint, verdict_warnings = judge(
+        joint, plate, budget, min(fits, key=lambda fit: fit.bic), law_is_given=model != "auto"
+    )
     warnings = [
         *verdict_warnings,
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),

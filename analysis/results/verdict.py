@@ -30,11 +30,16 @@ _CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however
 
 
 def judge(
-    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget, ideal: Fit
+    joint: JointFit,
+    plate: PlateFriction | None,
+    budget: UncertaintyBudget,
+    ideal: Fit,
+    *,
+    law_is_given: bool = False,
 ) -> tuple[JointFit, list[ResultWarning]]:
     """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for.
 
-    `ideal` is the likeliest fit on an ideal stand.
+    `ideal` is the likeliest fit on an ideal stand. A law that was asked for keeps its f_d.
     """
     selection, results = joint.selection, budget.results
     own = results.get(_NAME)
@@ -50,7 +55,10 @@ def judge(
             return joint, []
         _add_model_spread(budget, own, math.hypot(spread, difference))
         return joint, [_disagreement(own, plate)]
-    if plate is not None and plate.misfit < _MISFIT_MAX and difference < _SPREAD_MAX * own.value:
+    holds = plate is not None and plate.misfit < _MISFIT_MAX and difference < _SPREAD_MAX * own.value
+    if law_is_given:
+        return _with_degree(joint, Degree.FRICTION if holds else Degree.NONE), []
+    if plate is not None and holds:
         budget.remove(_NAME)
         shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: difference}
         budget.add(_NAME, plate.friction_dynamic, shares)
