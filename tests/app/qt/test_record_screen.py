@@ -145,7 +145,7 @@ def test_the_result_is_read_off_the_state(stage: Stage) -> None:
         "± 0.00064",
         "✓ Model fits",
         "319.942",
-        "coulomb+tilt, residual 21\u202fµm, noise 20\u202fµm",
+        "coulomb+tilt explains the record; residual 21\u202fµm, noise 20\u202fµm",
         "▲ The tail does not decay exponentially.",
         "✓ Ended: more samples would not sharpen the result",
     ):
