@@ -1,5 +1,7 @@
 """Errors of run files. Each message names the file, the fault and the remedy in one line."""
 
+import os
+import traceback
 from pathlib import Path
 from typing import cast
 
@@ -114,7 +116,12 @@ def one_line(error: BaseException) -> str:
 
 
 def internal_error(error: Exception) -> Message:
-    """Message for a fault of the program itself."""
+    """Message for a fault of the program itself; with SLIPSTAND_DEBUG its traceback goes to stderr.
+
+    Worker processes write to the stderr of the process that started them.
+    """
+    if os.environ.get("SLIPSTAND_DEBUG"):
+        traceback.print_exception(error)
     template = N_(
         "Slipstand itself failed ({kind}: {text}). "
         "Set SLIPSTAND_DEBUG=1, run it again and report what it prints"

@@ -16,6 +16,7 @@ from app.runs.batch.executors import (
     open_executor,
     ordered_map,
 )
+from app.runs.batch.tasks import AnalysisTask, analyze_runs
 
 
 class Unhurried(Executor):
@@ -132,3 +133,15 @@ def test_few_runs_are_done_here_and_many_in_processes():
         assert crew.workers == 2
     with open_executor(ExecutorOptions(jobs=64), 3) as crew:
         assert crew.workers == 3
+
+
+@pytest.mark.parametrize("debug", ["", "1"])
+def test_a_crash_in_a_worker_prints_its_traceback_where_that_is_wanted(
+    processes, short_runs, monkeypatch, capfd, debug
+):
+    monkeypatch.setenv("SLIPSTAND_DEBUG", debug)
+    no_request = AnalysisTask(str(short_runs[0]), None)
+    (outcome,) = analyze_runs([no_request], processes)
+    assert outcome.error.template.startswith("Slipstand itself failed")
+    printed = capfd.readouterr().err
+    assert ("Traceback (most recent call last)" in printed) == bool(debug)
