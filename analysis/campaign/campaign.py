@@ -1,4 +1,4 @@
-"""Summary of a campaign: rows by series, effects, ratios, excluded runs, and the published table beside."""
+"""Summary of a campaign: series, causes, ratios, excluded runs, effects of the stand, the published table."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from analysis.campaign.contacts import ContactRatio, friction_ratios
 from analysis.campaign.effects import Effects, find_effects
 from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow, pool_rows
 from analysis.campaign.series import RunResult, campaign_warnings, group_into_series, run_names
+from analysis.campaign.stand_effects import EffectSummary, summarize_effects
 from analysis.catalogue import table_columns
 from analysis.quantities import ResultWarning
 from messages.i18n import N_
@@ -32,6 +33,7 @@ class Campaign:
     msk64_degrees: tuple[str, ...]  # degrees that the table reached, each once, lowest first
     excluded: tuple[Excluded, ...]
     warnings: tuple[ResultWarning, ...]
+    effects_of_stand: tuple[EffectSummary, ...] = ()
 
 
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
@@ -54,6 +56,7 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
         tuple(dict.fromkeys(row.msk64_degree for row in shaken if row.msk64_degree)),
         tuple(Excluded(run.name, run.excluded) for run in runs if run.excluded),
         (*campaign_warnings(counted, known_contacts), *_run_warnings(counted)),
+        summarize_effects(counted),
     )
 
 

@@ -46,6 +46,9 @@ class RunResult:
     stand_id: str = ""  # runs on the same stand share the errors of masses, gravity and clock
     adequate: bool | None = None  # the friction law explains the record; None where no law was fitted
     friction_holds: bool = False  # no model does, but independent estimates of f_d agree
+    effects: tuple[str, ...] | None = None
+    """Names of the effects of the stand in the model; None where none were looked for."""
+    noise_m: float | None = None  # standard deviation of the readings; None where no law was fitted
     msk64_degree: str = ""  # "" where unknown
     excluded: str = ""  # why the run does not count; "" when it does
     warnings: tuple[ResultWarning, ...] = ()

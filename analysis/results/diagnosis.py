@@ -1,9 +1,13 @@
 """Warnings that name what is wrong with a stand, with its size and a remedy."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from analysis.catalogue import Place, definition
 from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, STAND_PARAMETERS, StandEffect
-from analysis.quantities import Quantity, ResultWarning, result_warning
+from analysis.quantities import Quantity, ResultWarning
 from messages.i18n import N_
+from messages.message import Message, message
 
 SENTENCES = {
     "release-ramp": N_("the release took {size}: use a sharper hook."),
@@ -59,20 +63,30 @@ def diagnose(effects: tuple[StandEffect, ...], results: dict[str, Quantity]) -> 
     """One warning for each effect that the model holds."""
     warnings = []
     for effect in effects:
-        names = [STAND_PARAMETERS[place].name for place in effect.own]
-        names += [SHARED_NAMES[place][0] for place in effect.shared if place in SHARED_NAMES]
-        shown = {name: _text(results, CORNER_NAMES.get(name, name)) for name in names}
-        if SENTENCES[effect.name] and all(shown.values()):
-            values = {"size": shown[_largest(names, results) if effect.name in _SAME_KIND else names[0]]}
-            if "second_mode_frequency_hz" in shown:
-                values["frequency"] = shown["second_mode_frequency_hz"]
-            warnings.append(result_warning(effect.name, SENTENCES[effect.name], **values))
+        names = result_names(effect)
+        if SENTENCES[effect.name] and all(name in results for name in names):
+            texts = {name: str(definition(name).format(results[name], Place.WINDOW)) for name in names}
+            told = main_result(effect, {name: results[name].value for name in names})
+            warnings.append(ResultWarning(effect.name, diagnosis(effect, texts, told)))
     return warnings
 
 
-def _largest(names: list[str], results: dict[str, Quantity]) -> str:
-    return max(names, key=lambda name: abs(results[name].value))
+def result_names(effect: StandEffect) -> list[str]:
+    """Names of the results that hold the sizes of an effect, the one that its sentence tells first."""
+    names = [STAND_PARAMETERS[place].name for place in effect.own]
+    names += [SHARED_NAMES[place][0] for place in effect.shared if place in SHARED_NAMES]
+    return [CORNER_NAMES.get(name, name) for name in names]
 
 
-def _text(results: dict[str, Quantity], name: str) -> str:
-    return str(definition(name).format(results[name], Place.WINDOW)) if name in results else ""
+def main_result(effect: StandEffect, values: Mapping[str, float]) -> str:
+    """Name of the result that the sentence of an effect tells, of the sizes `values` by name."""
+    names = result_names(effect)
+    return max(names, key=lambda name: abs(values[name])) if effect.name in _SAME_KIND else names[0]
+
+
+def diagnosis(effect: StandEffect, texts: Mapping[str, str | Message], told: str) -> Message:
+    """Sentence on an effect with its remedy; `texts` are its sizes by name, `told` the main one."""
+    values: dict[str, Any] = {"size": texts[told]}
+    if "second_mode_frequency_hz" in texts:
+        values["frequency"] = texts["second_mode_frequency_hz"]
+    return message(SENTENCES[effect.name], **values)

@@ -92,7 +92,7 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
     plate_mass_line = BudgetLine(BudgetSource.PLATE_MASS, "plate_mass_kg", mass_u_kg)
     found = document["results"].items()
     results = {name: read_quantity(value) for name, value in found if isinstance(value, dict)}
-    stand, device = metadata.stand, metadata.device
+    stand, device, model = metadata.stand, metadata.device, document["model"] or {}
     calibrations = (metadata.gauges.table, metadata.gauges.relative)
     return RunResult(
         name=str(path),
@@ -103,11 +103,19 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
         stand_id=_hash(
             [stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number]
         ),
-        adequate=(document["model"] or {}).get("adequate"),
-        friction_holds=(document["model"] or {}).get("degree") == Degree.FRICTION.value,
+        adequate=model.get("adequate"),
+        friction_holds=model.get("degree") == Degree.FRICTION.value,
+        effects=_effects(model),
+        noise_m=model.get("noise_rms_m"),
         msk64_degree=document["results"].get("msk64_degree", ""),
         warnings=tuple(map(read_warning, document["warnings"])),
     )
+
+
+def _effects(model: Document) -> tuple[str, ...] | None:
+    """Effects of the stand in a model; None of a law that was asked for, and of versions that knew none."""
+    looked_for = "parts" in model and len(model["tried"]) > 1
+    return tuple(model["parts"]) if looked_for else None
 
 
 def series_key(metadata: RunMetadata) -> SeriesKey:
