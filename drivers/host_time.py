@@ -53,6 +53,29 @@ class ActiveTimer:
         return self._elapsed_ns * 1e-9
 
 
+class ArrivalTimer:
+    """Times the arrival of samples from the first read on; a standstill of this computer starts it anew."""
+
+    _STANDSTILL_NS = 500_000_000
+    """After so long without a read, samples may have been lost."""
+
+    def __init__(self) -> None:
+        self._first_ns = self._last_ns = 0
+        self._before = 0.0
+        self.samples = 0.0  # that came after the first read
+
+    @property
+    def elapsed_s(self) -> float:
+        return (self._last_ns - self._first_ns) * 1e-9
+
+    def add(self, samples: float) -> None:
+        """Take the number of samples that have come until now, after a read."""
+        now_ns = host_ns()
+        if now_ns - self._last_ns > self._STANDSTILL_NS:
+            self._first_ns, self._before = now_ns, samples
+        self._last_ns, self.samples = now_ns, samples - self._before
+
+
 class HostMonitor:
     """Detects that this computer was suspended, stood still, or had its clock set; to be checked often."""
 

@@ -127,10 +127,17 @@ def rate_from_response(response: Response) -> float | None:
     return rate_hz if 0 < rate_hz < float("inf") else None
 
 
-def text_from_response(response: Response) -> str:
-    """A serial number or version as text, which some models send as numbers; "" if the device refuses."""
-    if not response.is_ok:
-        return ""
-    if response.payload and all(0x20 < byte < 0x7F for byte in response.payload):
-        return response.payload.decode("ascii")
-    return ".".join(str(byte) for byte in response.payload)
+def serial_number_from_response(response: Response) -> str:
+    """Serial number, a u32 (me-systeme, GSV-6PI example); "" if the device does not send one."""
+    numbers = _unpack(response, ">I")
+    return str(numbers[0]) if numbers else ""
+
+
+def firmware_from_response(response: Response) -> str:
+    """Firmware version, two u16 (me-systeme, MEGSV86x64.h); "" if the device does not send one."""
+    return ".".join(map(str, _unpack(response, ">HH")))
+
+
+def _unpack(response: Response, layout: str) -> tuple[int, ...]:
+    is_number = response.is_ok and len(response.payload) == struct.calcsize(layout)
+    return struct.unpack(layout, response.payload) if is_number else ()

@@ -13,12 +13,15 @@ from drivers.samples import SampleStatus
 from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
 from drivers.stream import parse_settings
 
-SERIAL_NUMBER = b"15060001"
-FIRMWARE = bytes([0, 1, 0, 45])
+SERIAL_NUMBER = 15_060_001
+FIRMWARE = (1, 45)
 MAX_RATE_HZ = 48_000.0
 _MIN_REQUEST_BYTES = 4
 _FLOAT = commands.set_float()[3:-1]
-_VALUES = {Code.SERIAL_NUMBER: SERIAL_NUMBER, Code.FIRMWARE: FIRMWARE}
+_VALUES = {
+    Code.SERIAL_NUMBER: struct.pack(">I", SERIAL_NUMBER),
+    Code.FIRMWARE: struct.pack(">HH", *FIRMWARE),
+}
 _KINDS: dict[int, CommandKind] = {
     Code.START: CommandKind.START,
     Code.STOP: CommandKind.STOP,

@@ -7,10 +7,11 @@ from drivers.devices.gsv.commands import (
     encode_request,
     encode_response,
     find_response,
+    firmware_from_response,
     rate_from_response,
+    serial_number_from_response,
     set_float,
     set_input,
-    text_from_response,
     write_rate,
 )
 from drivers.errors import SettingsError
@@ -81,7 +82,10 @@ def test_a_rate_is_read():
         assert rate_from_response(said) is None
 
 
-def test_letters_are_read_as_letters_and_all_else_as_numbers():
-    assert text_from_response(Response(0, b"15060001")) == "15060001"
-    assert text_from_response(Response(0, bytes([0, 1, 0, 45]))) == "0.1.0.45"
-    assert text_from_response(Response(0x40)) == ""
+def test_the_serial_number_is_one_number_and_the_firmware_two():
+    """me-systeme: GSV-6PI example unpacks `>I`; MEGSV86x64.h has the version in bits 31-16 and 15-0."""
+    assert serial_number_from_response(Response(0, bytes.fromhex("00e5cc61"))) == "15060065"
+    assert serial_number_from_response(Response(0, bytes.fromhex("05f5e0ff"))) == "99999999"
+    assert firmware_from_response(Response(0, bytes.fromhex("0001002d"))) == "1.45"
+    for read in (serial_number_from_response, firmware_from_response):
+        assert read(Response(0x40)) == read(Response(0x40, bytes(4))) == read(Response(0, b"12")) == ""

@@ -41,9 +41,9 @@ class Firmware:
             case Code.READ_RATE:
                 return encode_response(0, struct.pack(">f", self.rate_hz))
             case Code.SERIAL_NUMBER:
-                return encode_response(0, b"15060001")
+                return encode_response(0, bytes.fromhex("00e5cc61"))
             case Code.FIRMWARE:
-                return encode_response(0, bytes([1, 45]))
+                return encode_response(0, bytes.fromhex("0001002d"))
             case Code.START:
                 return encode_response(0) + b"".join(frames(FRAMES, self.layout))
         return encode_response(0)
@@ -72,7 +72,7 @@ def test_the_conversation_of_a_start():
         encode_request(Code.READ_RATE),
         encode_request(Code.START),
     ]
-    assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV", "1.45", "15060001")
+    assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV", "1.45", "15060065")
     assert source.rate_hz == 500.0
     assert source.filters == (ChannelFilter(1, 200.0),) * 2
     block = read_out(source, link, first)
@@ -120,6 +120,62 @@ def test_a_rate_that_is_not_taken_is_said():
         make_source({}, 2000).start(ScriptedLink(Firmware(refuses=[Code.WRITE_RATE])))
     with pytest.raises(ProtocolError, match="does not tell its rate"):
         make_source({}, None).start(ScriptedLink(Firmware(refuses=[Code.READ_RATE])))
+
+
+class Stream(ScriptedLink):
+    """A device that sends `sent_hz` frames a second by a clock of its own, whatever rate it says."""
+
+    def __init__(self, monkeypatch, sent_hz: float) -> None:
+        firmware = Firmware()
+        super().__init__(lambda sent: b"" if sent[2] == Code.START else firmware(sent))
+        self._sent_hz, self._now_ns, self._started_ns, self._given = sent_hz, 10**12, None, 0
+        for name in ("drivers.stream.time.monotonic", "drivers.host_time.host_ns"):
+            scale = 1 if name.endswith("host_ns") else 1e-9
+            monkeypatch.setattr(name, lambda scale=scale: self._now_ns * scale)
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+        if data[2] == Code.START:
+            self._started_ns = self._now_ns
+
+    def read(self) -> bytes:
+        self._now_ns += 20_000_000
+        if self._started_ns is None:
+            return super().read()
+        due = int((self._now_ns - self._started_ns) * 1e-9 * self._sent_hz)
+        first, self._given = self._given, due
+        return b"".join(frames(due - first, first=first)) if due > first else b""
+
+
+def test_the_stream_is_timed_because_a_gsv_6_may_not_have_taken_its_rate(monkeypatch):
+    monkeypatch.setattr(GsvSource, "timeout_s", 3.0)
+    with pytest.raises(ProtocolError, match=r"says 500 Hz and sends 100 Hz: switch it off .* --rate 100$"):
+        make_source({}, 500).start(Stream(monkeypatch, 100.0))
+    with pytest.raises(ProtocolError, match=r"says 500 Hz and sends 2\.99 Hz"):
+        make_source({}, 500).start(Stream(monkeypatch, 3.0))
+    for sent_hz in (500.0, 530.0):
+        link = Stream(monkeypatch, sent_hz)
+        source = make_source({}, 500)
+        first = source.start(link)
+        assert 0.5 <= len(first) / TWO.length / sent_hz < 0.7  # all of it is decoded
+        assert source.rate_hz == 500.0
+
+
+def test_a_slow_stream_is_not_timed(monkeypatch):
+    monkeypatch.setattr(GsvSource, "timeout_s", 3.0)
+    source = make_source({}, 2)
+    assert source.start(Stream(monkeypatch, 2.0))
+
+
+def test_the_scale_of_whole_numbers_is_said_to_be_unverified():
+    source = make_source({"format": "device"}, None)
+    source.start(ScriptedLink(Firmware(FrameLayout(2, ValueKind.INT16))))
+    assert "sends int16, whose scale was not verified on hardware: calibrate in this format" in str(
+        source.run_note
+    )
+    source = make_source({}, None)
+    source.start(ScriptedLink(Firmware()))
+    assert not source.run_note
 
 
 def test_a_device_that_does_not_say_who_it_is():
