@@ -43,9 +43,12 @@ def test_two_transmitters_on_one_bus_need_two():
 def test_the_status_of_an_enod4():
     poll = poll_for(map="scaime-enod4")
     bits = {0b0000: (False, False), 0b0100: (False, True), 0b1000: (True, False), 0b1100: (True, True)}
+    bits |= {0b1_0000: (False, False), 0b100_0000: (False, True)}  # at rest; EEPROM failure
     for word, (is_overloaded, is_faulty) in bits.items():
         reading = poll.channel_values([struct.pack(">Hi", word, 9)] * 2)[0]
         assert (reading.is_overloaded, reading.is_faulty) == (is_overloaded, is_faulty)
+    assert [(one.register, one.count) for one in poll.requests] == [(0x7D, 3), (0x7D, 3)]
+    assert not read_map("scaime-enod4", {}).caution
 
 
 def test_registers_that_do_not_touch_are_read_apart():

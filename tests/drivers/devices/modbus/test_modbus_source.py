@@ -127,7 +127,6 @@ def test_a_rate_is_labelled_as_quasi_static_below_500_hz(clock):
     assert str(started(quick, rate_hz=500.0).run_note) == ""
     enod4 = started(Transmitter(clock, map="scaime-enod4"), {"map": "scaime-enod4"}, 100.0)
     assert "quasi-static" in str(enod4.run_note)
-    assert "addresses of map scaime-enod4 are unconfirmed" in str(enod4.run_note)
     assert "gauge 2 is asked" in str(enod4.run_note)
 
 
@@ -155,6 +154,25 @@ def test_the_zero_command_is_sent_only_when_asked_for(clock):
     link.registers.store_sample(COUNTS + 3, 0)
     block = rows(source, polls(source, link, 1))
     np.testing.assert_array_equal(block.counts, [[3, 3]])
+
+
+def test_a_tlb4_is_zeroed_by_function_16(clock):
+    link = Transmitter(clock, map="laumas-tlb4")
+    source = started(link, {"map": "laumas-tlb4", "zero": "true"}, 100.0)
+    written = [data for data in link.sent if data[1] == 16]
+    assert [data[:-2].hex(" ") for data in written] == [
+        "01 10 00 05 00 01 02 00 08", "02 10 00 05 00 01 02 00 08"
+    ]  # fmt: skip
+    link.registers.store_sample(COUNTS + 3, 0)
+    block = rows(source, polls(source, link, 1))
+    np.testing.assert_array_equal(block.counts, [[3, 3]])
+
+
+def test_a_caution_of_the_map_is_in_every_run(clock, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text('caution = "mind the gap"\nunit = 1\n[table]\nregister = 0\n[relative]\nregister = 2\n')
+    source = started(Transmitter(clock), {"map": str(own)}, 100.0)
+    assert str(source.run_note).endswith("; mind the gap")
 
 
 def test_a_refused_zero_command(clock):
