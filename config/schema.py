@@ -234,6 +234,7 @@ class Device(_Checked, frozen=True):
     protocol: str = "slipstand-binary"
     baud: int | None = None
     parity: Literal["N", "E", "O"] = "N"
+    stop_bits: Literal[1, 2] = 1
     rate_hz: float | None = None
     settings: dict[str, Any] = {}
 

@@ -22,6 +22,7 @@ from messages.i18n import N_
 _log = logging.getLogger(__name__)
 
 PARITIES = ("N", "E", "O")
+STOP_BITS = (1, 2)
 PROCESSES = Path("/proc")
 _READ_TIMEOUT_S = 0.05
 """How long a read waits for its first byte: threads that read are stopped within this time."""
@@ -89,9 +90,10 @@ class PortConfig:
     url: str
     baud: int
     parity: str = "N"
+    stop_bits: int = 1
 
     def open(self) -> OpenPort:
-        return open_port(self.url, self.baud, self.parity)
+        return self._open(self.url)
 
     def reopen(self, lost: PortInfo) -> OpenPort:
         """Open the port of the same device, wherever it is now. Raises DriverError while it is gone."""
@@ -99,7 +101,10 @@ class PortConfig:
         if url is None:
             template = N_("the device of {port} is not there: plug it in again, into the same socket")
             raise PortUnavailableError(template, port=lost.device)
-        return open_port(url, self.baud, self.parity)
+        return self._open(url)
+
+    def _open(self, url: str) -> OpenPort:
+        return open_port(url, self.baud, self.parity, self.stop_bits)
 
 
 def list_ports() -> list[PortInfo]:
@@ -139,17 +144,20 @@ def find_replugged(lost: PortInfo) -> str | None:
     return None
 
 
-def open_port(url: str, baud: int, parity: str = "N") -> "Port":
+def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
     """Open a port for this program alone.
 
     `url` is a device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
-    (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`); `parity` N, E or O; bytes have 8
-    data bits and one stop bit. Raises PortUnavailableError if the port does not exist, is busy, or may not be
-    opened, SettingsError if it cannot be set so.
+    (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`); `parity` N, E or O; `stop_bits`
+    1 or 2; bytes have 8 data bits. Raises PortUnavailableError if the port does not exist, is busy, or may
+    not be opened, SettingsError if it cannot be set so.
     """
     if parity not in PARITIES:
         template = N_("parity {parity!r} is not known: give one of {allowed}")
         raise SettingsError(template, parity=parity, allowed=PARITIES)
+    if stop_bits not in STOP_BITS:
+        template = N_("stop_bits {stop_bits} are not known: give one of {allowed}")
+        raise SettingsError(template, stop_bits=stop_bits, allowed=STOP_BITS)
     if baud <= 0:
         template = N_("baud {baud} is not possible: give the device's baud rate, for example 115200")
         raise SettingsError(template, baud=baud)
@@ -158,7 +166,8 @@ def open_port(url: str, baud: int, parity: str = "N") -> "Port":
         raise port_busy_error(url, users)
     timeouts = {"timeout": _READ_TIMEOUT_S, "write_timeout": _WRITE_TIMEOUT_S}
     try:
-        wire = serial.serial_for_url(url, baudrate=baud, parity=parity, exclusive=True, **timeouts)
+        line = {"baudrate": baud, "parity": parity, "stopbits": stop_bits}
+        wire = serial.serial_for_url(url, exclusive=True, **line, **timeouts)
     except PLATFORM_ERRORS as error:
         raise port_unavailable_error(url, baud, error, [port.device for port in list_ports()]) from error
     absent = (AttributeError, NotImplementedError, *PLATFORM_ERRORS)  # only some platforms have these
@@ -166,7 +175,7 @@ def open_port(url: str, baud: int, parity: str = "N") -> "Port":
         wire.set_low_latency_mode(True)
     with contextlib.suppress(*absent):
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
-    _log.info("opened %s at %d baud, parity %s", url, baud, parity)
+    _log.info("opened %s at %s", url, LineSettings(baud, parity, stop_bits))
     return Port(wire, url)
 
 
@@ -209,6 +218,7 @@ class Port:
         """Change the settings and discard unread bytes. Raises SettingsError, DeviceLostError."""
         try:
             self._wire.baudrate, self._wire.parity = line_settings.baud, line_settings.parity
+            self._wire.stopbits = line_settings.stop_bits
         except PLATFORM_ERRORS as error:
             template = N_("port {port} cannot be set to {baud} baud, parity {parity} ({fault}): give others")
             baud, parity = line_settings.baud, line_settings.parity

@@ -24,13 +24,14 @@ class Link(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """Baud rate and parity of a serial port."""
+    """Baud rate, parity and stop bits of a serial port."""
 
     baud: int
     parity: str = "N"
+    stop_bits: int = 1
 
     def __str__(self) -> str:
-        return f"{self.baud} baud 8{self.parity}1"
+        return f"{self.baud} baud 8{self.parity}{self.stop_bits}"
 
 
 class CancellableLink:

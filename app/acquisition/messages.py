@@ -60,7 +60,8 @@ class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     url: str
     protocol: str
     baud: int | None = None
-    parity: str = "N"
+    parity: str | None = None  # that of the calibration file if None, else N
+    stop_bits: int | None = None  # the same, else 1
     rate_hz: float | None = None
     device: dict[str, str] = {}  # the device's own settings, `--set KEY=VALUE`, checked by its driver
     relative_url: str = ""

@@ -37,6 +37,8 @@ def complete_port_settings(port: PortSettings, device: Device) -> PortSettings:
     return msgspec.structs.replace(
         port,
         baud=device.baud if port.baud is None else port.baud,
+        parity=device.parity if port.parity is None else port.parity,
+        stop_bits=device.stop_bits if port.stop_bits is None else port.stop_bits,
         rate_hz=device.rate_hz if port.rate_hz is None else port.rate_hz,
         device=_texts(device.settings) | port.device,
     )

@@ -66,6 +66,7 @@ def port_settings(options: LinkOptions, port: str, protocol: str) -> PortSetting
         protocol=protocol,
         baud=options.baud,
         parity=options.parity,
+        stop_bits=None if options.stop_bits is None else int(options.stop_bits),
         rate_hz=options.rate,
         device=key_values(options.settings),
         relative_url=options.relative_port,

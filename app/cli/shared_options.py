@@ -62,7 +62,8 @@ class LinkOptions:
     baud: int | None = number(
         "--baud", "Baud rate; the protocol's usual one if absent.", above=0, integer=True
     )
-    parity: str = choice("--parity", ("N", "E", "O"), "N (none), E (even) or O (odd).", "N")
+    parity: str | None = choice("--parity", ("N", "E", "O"), "N (none), E (even) or O (odd); N if absent.")
+    stop_bits: str | None = choice("--stop-bits", ("1", "2"), "1 or 2; 1 if absent.")
     settings: list[str] | None = device_settings()
 
 

@@ -85,6 +85,8 @@ def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> St
     form = ConnectForm(
         protocol=device.protocol,
         baud="" if device.baud is None else str(device.baud),
+        parity=device.parity,
+        stop_bits=str(device.stop_bits),
         rate_hz="" if device.rate_hz is None else f"{device.rate_hz:g}",
     )
     protocols = tuple(driver for driver in DRIVERS.values() if driver.available)

@@ -42,6 +42,7 @@ class ConnectForm:
     baud: str = ""
     rate_hz: str = ""
     parity: str = "N"
+    stop_bits: str = "1"
     settings: str = ""
     """Settings of the device, `KEY=VALUE KEY=VALUE`."""
     relative_port: str = ""  # port of gauge 2 if each gauge has a device of its own

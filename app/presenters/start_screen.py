@@ -87,6 +87,7 @@ def port_settings(form: ConnectForm) -> PortSettings:
         protocol=form.protocol,
         baud=_whole(form.baud.strip(), gettext("Baud")),
         parity=form.parity,
+        stop_bits=int(form.stop_bits),
         rate_hz=_positive(form.rate_hz.strip(), gettext("Rate")),
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),

@@ -113,7 +113,7 @@ class StartScreen(QWidget):
 
 
 class _Form(QWidget):
-    """Port, protocol, baud, rate; parity, settings of the device and a second port are folded away."""
+    """Port, protocol, baud, rate; parity, stop bits, settings and a second port are folded away."""
 
     def __init__(self, presenter: StartPresenter) -> None:
         super().__init__()
@@ -123,6 +123,8 @@ class _Form(QWidget):
         self._protocol = ComboBox()
         self._parity = ComboBox()
         self._parity.addItems([gettext(words) for words in _PARITIES.values()])
+        self._stop_bits = ComboBox()
+        self._stop_bits.addItems(["1", "2"])
         self._fields = {name: QLineEdit() for name in ("baud", "rate_hz", "settings", "relative_port")}
         self._fields["rate_hz"].setPlaceholderText(gettext("as the device is set"))
         self._fields["settings"].setPlaceholderText("KEY=VALUE KEY=VALUE")
@@ -132,12 +134,18 @@ class _Form(QWidget):
         self._more.toggled.connect(self._show_rare)
         self._rare = QWidget()
         self._lay_out()
-        bind_button(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
+        bind_button(
+            self._more,
+            "Alt+M",
+            gettext("Parity, stop bits, the device's own settings, a second device"),
+            self,
+        )
         edits = [field.textEdited for field in self._fields.values()]
         for edited in (
             self._port.currentTextChanged,
             self._protocol.activated,
             self._parity.activated,
+            self._stop_bits.activated,
             *edits,
         ):
             edited.connect(lambda _: presenter.set_form(self._read()))
@@ -152,7 +160,8 @@ class _Form(QWidget):
         form = state.form
         show_texts(self._fields, form)
         self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
-        if form.settings or form.relative_port or form.parity != "N":
+        self._stop_bits.setCurrentText(form.stop_bits)
+        if form.settings or form.relative_port or (form.parity, form.stop_bits) != ("N", "1"):
             self._more.setChecked(True)
         usual = state.selected_protocol.default_baud if state.selected_protocol else None
         self._fields["baud"].setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
@@ -162,6 +171,7 @@ class _Form(QWidget):
             port=self._port.currentText(),
             protocol=self._protocol.currentText(),
             parity=list(_PARITIES)[self._parity.currentIndex()],
+            stop_bits=self._stop_bits.currentText(),
             **{name: field.text() for name, field in self._fields.items()},
         )
 
@@ -181,6 +191,7 @@ class _Form(QWidget):
         rare = make_form_grid(
             [
                 (gettext("Parity"), self._parity),
+                (gettext("Stop bits"), self._stop_bits),
                 (gettext("Settings"), self._fields["settings"]),
                 (gettext("Port 2"), self._fields["relative_port"]),
             ]

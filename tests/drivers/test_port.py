@@ -11,6 +11,7 @@ from drivers.errors import DeviceLostError, PortUnavailableError, QueueFullError
 from drivers.host_time import host_ns
 from drivers.port import (
     Port,
+    PortConfig,
     PortInfo,
     PortUser,
     device_lost_error,
@@ -205,7 +206,26 @@ def test_a_kind_of_url_that_nobody_knows():
         open_port("carrier-pigeon://loft", 115200)
 
 
+@posix
+def test_stop_bits_reach_the_port(terminal):
+    """SCMBus of Scaime is 8N2 (eNod4 software manual). A pseudo-terminal keeps them, not parity."""
+    import termios
+
+    path, (master,) = terminal
+    for config, flags in (
+        (PortConfig(path, 9600, "N", 2), termios.CSTOPB),
+        (PortConfig(path, 9600), 0),
+    ):
+        with config.open() as port:
+            assert termios.tcgetattr(master)[2] & termios.CSTOPB == flags
+            port.configure(LineSettings(9600, "N", 2))
+            assert termios.tcgetattr(master)[2] & termios.CSTOPB
+    assert str(LineSettings(9600, "E", 2)) == "9600 baud 8E2"
+
+
 def test_settings_that_no_port_has():
+    with pytest.raises(SettingsError, match="stop_bits 3 are not known: give one of 1, 2"):
+        open_port("loop://", 9600, stop_bits=3)
     with pytest.raises(SettingsError, match="parity 'X' is not known: give one of N, E, O"):
         open_port("loop://", 9600, parity="X")
     with pytest.raises(SettingsError, match="baud 0 is not possible"):

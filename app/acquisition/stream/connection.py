@@ -103,8 +103,9 @@ class PortOpener:
     def __init__(self, settings: PortSettings, source: SampleSource) -> None:
         baud = settings.baud or find_driver(settings.protocol).default_baud_for(settings.device)
         self._source = source
-        self._config = PortConfig(settings.url, baud, settings.parity)
-        self._second = PortConfig(settings.relative_url, baud, settings.parity)
+        line = baud, settings.parity or "N", settings.stop_bits or 1
+        self._config = PortConfig(settings.url, *line)
+        self._second = PortConfig(settings.relative_url, *line)
         self._opened: tuple[PortInfo, PortInfo] | None = None
         if isinstance(source, PairSource) and settings.relative_url == settings.url:
             raise SettingsError(

@@ -39,6 +39,10 @@ def test_the_calibration_file_says_what_the_port_leaves_open():
     asked = PortSettings("/dev/x", "csv", device={"columns": "relative,table"})
     port = complete_port_settings(asked, device)
     assert (port.baud, port.rate_hz) == (9600, 80.0)
+    line = complete_port_settings(asked, Device("csv", parity="E", stop_bits=2))
+    assert (line.parity, line.stop_bits) == ("E", 2)
+    given = PortSettings("/dev/x", "csv", parity="N", stop_bits=1)
+    assert complete_port_settings(given, Device("csv", parity="E", stop_bits=2)) == given
     assert port.device == {"columns": "relative,table", "time_bits": "16"}
     assert complete_port_settings(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
     other = PortSettings("/dev/x", "slipstand-binary")

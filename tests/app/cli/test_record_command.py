@@ -127,6 +127,7 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
         (["--port", "loop://", "--protocol", "csv", "--calibration", "nix.toml"], "nix.toml"),
         (["--port", "loop://", "--protocol", "csv", "--duration", "-1"], "--duration -1"),
         (["--port", "loop://", "--protocol", "csv", "--parity", "X"], "'X'"),
+        (["--port", "loop://", "--protocol", "csv", "--stop-bits", "3"], "'3'"),
         (["--port", "loop://", "--protocol", "csv", "--trigger", "none"], "--duration"),
         (["--port", "loop://", "--protocol", "csv", "--duration", "1", "--until-rest"], "--until-rest"),
         (["--port", "/dev/none", "--protocol", "csv", "--baud", "0"], "--baud 0"),
@@ -169,6 +170,20 @@ def test_a_device_with_a_wrong_parity_is_said_in_one_line(slipstand: Any, tmp_pa
         outcome = slipstand("record", "--port", url, "--protocol", "csv", "--directory", tmp_path)
         serving.join()
     assert_one_error_line(outcome, "text read with a wrong parity: try --parity N, E or O")
+
+
+def test_stop_bits_of_the_command_reach_the_port(slipstand: Any, tmp_path: Path) -> None:
+    import termios
+
+    device_end, reader_end = os.openpty()
+    try:
+        where = ("--port", os.ttyname(reader_end), "--protocol", "csv", "--directory", tmp_path)
+        assert slipstand("record", *where, "--stop-bits", 2).code == 1
+        flags = termios.tcgetattr(device_end)[2]
+    finally:
+        os.close(device_end)
+        os.close(reader_end)
+    assert flags & termios.CSTOPB
 
 
 def test_a_silent_port_is_said_within_seconds(slipstand: Any, tmp_path: Path) -> None:

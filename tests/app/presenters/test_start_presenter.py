@@ -38,9 +38,11 @@ def presenter(doors: FakeDoors) -> StartPresenter:
 
 def test_a_form_becomes_settings_with_blanks_left_to_the_device() -> None:
     form = ConnectForm(" /dev/ttyUSB0 ", "csv", "", "")
-    assert port_settings(form) == PortSettings("/dev/ttyUSB0", "csv")
+    assert port_settings(form) == PortSettings("/dev/ttyUSB0", "csv", parity="N", stop_bits=1)
     form = ConnectForm("COM7", "csv", " 115200", "1000,5")
-    assert port_settings(form) == PortSettings("COM7", "csv", baud=115200, rate_hz=1000.5)
+    assert port_settings(form) == PortSettings(
+        "COM7", "csv", baud=115200, parity="N", stop_bits=1, rate_hz=1000.5
+    )
 
 
 @pytest.mark.parametrize(
@@ -71,7 +73,7 @@ def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
     presenter.set_form(ConnectForm("COM7", "csv"))
     presenter.connect()
     presenter.navigator.close_connection()
-    assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "closed"]
+    assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv", parity="N", stop_bits=1), "closed"]
 
 
 def test_nothing_is_opened_twice_while_something_is_awaited(
@@ -109,9 +111,11 @@ def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
 
 
 def test_parity_own_settings_and_a_second_port_reach_the_device() -> None:
-    form = ConnectForm("COM7", "modbus", parity="E", settings=" map=dat1400  unit=2 ", relative_port=" COM8 ")
+    form = ConnectForm(
+        "COM7", "modbus", parity="E", stop_bits="2", settings=" map=dat1400  unit=2 ", relative_port=" COM8 "
+    )
     assert port_settings(form) == PortSettings(
-        "COM7", "modbus", parity="E", device={"map": "dat1400", "unit": "2"}, relative_url="COM8"
+        "COM7", "modbus", parity="E", stop_bits=2, device={"map": "dat1400", "unit": "2"}, relative_url="COM8"
     )
     with pytest.raises(ValueError, match="Device setting 'unit' is no KEY=VALUE"):
         port_settings(ConnectForm("COM7", "modbus", settings="map=dat1400 unit"))
