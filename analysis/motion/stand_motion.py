@@ -8,6 +8,7 @@ conditions change sign. Against DOP853 displacements agree to 1e-6 m.
 
 import math
 from enum import IntEnum
+from typing import TypeAlias
 
 import numpy as np
 
@@ -121,6 +122,18 @@ base."""
 _PLAIN = 4  # of them without second mode and moving base
 
 
+Phase: TypeAlias = tuple[float, float, float]
+"""What stays the same over a step: sign of the slip, 0 in a stick; slid path before the phase, less `sign`
+times u2 - u1 at its start (m); and sign of u1', 0 at a turning point. numba's cache cannot be loaded where a
+named tuple has another name."""
+
+
+@compiled_part
+def state_size(parts: Floats) -> int:
+    """How many of the state's values move."""
+    return _STATE if parts[MODE_MASS] != 0.0 or parts[BASE_COMPLIANCE] != 0.0 else _PLAIN
+
+
 @compiled_part
 def hold_share(parts: Floats, time: float) -> float:
     """Share of the hook's first force that it still has."""
@@ -172,21 +185,9 @@ def table_force(parameters: Floats, parts: Floats, time: float, state: Floats) -
     return force
 
 
-def slope(
-    parameters: Floats,
-    parts: Floats,
-    sign: float,
-    time: float,
-    path: float,
-    heading: float,
-    state: Floats,
-    out: Floats,
-) -> float:
-    """Write the derivative of `state` in a phase into `out`; return the plate's vertical acceleration.
-
-    `path` is the slid path before the phase, less `sign` times u2 - u1 at its start; `heading` is the sign of
-    u1', 0 at a turning point.
-    """
+def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: Floats, out: Floats) -> float:
+    """Write the derivative of `state` into `out`; return the plate's vertical acceleration."""
+    sign, path, heading = phase
     u, v, slip, relative = state[0], state[1], state[2], state[3]
     gravity, plate, arc = parameters[GRAVITY], parameters[PLATE_MASS], parts[ARC]
     table = parameters[TABLE_MASS] * (1.0 - parts[MODE_MASS])
@@ -232,29 +233,24 @@ def slope(
 def _step(
     parameters: Floats,
     parts: Floats,
-    sign: float,
+    phase: Phase,
     time: float,
-    path: float,
-    heading: float,
     state: Floats,
     trial: Floats,
     slopes: Floats,
     step: float,
-    size: int,
 ) -> None:
-    """Write the state after `step` into `trial`; `slopes` (5, n) holds the first slope in row 0.
-
-    `size` is how many of the state's values move.
-    """
+    """Write the state after `step` into `trial`; `slopes` (5, n) holds the first slope in row 0."""
+    size = state_size(parts)
     for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[0, i]
-    slope(parameters, parts, sign, time + 0.5 * step, path, heading, trial, slopes[1])
+    slope(parameters, parts, phase, time + 0.5 * step, trial, slopes[1])
     for i in range(size):
         trial[i] = state[i] + 0.5 * step * slopes[1, i]
-    slope(parameters, parts, sign, time + 0.5 * step, path, heading, trial, slopes[2])
+    slope(parameters, parts, phase, time + 0.5 * step, trial, slopes[2])
     for i in range(size):
         trial[i] = state[i] + step * slopes[2, i]
-    slope(parameters, parts, sign, time + step, path, heading, trial, slopes[3])
+    slope(parameters, parts, phase, time + step, trial, slopes[3])
     for i in range(size):
         rise = slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]
         trial[i] = state[i] + step / 6.0 * rise
@@ -263,24 +259,23 @@ def _step(
 def demand(
     parameters: Floats,
     parts: Floats,
+    phase: Phase,
     time: float,
     stuck_s: float,
-    path: float,
-    heading: float,
     state: Floats,
     rates: Floats,
 ) -> tuple[float, float]:
     """By how much the joint acceleration exceeds what static friction holds, and the sign of a slip then.
 
-    Overwrites `rates`.
+    `phase` is that of a stick, with all of the slid path. Overwrites `rates`.
     """
-    vertical = slope(parameters, parts, 0.0, time, 0.0, heading, state, rates)
+    vertical = slope(parameters, parts, phase, time, state, rates)
     wanted = rates[1] + rates[7] - parameters[GRAVITY] * parameters[TILT]
     direction = -1.0 if wanted > 0.0 else 1.0
     static = max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
     if parts[DWELL] != 0.0:
         static *= 1.0 + parts[DWELL] * math.log(1.0 + stuck_s / _DWELL_S)
-    static *= track_factor(parts, direction, state[3], path)
+    static *= track_factor(parts, direction, state[3], phase[1])
     return abs(wanted) - static * (parameters[GRAVITY] + vertical), direction
 
 
@@ -292,7 +287,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     parts = parameters[len(parameters) - STAND_PARAMETER_COUNT :]
     frequency = math.sqrt(parameters[STIFFNESS] / parameters[TABLE_MASS])
     longest = _STEP_RAD / frequency
-    size = _STATE if parts[MODE_MASS] != 0.0 or parts[BASE_COMPLIANCE] != 0.0 else _PLAIN
+    size = state_size(parts)
     if parts[BASE_COMPLIANCE] != 0.0:
         longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[BASE_FREQUENCY]))
     if parts[MODE_MASS] != 0.0:
@@ -304,31 +299,29 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
     heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
-    excess, direction = demand(parameters, parts, 0.0, _HELD_S, 0.0, heading, state, slopes[4])
+    excess, direction = demand(parameters, parts, (0.0, 0.0, heading), 0.0, _HELD_S, state, slopes[4])
     sign = direction if excess > 0.0 else 0.0
     new_phase, unchecked = True, False
     while time < duration_s and node < _NODES_MOST and abs(state[0]) < _ESCAPE * pull + _ESCAPE_M:
-        along = path - sign * state[3]
+        phase = (sign, path - sign * state[3], heading)
         if new_phase:
             if count == len(phases):
                 phases = _doubled(phases)
             row = phases[count]
             row[0], row[1], row[2], row[3], row[4], row[5] = time, sign, state[0], state[1], state[3], node
-            slope(parameters, parts, sign, time, along, heading, state, slopes[0])
+            slope(parameters, parts, phase, time, state, slopes[0])
             nodes = _append_node(nodes, node, time, state, slopes[0])
             count, node, new_phase, began = count + 1, node + 1, False, time
         step = min(longest, duration_s - time)
         if time < parts[RAMP]:
             step = min(step, max(parts[RAMP] - time, 1e-9))
-        _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
-        last = _event(
-            parameters, parts, sign, time + step, time + step - began, path, heading, trial, slopes[4]
-        )
+        _step(parameters, parts, phase, time, state, trial, slopes, step)
+        last = _event(parameters, parts, phase, time + step, time + step - began, trial, slopes[4])
         if last > 0.0 and not unchecked:
             if sign != 0.0 and state[2] * sign <= 0.0:
                 for _ in range(_GRAZING_DIVISIONS):
                     step *= 0.25
-                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
+                    _step(parameters, parts, phase, time, state, trial, slopes, step)
                     last = -sign * trial[2]
                     if last < 0.0:
                         break
@@ -337,23 +330,15 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                     state[2] = 0.0
                     continue
             else:
-                first = _event(parameters, parts, sign, time, time - began, path, heading, state, slopes[4])
+                first = _event(parameters, parts, phase, time, time - began, state, slopes[4])
                 low, high, low_value, high_value = 0.0, step, min(first, 0.0), last
                 for _ in range(_EVENT_STEPS):
                     step = high - (high - low) * high_value / (high_value - low_value)
                     if not low < step < high:
                         step = 0.5 * (low + high)
-                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
+                    _step(parameters, parts, phase, time, state, trial, slopes, step)
                     value = _event(
-                        parameters,
-                        parts,
-                        sign,
-                        time + step,
-                        time + step - began,
-                        path,
-                        heading,
-                        trial,
-                        slopes[4],
+                        parameters, parts, phase, time + step, time + step - began, trial, slopes[4]
                     )
                     if value > 0.0:
                         high, high_value, low_value = step, value, 0.5 * low_value
@@ -363,13 +348,13 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                         break
                 if high - step > 0.0 and step == low:
                     step = high
-                    _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
+                    _step(parameters, parts, phase, time, state, trial, slopes, step)
                 new_phase = True
         if is_dry and heading * trial[1] < 0.0:  # the table turns within the step
             low, high, low_value, high_value = 0.0, step, heading * state[1], heading * trial[1]
             for _ in range(_TURN_STEPS):
                 step = low + (high - low) * low_value / (low_value - high_value)
-                _step(parameters, parts, sign, time, along, heading, state, trial, slopes, step, size)
+                _step(parameters, parts, phase, time, state, trial, slopes, step)
                 if heading * trial[1] > 0.0:
                     low, low_value = step, heading * trial[1]
                 else:
@@ -382,12 +367,14 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
         for i in range(size):
             state[i] = trial[i]
         heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
-        slope(parameters, parts, sign, time, path - sign * state[3], heading, state, slopes[0])
+        phase = (sign, path - sign * state[3], heading)
+        slope(parameters, parts, phase, time, state, slopes[0])
         nodes = _append_node(nodes, node, time, state, slopes[0])
         node += 1
         if new_phase:
             stuck_s = time - began if sign == 0.0 else 0.0
-            excess, direction = demand(parameters, parts, time, stuck_s, path, heading, state, slopes[4])
+            phase = (0.0, path, heading)
+            excess, direction = demand(parameters, parts, phase, time, stuck_s, state, slopes[4])
             if sign != 0.0:
                 state[2] = 0.0
                 sign = direction if excess > 0.0 else 0.0
@@ -399,19 +386,17 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
 def _event(
     parameters: Floats,
     parts: Floats,
-    sign: float,
+    phase: Phase,
     time: float,
     since_s: float,
-    path: float,
-    heading: float,
     state: Floats,
     rates: Floats,
 ) -> float:
     """Positive where a phase has ended: a slip has stopped, or a stick cannot hold."""
-    if sign != 0.0:
-        overrun: float = -sign * state[2]
+    if phase[0] != 0.0:
+        overrun: float = -phase[0] * state[2]
         return overrun
-    excess, _ = demand(parameters, parts, time, since_s, path, heading, state, rates)
+    excess, _ = demand(parameters, parts, phase, time, since_s, state, rates)
     return excess
 
 

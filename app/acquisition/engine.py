@@ -12,6 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from app.acquisition import messages, run_setup
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
@@ -70,28 +72,29 @@ class PollSchedule:
 
 
 class Engine:
-    """A connected device, and the runs recorded from it, one after another."""
+    """A connected device, and the runs recorded from it, one after another.
+
+    `connect` has the port's settings complete.
+    """
 
     def __init__(
         self,
-        port: messages.PortSettings,
+        connect: messages.Connect,
         stand: Stand,
         gauges: Gauges,
         stream: live_stream.LiveStream,
         ring: RingWriter,
         commands: CommandReader[messages.Command],
         events: EventSender[messages.Event],
-        *,
-        low_latency: bool = False,
     ) -> None:
-        self._port = port
+        self._port = connect.port
         self._stand = stand
         self._gauges = gauges
         self._stream = stream
         self._ring = ring
         self._commands = commands
         self._events = events
-        self._poll_schedule = PollSchedule(low_latency=low_latency)
+        self._poll_schedule = PollSchedule(low_latency=connect.low_latency)
         self._rate_hz = stream.rate_hz
         self._history = live_stream.ReadHistory(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
@@ -337,12 +340,12 @@ def serve(
         raise AcquisitionError("an engine is told what to connect to first: send Connect")
     events.send(messages.StateChanged(messages.PullbackState.CONNECTING, 0.0))
     stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
-    port = run_setup.complete_port_settings(connect.port, gauges.device)
+    connect = replace(connect, port=run_setup.complete_port_settings(connect.port, gauges.device))
     with (
-        live_stream.open_stream(port, gauges) as stream,
+        live_stream.open_stream(connect.port, gauges) as stream,
         create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz, gauges) as ring,
     ):
-        engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
+        engine = Engine(connect, stand, gauges, stream, ring, commands, events)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_quit())
         device = stream.identity
         _log.info("connected: %s %s, %g Hz", device.name, device.firmware, stream.rate_hz)

@@ -39,17 +39,16 @@ def write_simulated_run(
     *,
     series: str | None = None,
     rate_hz: float = 1000.0,
-    plateau_s: float = PLATEAU_S,
     replace: bool = False,
     effects: Mapping[str, float] = {},
     read: Read | None = None,
 ) -> StoredRun:
-    """Store a simulated motion, held at the pullback for `plateau_s` first. Raises RunError, ConfigError.
+    """Store a simulated motion, held at the pullback for `PLATEAU_S` first. Raises RunError, ConfigError.
 
     `effects` are true deviations from the ideal stand, by their parameters; `read` is what gauges make of
     the motion.
     """
-    held = round(plateau_s * rate_hz)
+    held = round(PLATEAU_S * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
     times_s = (np.arange(count) - held) / rate_hz
     show = motion.sample_displacements

@@ -10,7 +10,7 @@ import pytest
 from test_long_run_memory import RATE_HZ, READ_NS, Connection, frames
 
 from app.acquisition.engine import Engine
-from app.acquisition.messages import Arm, PortSettings, Quit, RunEnded, RunSettings
+from app.acquisition.messages import Arm, Connect, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
 from app.acquisition.stream.connection import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
@@ -69,8 +69,8 @@ def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quick
     owner = Owner(intake, tmp_path, connection.start_ns, quicker)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ, load_gauges()) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
-        port = PortSettings("fake://", "slipstand-binary")
-        Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner).run()
+        connect = Connect(PortSettings("fake://", "slipstand-binary"), "", "")
+        Engine(connect, load_stand(), load_gauges(), stream, ring, owner, owner).run()
     assert owner.ended is not None
     assert ("instead of 100" in str(owner.ended.message)) == (quicker != 1.0), owner.ended.message
     ending = open_run(owner.ended.path).end

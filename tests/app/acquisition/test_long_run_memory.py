@@ -14,6 +14,7 @@ from app.acquisition.engine import Engine
 from app.acquisition.live_client import LiveIdentifier
 from app.acquisition.messages import (
     Arm,
+    Connect,
     Health,
     PortSettings,
     PullbackState,
@@ -143,8 +144,8 @@ def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     owner = Owner(intake, tmp_path, connection.start_ns)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ, load_gauges()) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
-        port = PortSettings("fake://", "slipstand-binary")
-        Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner, low_latency=True).run()
+        connect = Connect(PortSettings("fake://", "slipstand-binary"), "", "", low_latency=True)
+        Engine(connect, load_stand(), load_gauges(), stream, ring, owner, owner).run()
     (ended,) = [event for event in owner.events if isinstance(event, RunEnded)]
     assert ended.samples == pytest.approx(ALL_READS * READ_SAMPLES, abs=READS_A_STEP * READ_SAMPLES)
     assert owner.blocks[ALL_READS] - owner.blocks[SETTLED_READS] < BLOCKS_MAX
