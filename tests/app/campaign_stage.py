@@ -15,6 +15,7 @@ from app.runs.metadata import create_metadata
 from config.files import load_stand
 from config.schema import Gauge, Gauges
 from messages.message import message
+from tests.effects_kit import effect_run
 
 FOLDER = "/recordings"
 GAUGES = Gauges(*(Gauge(gain_m_per_count=1e-6, zero_count=0.0) for _ in range(2)))
@@ -77,3 +78,12 @@ def found(
     }
     stale = ResultWarning("stale", message("results of a.h5 were stale: new ones are taken."))
     return summarise(CollectedRuns(counted, failures, (stale,), details), ALL_SERIES)
+
+
+def runs_with_a_mode() -> list[RunResult]:
+    """Two runs of a series with the same second mode, and a long release in one."""
+    mode = {"second-mode": (0.019, 8.2, 0.01)}
+    return [
+        effect_run(path_of("1FFM0", 1), mode),
+        effect_run(path_of("1FFM0", 2), mode | {"release-ramp": (0.031,)}),
+    ]

@@ -24,3 +24,24 @@ def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     options = CampaignOptions(series=("1FFM0", "2SSM1"), repeats=1, rate_hz=300.0, duration_s=5.0)
     tests = plan_tests(options, load_stand(), load_gauges(), tmp_path_factory.mktemp("short"), began)
     return [Path(write_test(test).path) for test in tests]
+
+
+@pytest.fixture(scope="session")
+def real_stand_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of three analysed runs, not to be changed: a second mode in all, a long release in one."""
+    from app.runs.analyze import AnalysisRequest, analyze_run
+    from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
+    from config.files import load_gauges, load_stand
+
+    folder = tmp_path_factory.mktemp("real-stand")
+    began = datetime.datetime(2026, 11, 21, 8, 0, tzinfo=datetime.UTC)
+    mode = {"second-mode": 0.03}
+    for number, effects in enumerate((mode, mode, mode | {"release-ramp": 0.02})):
+        options = CampaignOptions(
+            series=("1FFM0",), repeats=1, seed=number, rate_hz=500.0, duration_s=5.0, effects=effects
+        )
+        begins = began + datetime.timedelta(hours=number)
+        for test in plan_tests(options, load_stand(), load_gauges(), folder, begins):
+            path = Path(write_test(test).path)
+            analyze_run(path, AnalysisRequest(classical=False), save=True, trusted=True)
+    return folder

@@ -11,6 +11,7 @@ from analysis.campaign.effects import Effect
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
+from analysis.campaign.stand_effects import EffectScope, EffectSummary
 from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn
 from analysis.formatting import typeset, with_unit
 from analysis.motion.two_mass import TwoMassParameters
@@ -61,6 +62,7 @@ def summarise(runs: CollectedRuns, all_series: Sequence[str]) -> CampaignSummary
         _table_rows(runs, campaign, all_series),
         _contact_bars(runs, campaign),
         tuple(map(_effect_row, campaign.effects.effects)),
+        tuple(map(_stand_effect, campaign.effects_of_stand)),
         _repeatability_rows(campaign),
         plan_next_test(campaign, all_series),
         _excluded_rows(runs, campaign),
@@ -108,6 +110,11 @@ def _effect_row(effect: Effect) -> EffectRow:
     )
 
 
+def _stand_effect(effect: EffectSummary) -> Chip:
+    is_common = effect.scope in (EffectScope.STAND, EffectScope.CONTACT)
+    return Chip(in_words(effect.message), Tone.WARN if is_common else Tone.PLAIN)
+
+
 def _repeatability_rows(campaign: Campaign) -> tuple[RepeatabilityRow, ...]:
     """Repeatability of f_d in each series with several runs, the worst first."""
     with_repeats = [
@@ -142,8 +149,10 @@ def _excluded_rows(runs: CollectedRuns, campaign: Campaign) -> tuple[RunRow, ...
 def _warning_texts(runs: CollectedRuns, campaign: Campaign) -> tuple[str, ...]:
     """Warnings about the runs together and about series, with file names for paths."""
     of_series = chain.from_iterable(row.warnings for row in campaign.rows)
+    told = {effect.name for effect in campaign.effects_of_stand}
+    of_all = (*runs.warnings, *campaign.warnings, *of_series)
     texts = []
-    for warning in (*runs.warnings, *campaign.warnings, *of_series):
+    for warning in (warning for warning in of_all if warning.code not in told):
         text = in_words(warning.message)
         for run in runs.runs:
             text = text.replace(run.name, Path(run.name).name)

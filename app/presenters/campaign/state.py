@@ -128,6 +128,8 @@ class CampaignSummary:
     """Every series of the stand in the paper's order, then other series of the runs."""
     contacts: tuple[ContactBars, ...] = ()
     effects: tuple[EffectRow, ...] = ()
+    stand_effects: tuple[Chip, ...] = ()
+    """Effects of the stand; those of single runs have a plain tone."""
     repeatability: tuple[RepeatabilityRow, ...] = ()
     next_test: NextTest | None = None
     excluded: tuple[RunRow, ...] = ()

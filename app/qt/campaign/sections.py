@@ -1,4 +1,4 @@
-"""The right column of Campaign: runs of a series, next test, effects, repeatability, exclusions, warnings."""
+"""The right column of Campaign: runs of a series, next test, causes, the stand, repeatability, warnings."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -24,6 +24,7 @@ def make_sections(summary: CampaignSummary, presenter: CampaignPresenter) -> QWi
     sections: tuple[tuple[str, list[Item]], ...] = (
         (gettext("Next test"), list(_next_test(summary, presenter))),
         (gettext("What f<sub>d</sub> depends on"), list(_effects(summary))),
+        (gettext("Effects of the stand"), [_chip(chip, wrap=True) for chip in summary.stand_effects]),
         (gettext("How f<sub>d</sub> repeats"), list(_repeatability(summary.repeatability))),
         (gettext("Left out"), [_excluded_row(run, presenter) for run in summary.excluded]),
         (gettext("Without a result"), [_chip(Chip(text, Tone.BAD), wrap=True) for text in summary.faults]),

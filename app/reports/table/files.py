@@ -3,17 +3,14 @@
 import csv
 import io
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
 from analysis.campaign.effects import Effect
-from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place
-from analysis.quantities import Quantity
 from app.reports.table.text import (
     LEGEND,
     PublishedRowComparison,
@@ -27,6 +24,7 @@ from app.reports.table.text import (
     text_lines,
 )
 from app.runs.analysis_json import warning_documents
+from app.runs.campaign.documents import effect_documents, pooled_document, quantity_document
 from app.runs.disk import atomic_write
 from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, write_sheets
 
@@ -190,6 +188,7 @@ def table_document(content: TableContent) -> dict[str, Any]:
         "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
         "effects": [_effect_document(effect) for effect in campaign.effects.effects],
         "scatter_beyond_effects": campaign.effects.scatter,
+        "effects_of_stand": effect_documents(campaign.effects_of_stand),
         "ratios": msgspec.to_builtins(campaign.ratios),
         "msk64_degrees": list(campaign.msk64_degrees),
         "excluded": msgspec.to_builtins(campaign.excluded),
@@ -199,7 +198,7 @@ def table_document(content: TableContent) -> dict[str, Any]:
 
 
 def _effect_document(effect: Effect) -> dict[str, Any]:
-    sizes = [{"step": str(size.step), "change": _quantity_document(size.change)} for size in effect.sizes]
+    sizes = [{"step": str(size.step), "change": quantity_document(size.change)} for size in effect.sizes]
     document: dict[str, Any] = msgspec.to_builtins(effect)
     return document | {"sentence": str(effect.sentence), "sizes": sizes}
 
@@ -211,7 +210,7 @@ def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dic
         "pullback_m": row.series.pullback_m,
         "table_mass_kg": row.series.table_mass_kg,
         "runs": list(row.runs),
-        **{name: _pooled_document(pooled) for name, pooled in row.quantities.items()},
+        **{name: pooled_document(pooled) for name, pooled in row.quantities.items()},
         "warnings": warning_documents(row.warnings),
     }
     if row.msk64_degree:
@@ -222,15 +221,3 @@ def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dic
         }
         found["published"] = {"figures": figures, "flags": list(printed.flags)}
     return found
-
-
-def _pooled_document(pooled: PooledQuantity) -> dict[str, Any]:
-    shared = {str(error): deviation for error, deviation in pooled.common.items()}
-    described: dict[str, Any] = msgspec.to_builtins(replace(pooled, common={})) | {"common": shared}
-    described.pop("quantity")
-    return _quantity_document(pooled.quantity) | described
-
-
-def _quantity_document(quantity: Quantity) -> dict[str, Any]:
-    described: dict[str, Any] = msgspec.to_builtins(quantity)
-    return described | {"interval_95": list(quantity.interval_95)}

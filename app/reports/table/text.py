@@ -154,6 +154,7 @@ def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
     flags = [f"{label}: {', '.join(row.flags)}" for label, row in published.items() if row.flags]
     every = (
         ("What f_d depends on", effect_sentences(campaign.effects)),
+        ("Effects of the stand", [str(effect.message) for effect in campaign.effects_of_stand]),
         ("f_s / f_d by contact", [ratio_sentence(ratio) for ratio in campaign.ratios]),
         ("MSK-64 degrees that the table reached", _degrees(campaign)),
         ("Flags of the audit of the published table", flags),
@@ -178,8 +179,13 @@ def _degrees(campaign: Campaign) -> list[str]:
 
 
 def _warnings(content: TableContent) -> Iterator[str]:
-    """Warnings. One that many series share is printed for the first, with the names of the others."""
-    yield from (str(caution.message) for caution in (*content.warnings, *content.campaign.warnings))
+    """Warnings. One that many series share is printed for the first, with the names of the others.
+
+    Those of effects of the stand are left out: these are told over all runs.
+    """
+    told = {effect.name for effect in content.campaign.effects_of_stand}
+    of_all = (*content.warnings, *content.campaign.warnings)
+    yield from (str(caution.message) for caution in of_all if caution.code not in told)
     by_code: dict[str, list[tuple[str, str]]] = {}
     for row in content.campaign.rows:
         for caution in row.warnings:

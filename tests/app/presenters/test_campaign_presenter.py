@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from campaign_stage import ALL_SERIES, FOLDER, found, path_of, run, runs
+from campaign_stage import ALL_SERIES, FOLDER, found, path_of, run, runs, runs_with_a_mode
 from stage import Call, FakeWorker
 
 from analysis.campaign.campaign import summarize
@@ -109,6 +109,18 @@ def test_effects_are_told_in_words_and_sentences(stage: Stage) -> None:
     assert effects["Contact"].is_found
     assert "depends on the contact" in effects["Contact"].sentence
     assert effects["Pullback"].conclusion == "cannot be told"
+
+
+def test_effects_of_the_stand_are_told_apart_from_those_of_runs(stage: Stage) -> None:
+    stage.gather(found(runs_with_a_mode()))
+    summary = stage.presenter.state.summary
+    mode, ramp = summary.stand_effects
+    assert (mode.tone, ramp.tone) == (Tone.WARN, Tone.PLAIN)
+    assert mode.text.startswith("2 of 2 runs: a second mode at 8.20")
+    assert ramp.text.startswith("1 of 2 runs (1FFM0_002.h5): the release took 31.00")
+    assert not any("second mode" in text or "release" in text for text in summary.warnings)
+    stage.gather(found())
+    assert stage.presenter.state.summary.stand_effects == ()
 
 
 def test_a_run_far_from_the_others_is_named_where_one_looks(stage: Stage) -> None:

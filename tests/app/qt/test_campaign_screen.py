@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from campaign_stage import ALL_SERIES, FOLDER, found, path_of
+from campaign_stage import ALL_SERIES, FOLDER, found, path_of, runs_with_a_mode
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
@@ -99,6 +99,14 @@ def test_a_campaign_is_drawn(stage: Stage) -> None:
     for expected in ("Campaign: 9 runs in 3 series", "1SSM1", "Contact", "found", "torn.h5: It is no run."):
         assert expected in stage.words()
     assert "FF" in stage.screen._plot.accessibleName()
+
+
+def test_effects_of_the_stand_have_a_block(stage: Stage) -> None:
+    stage.gathered()
+    assert "Effects of the stand" not in stage.words()
+    stage.gathered(found(runs_with_a_mode()))
+    assert "Effects of the stand" in stage.words()
+    assert "2 of 2 runs: a second mode" in stage.words()
 
 
 def test_enter_on_a_row_leads_to_its_runs(stage: Stage, qtbot: QtBot) -> None:
