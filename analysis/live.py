@@ -3,9 +3,10 @@
 Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law
 is refined from its last minimum. When no law explains the readings any more, the search is repeated. As long
 as none does, friction comes from the plate alone: on a stand that is not ideal the joint fit is off by more
-than its uncertainty, and a search takes longer than an update may.
+than its uncertainty. Further searches take a step in each update then; effects of a stand are not looked for.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,11 +36,13 @@ from analysis.uncertainty import ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
 _READINGS = 1200  # readings a channel for refining; the chosen law then sees all
+_READINGS_SEARCHED = 600  # for a search in steps: the longest step is as long as a full analysis
 _LOST = 1.3  # mean square of the residual over that of the noise from which on the motion was lost
 _AGAIN = 1.1  # a search is not repeated before the record is longer by this factor ...
 _AFTER_FAILURE = 2.0  # ... where it found no law that fits: on such a stand the next finds none either
 _AGREE_SIGMAS = 3.0  # of the plate alone: a law that is all but adequate is shown where both agree so well
 _STEPS = 3
+_ENDED = object()  # in place of a step of a search
 _ANEW_S = 0.5  # interval of full analyses once slip has ended; between them the chosen law is refined
 _SAME_START = 0.1  # tails that begin so close, in periods, are one
 _TAIL_PERIODS = 10.0
@@ -78,21 +81,27 @@ class LiveIdentification:
         self._searched_s = 0.0
         self._failed_s = 0.0
         """Length of the record, after the release, when a search last found no law that fits."""
+        self._search: Iterator[None] | None = None  # under way, a step in each update
         self._last: _LiveFit | None = None
-        self._by_plate: LiveState | None = None  # the last without an adequate law, where slip had ended
+        self._by_plate: _PlateFit | None = None  # the last without an adequate law
 
     def update(self, record: Record) -> LiveState:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
         record = average_record(record)
         try:
-            known = self._refine(record, now_s) or self._repeat(now_s) or self._analyse_again(record, now_s)
+            known = (
+                self._refine(record, now_s)
+                or self._continue_search(now_s)
+                or self._extend_by_plate(record, now_s)
+                or self._analyse_again(record, now_s)
+            )
         except (RecordError, np.linalg.LinAlgError):  # half a record may be anything
             return LiveState(now_s)
         if isinstance(known, LiveState):
             self._last = None
             return known
-        self._last, self._by_plate = known, None
+        self._last, self._by_plate, self._search = known, None, None
         return known.state
 
     def _refine(self, record: Record, now_s: float) -> "_LiveFit | None":
@@ -117,16 +126,33 @@ class LiveIdentification:
         )
         return replace(known, state=state, anew_s=last.anew_s)
 
-    def _repeat(self, now_s: float) -> LiveState | None:
-        """Repeat what the plate alone said after its last slip; None when a full analysis is due."""
-        known = self._by_plate
-        return known and (replace(known, time_s=now_s) if now_s < known.time_s + _ANEW_S else None)
+    def _continue_search(self, now_s: float) -> LiveState | None:
+        """Take a step of the search that is under way, and repeat what is known; None where there is none."""
+        if self._search is None or self._by_plate is None:
+            return None
+        if next(self._search, _ENDED) is _ENDED:
+            self._search = None
+        return replace(self._by_plate.state, time_s=now_s)
+
+    def _extend_by_plate(self, record: Record, now_s: float) -> LiveState | None:
+        """Extend the tail after the last slip; None when a full analysis is due."""
+        last = self._by_plate
+        if last is None or last.decay.tail is None or now_s > last.anew_s + _ANEW_S:
+            return None
+        decay = extend_decay(last.decay, record)
+        if decay is None:
+            return None
+        decay = _with_tail(decay, last.decay.tail.start_s, last.decay.tail)
+        period, damping = _period_and_damping(constants_from_tail(record, decay))
+        return replace(last.state, time_s=now_s, period_s=period, damping_n1_per_s=damping)
 
     def _analyse_by_plate(self, record: Record, decay: FreeDecay, now_s: float) -> LiveState:
         """What is known without an adequate law: friction from the plate alone, and the tail."""
-        plate = estimate_plate_friction(record, decay)
         friction = None
-        if plate is not None:
+        last = self._by_plate
+        if last is not None and _have_same_slips(last.decay, decay):
+            friction = last.state.friction_dynamic_plate
+        elif (plate := estimate_plate_friction(record, decay)) is not None:
             friction = Quantity.normal(plate.friction_dynamic, plate.standard_uncertainty, "1")
         to_record = decay.channels.to_record_time
         period, damping = None, None
@@ -140,7 +166,7 @@ class LiveIdentification:
             period_s=period,
             damping_n1_per_s=damping,
         )
-        self._by_plate = None if decay.tail is None else state
+        self._by_plate = _PlateFit(state, decay, now_s)
         return state
 
     def _analyse_again(self, record: Record, now_s: float) -> "_LiveFit | LiveState":
@@ -155,12 +181,13 @@ class LiveIdentification:
         if since_s < _AFTER_FAILURE * self._failed_s:
             return self._analyse_by_plate(record, decay, now_s)
         problem = build_problem(record, decay)
-        candidates = identifiable_fits(self._fit_laws(record, decay, problem, since_s))
+        fits = self._fit_laws(record, decay, problem, since_s)
+        if not fits:
+            return self._analyse_by_plate(record, decay, now_s)
+        candidates = identifiable_fits(fits)
         best = min(candidates, key=lambda fit: fit.bic)
         chosen = fit_at_minimum(problem, best.law, problem.minimise(best.parameters, best.law, _STEPS))
         self._minima[chosen.law] = chosen.parameters
-        if not _explains(problem, chosen) and self._searched_s == since_s:
-            self._failed_s = since_s
         judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
         if not judged.adequate:
             by_plate = self._analyse_by_plate(record, decay, now_s)
@@ -177,15 +204,33 @@ class LiveIdentification:
         return replace(known, state=state)
 
     def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:
-        """Refine every law; search again where there is none yet or none explains the readings."""
+        """Refine every law; search where there is none yet, and again where none explains the readings.
+
+        After a search that found no law another one takes a step in each of the next updates: the result is
+        empty then.
+        """
         some = problem.decimated(_READINGS, decay.dense_until_s)
-        if self._minima:
-            fits = [
-                fit_at_minimum(some, law, some.minimise(parameters, law, _STEPS))
-                for law, parameters in self._minima.items()
-            ]
-            if any(_explains(some, fit) for fit in fits) or since_s < _AGAIN * self._searched_s:
-                return fits
+        fits = self._refined(some)
+        if fits and (any(_explains(some, fit) for fit in fits) or since_s < _AGAIN * self._searched_s):
+            return fits
+        if self._failed_s:
+            few = problem.decimated(_READINGS_SEARCHED, decay.dense_until_s)
+            self._search = self._search_minima(record, decay, few, since_s)
+            return []
+        for _ in self._search_minima(record, decay, some if fits else problem, since_s):
+            pass
+        return self._refined(some)
+
+    def _refined(self, problem: FitProblem) -> list[Fit]:
+        return [
+            fit_at_minimum(problem, law, problem.minimise(parameters, law, _STEPS))
+            for law, parameters in self._minima.items()
+        ]
+
+    def _search_minima(
+        self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float
+    ) -> Iterator[None]:
+        """Search the minimum of every law, with a pause after each step."""
         self._searched_s = since_s
         start, guided = initial_guess(problem, decay)
         search = Search(problem, guided, decay.period_s, decay.dense_until_s)
@@ -193,9 +238,11 @@ class LiveIdentification:
             points = [search.fit_first_slip(start)]
         else:
             points = guess_release(guided, start, decay.period_s, record.pullback_m)
-        fits = search.fit_all(COMPARED_LAWS, search.find_minima(points))
+        minima = yield from search.follow_minima(points)
+        fits = yield from search.fit_closed_forms(COMPARED_LAWS, minima)
         self._minima = {fit.law: fit.parameters for fit in fits}
-        return fits
+        if not any(_explains(problem, fit) for fit in fits):
+            self._failed_s = since_s
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -207,6 +254,15 @@ class _LiveFit:
     fit: Fit
     fitted: ParameterUncertainty
     constants: DecayConstants
+    anew_s: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _PlateFit:
+    """What is known from the plate alone, at the full analysis at `anew_s`."""
+
+    state: LiveState
+    decay: FreeDecay
     anew_s: float
 
 
@@ -243,6 +299,13 @@ def _narrowing(known: _LiveFit, problem: FitProblem) -> tuple[str, ...]:
     removed = friction_variance_reduction(problem, known.fit, noise, end_s)
     worth = is_worth_waiting(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
     return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
+
+
+def _have_same_slips(before: FreeDecay, now: FreeDecay) -> bool:
+    """Whether slip had ended before, and no reading of a slip is new since."""
+    if before.slip_end_s is None or now.slip_end_s is None or before.tail is None:
+        return False
+    return abs(now.slip_end_s - before.slip_end_s) < _SAME_START * now.period_s
 
 
 def extend_decay(decay: FreeDecay, record: Record) -> FreeDecay | None:

@@ -1,7 +1,9 @@
 """Search for the lowest minimum of chi-square of each friction law, from a first guess on."""
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -99,7 +101,11 @@ class Search:
         return first.minimise(start, FIRST_SLIP_LAW, 25).parameters
 
     def find_minima(self, points: list[Floats]) -> list[Floats]:
-        """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time.
+        """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time."""
+        return _finish(self.follow_minima(points))
+
+    def follow_minima(self, points: list[Floats]) -> "Steps[list[Floats]]":
+        """`find_minima`, with a pause after each window.
 
         Later slips depend on f_s through every breakaway before them, so that chi-square of a whole
         record has a great many minima; that of the first slips has few. The best few are kept as the
@@ -113,6 +119,7 @@ class Search:
                 window.minimise(point, WIDEST_LAW, 12) for point in _scan_static_friction(window, lines)
             ]
             points = [minimum.parameters for minimum in _distinct(minima)]
+            yield
         return points
 
     def fit(self, law: FrictionLaw, starts: list[Floats], rival: Floats | None = None) -> Fit:
@@ -161,18 +168,26 @@ class Search:
         return fit_at_minimum(self.problem, law, last)
 
     def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
-        """Fit each model, the widest first, each from all minima known by then.
+        """Fit each of `laws` from several starts.
 
-        In the end none may lie above a law that it holds as a special case. A single law that is not in
-        closed form is fitted from the fit of the widest that is.
+        A single law that is not in closed form is fitted from the fit of the widest that is.
         """
         if not laws[-1].solver.is_closed_form:
             return [self.fit_fallback(laws[-1], self.fit(WIDEST_LAW, starts))]
+        return _finish(self.fit_closed_forms(laws, starts))
+
+    def fit_closed_forms(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> "Steps[list[Fit]]":
+        """`fit_all` of laws in closed form, with a pause after each law.
+
+        The widest is fitted first, each from all minima known by then. In the end none may lie above a law
+        that it holds as a special case.
+        """
         fits: dict[FrictionLaw, Fit] = {}
         for model in reversed(laws):
             best = min(fits.values(), key=lambda fit: fit.chi_square, default=None)
             rival = None if best is None else best.parameters
             fits[model] = self.fit(model, [*starts, *(fit.parameters for fit in fits.values())], rival)
+            yield
         for model in laws:
             for inside in laws:
                 special = set(inside.free_parameters) < set(model.free_parameters)
@@ -192,6 +207,20 @@ class Search:
             fine += [_cross_jumps(most, law, most.minimise(point, law, 12)) for point in nearby]
         fine = _distinct(fine)
         return [minimum for minimum in fine if minimum.cost <= fine[0].cost + _TIE][:_KEPT]
+
+
+Result = TypeVar("Result")
+Steps: TypeAlias = Generator[None, None, Result]
+"""Work that pauses between its steps."""
+
+
+def _finish(steps: Steps[Result]) -> Result:
+    while True:
+        try:
+            next(steps)
+        except StopIteration as ended:
+            result: Result = ended.value
+            return result
 
 
 def may_be_friction(problem: FitProblem, fits: list[Fit]) -> bool:

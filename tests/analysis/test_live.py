@@ -5,6 +5,7 @@ import pytest
 from synthetic import CALIBRATED, Truth, simulate_record
 
 from analysis.averaging import average_record
+from analysis.fitting.problem import GaussNewton
 from analysis.identify import identify
 from analysis.laws.stand_parts import stand_displacements
 from analysis.live import LiveIdentification
@@ -82,6 +83,45 @@ def test_a_stand_that_is_not_ideal_is_followed_by_the_plate_alone(effects):
     assert all(abs(found.value - mean) < 4.0 * found.standard_uncertainty for found in by_plate)
     assert states[-1].period_s.value == pytest.approx(0.32, abs=3e-4)
     assert states[-1].slip_end_s == pytest.approx(3.2, abs=0.3)
+
+
+def film_record():
+    truth = Truth(friction_static=0.12, tilt_rad=1e-3, rate_hz=500.0)
+    motion = stand_displacements(truth.parameters(), {"film_s_per_m": 1.0}, truth.duration_s + 1e-3)
+    return simulate_record(truth, motion)
+
+
+def test_no_update_does_more_than_one_step_of_a_search(monkeypatch):
+    """Searches that find no law once took 10 to 40 times as many evaluations in one update as others."""
+    evaluated = []
+    evaluate = GaussNewton.evaluate
+
+    def counted(self, point):
+        evaluated[-1] += sum(len(times_s) for times_s, *_ in self._gauges)
+        return evaluate(self, point)
+
+    monkeypatch.setattr(GaussNewton, "evaluate", counted)
+    whole, live = film_record(), LiveIdentification()
+    for time_s in np.arange(1.4, 10.0, 0.05):
+        evaluated.append(0)
+        live.update(until(whole, time_s))
+
+    assert max(evaluated) < 8e5
+    assert sum(evaluated) > 1e6, "laws were tried again as the record grew"
+
+
+def test_the_tail_narrows_between_full_analyses_where_no_law_fits(monkeypatch):
+    whole, live = film_record(), LiveIdentification()
+    live.update(until(whole, 6.0))
+    full_analyses = []
+    monkeypatch.setattr("analysis.live.prepare", full_analyses.append)
+
+    first, last = live.update(until(whole, 6.1)), live.update(until(whole, 6.4))
+
+    assert not full_analyses
+    assert last.friction_dynamic_plate == first.friction_dynamic_plate
+    assert last.period_s.standard_uncertainty < 0.9 * first.period_s.standard_uncertainty
+    assert last.period_s.value == pytest.approx(0.32, abs=4.0 * last.period_s.standard_uncertainty)
 
 
 def test_a_sure_joint_fit_takes_over_from_the_plate():
