@@ -68,6 +68,7 @@ _CHECKS = (
     ("installation", "installation", "check_installation"),
     ("folders", "folders", "check_folders"),
     ("gauges", "folders", "check_gauges"),
+    ("effects of the stand", "stand", "check_effects"),
     ("ports", "ports", "check_ports"),
     ("clocks", "installation", "check_clocks"),
 )

@@ -72,6 +72,17 @@ def collect_run(
         return CollectedRun(task.path, error_message(error), details)
 
 
+def collect_kept(path: Path, validator: Validator | None = None) -> CollectedRun:
+    """Take the newest result that is kept in a run and still stands, if there is one. Never raises."""
+    try:
+        validate_and_count(path, validator or shared_validator())
+        details, document = read_file(path, _read)
+        result = None if document is None else run_result(path, details.metadata, document)
+        return CollectedRun(str(path), details=details, result=result)
+    except Exception as error:
+        return CollectedRun(str(path), error_message(error))
+
+
 def _read(file: h5py.File) -> tuple[RunDetails, Document | None]:
     metadata = read_metadata(file)
     saved, stale = latest_valid_in_file(

@@ -136,6 +136,29 @@ def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
     assert found(outcome)["gauge checks"]["state"] == "fail"
 
 
+def test_effects_of_the_stand_over_its_last_runs_are_told(
+    slipstand: Any, real_stand_runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(real_stand_runs))
+    checks = found(slipstand("doctor", "--json"))
+    mode, ramp = checks["second-mode"], checks["release-ramp"]
+
+    assert checks["effects of the stand"]["message"] == (
+        "3 kept results of the last 3 run files (at most 20 are read), 3 of them searched for effects"
+    )
+    assert (mode["state"], ramp["state"]) == ("warn", "ok")
+    assert mode["message"].startswith("3 of 3 runs: a second mode at ")
+    assert mode["remedy"].endswith(f"slipstand table {real_stand_runs}")
+    assert ramp["message"].startswith("1 of 3 runs (20261121T100000_1FFM0_001.h5): the release took")
+
+
+def test_without_kept_results_effects_of_the_stand_are_not_claimed_to_be_none(slipstand: Any) -> None:
+    check = found(slipstand("doctor", "--json"))["effects of the stand"]
+
+    assert check["state"] == "ok"
+    assert "none of this stand; analyze --save keeps them" in check["message"]
+
+
 def use_table(folder: Path, **changes: Any) -> None:
     """Make a calibration of gauge 1 the one in use."""
     base = settings_file("gauges.toml")
