@@ -39,6 +39,9 @@ class DeviceDriver:
     format_bauds: Mapping[str, int] = field(default_factory=dict)
     """Usual baud rates of a device that is chosen by its setting `format`."""
     frames_title: str = ""  # what its bytes are called in messages; "" where they are lines of text
+    simulated_rate_hz: float = 2000.0  # samples a second of its simulated device, unless told otherwise
+    simulated_gauges: str = ""
+    """Settings file with the calibration of its simulated device; "" for the one in use."""
     has_single_gauge_settings: bool = False  # whether it can be set to one gauge of two
 
     @property

@@ -53,27 +53,35 @@ class ActiveTimer:
         return self._elapsed_ns * 1e-9
 
 
-class ArrivalTimer:
-    """Times the arrival of samples from the first read on; a standstill of this computer starts it anew."""
+class ArrivalRate:
+    """Rate at which samples arrive, in windows of time; in those of a busy computer it differs."""
 
-    _STANDSTILL_NS = 500_000_000
-    """After so long without a read, samples may have been lost."""
+    _STEADY = 0.05
+    _STEADY_SAMPLES = 2.0
+    """How far windows of an even stream differ: a read is late by up to 20 ms, and holds whole samples."""
 
-    def __init__(self) -> None:
-        self._first_ns = self._last_ns = 0
-        self._before = 0.0
-        self.samples = 0.0  # that came after the first read
-
-    @property
-    def elapsed_s(self) -> float:
-        return (self._last_ns - self._first_ns) * 1e-9
+    def __init__(self, window_s: float) -> None:
+        self._window_s = window_s
+        self._begin: tuple[int, float] | None = None
+        self.windows_hz: list[float] = []  # samples a second in each complete window, the latest last
 
     def add(self, samples: float) -> None:
-        """Take the number of samples that have come until now, after a read."""
+        """Take the number of samples that have come until now, after a read; the first begins the window."""
         now_ns = host_ns()
-        if now_ns - self._last_ns > self._STANDSTILL_NS:
-            self._first_ns, self._before = now_ns, samples
-        self._last_ns, self.samples = now_ns, samples - self._before
+        elapsed_s = 0.0 if self._begin is None else (now_ns - self._begin[0]) * 1e-9
+        if self._begin is not None and elapsed_s >= self._window_s:
+            self.windows_hz.append((samples - self._begin[1]) / elapsed_s)
+        if self._begin is None or elapsed_s >= self._window_s:
+            self._begin = (now_ns, samples)
+
+    @property
+    def steady_hz(self) -> float | None:
+        """Mean of the windows; None where there are fewer than two, or they differ."""
+        if len(self.windows_hz) < 2:
+            return None
+        mean_hz = sum(self.windows_hz) / len(self.windows_hz)
+        allowed_hz = self._STEADY * mean_hz + self._STEADY_SAMPLES / self._window_s
+        return mean_hz if max(self.windows_hz) - min(self.windows_hz) <= allowed_hz else None
 
 
 class HostMonitor:

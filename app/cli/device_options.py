@@ -44,7 +44,7 @@ class StandOptions:
     protocol: str = option(
         "--protocol", f"{', '.join(driver.name for driver in AVAILABLE)}.", "slipstand-binary"
     )
-    rate_hz: float = option("--rate", "Samples a second.", 2000.0)
+    rate_hz: float | None = option("--rate", "Samples a second; as the protocol's device if absent.")
     series: str = option("--series", "Series code; brings T, n1, f_d, masses, pullback.", "1FFM0")
     friction: float | None = option("--friction", "True f_d; the series' if absent.")
     static_friction: float | None = option("--static-friction", "True f_s; f_d if absent.")

@@ -1,6 +1,7 @@
 """`slipstand device simulate`: the simulated stand on a port."""
 
 import dataclasses
+import shlex
 import sys
 from functools import partial
 
@@ -34,6 +35,8 @@ def _announce(ready: Ready, *, as_json: bool) -> None:
     else:
         rate = f"{ready.rate_hz:g} Hz"
         out.print_line(f"simulated stand {ready.series}, {ready.protocol}, {rate}: {ready.port}")
+        if ready.calibration:
+            out.print_line(f"record from it with --calibration {shlex.quote(ready.calibration)}")
     sys.stdout.flush()
 
 

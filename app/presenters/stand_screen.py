@@ -185,6 +185,7 @@ def _happened(truth: Truth) -> tuple[str, ...]:
 
 def _default_form(options: SimulatedStandOptions, form: StandForm) -> StandForm:
     values = {name: getattr(options, option) for name, (option, _, _) in _FIELDS.items()}
+    values["rate_hz"] = options.sample_rate_hz
     if options.friction is None:
         values["friction"] = published_row(form.series).friction_dynamic
     texts = {name: f"{value * _FIELDS[name][2]:g}" for name, value in values.items()}

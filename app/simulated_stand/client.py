@@ -23,6 +23,8 @@ class Ready(msgspec.Struct, frozen=True):
     rate_hz: float
     series: str
     truth_file: str | None
+    calibration: str | None
+    """Calibration file that its readings need; None for the one in use."""
 
 
 class Started(msgspec.Struct, frozen=True, tag=True):
@@ -73,6 +75,11 @@ class SimulatedStand:
     @property
     def port(self) -> str:
         return self._ready.port
+
+    @property
+    def calibration(self) -> str | None:
+        """Calibration file that its readings need; None for the one in use."""
+        return self._ready.calibration
 
     @property
     def process_id(self) -> int:

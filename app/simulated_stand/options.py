@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 
 from app.simulated_stand.effects import check_effects
+from config.files import load_gauges, settings_file
 from drivers.errors import DriverError
 from drivers.registry import find_driver
 from drivers.simulated.faults import parse_disturbance
@@ -62,16 +63,18 @@ _LIMITS = {
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A simulated stand: its protocol, its true parameters, and faults of its wire.
 
-    SI units. None takes the value of the series' row in Table 1 or, for `static_friction`, that of
-    `friction`. Raises ValueError (msgspec.ValidationError when decoded) for a value out of range.
+    SI units. None takes the value of the series' row in Table 1, for `static_friction` that of `friction`,
+    for `rate_hz` that of the protocol's device. Raises ValueError (msgspec.ValidationError when decoded) for
+    a value out of range.
     """
 
     protocol: str = "slipstand-binary"
-    rate_hz: float = 2000.0
+    rate_hz: float | None = None
     series: str = "1FFM0"
     stand_file: str | None = None
     gauges_file: str | None = None
-    """Calibration that turns its displacements into counts; the settings in use if None."""
+    """Calibration that turns its displacements into counts. None takes that of the protocol's simulated
+    device, where it has one, else the settings in use."""
     device: dict[str, str] = {}  # the device's own settings, `--set KEY=VALUE`, as its driver knows them
 
     friction: float | None = None
@@ -134,6 +137,18 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         check_effects(self.effects)
         for text in self.disturbances:
             parse_disturbance(text)
+
+    def completed(self) -> "SimulatedStandOptions":
+        """Options with rate and calibration of the protocol, where none is given. Raises SettingsError."""
+        driver = find_driver(self.protocol)
+        gauges_file = self.gauges_file
+        if gauges_file is None and driver.simulated_gauges and load_gauges().device.protocol != driver.name:
+            gauges_file = str(settings_file(driver.simulated_gauges))
+        return msgspec.structs.replace(self, rate_hz=self.sample_rate_hz, gauges_file=gauges_file)
+
+    @property
+    def sample_rate_hz(self) -> float:
+        return find_driver(self.protocol).simulated_rate_hz if self.rate_hz is None else self.rate_hz
 
     def device_settings(self) -> tuple[dict[str, str], bool]:
         """Settings of the device, and whether its first column holds gauge 2. Raises SettingsError."""

@@ -47,7 +47,9 @@ def serve(
     transport = open_tcp_port(options.tcp_port or 0) if is_tcp else open_pseudo_terminal()
     try:
         stand = SimulatedStandDevice(options, transport, publish)
-        on_ready(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
+        done = options.completed()
+        files = done.truth_file, done.gauges_file
+        on_ready(Ready(transport.url, done.protocol, done.sample_rate_hz, done.series, *files))
         publish(stand.truth())
         while not has_ended():
             while (disturbance := next_disturbance()) is not None:

@@ -12,6 +12,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauge, Gauges
 from drivers.arrays import Flags, Floats, Int32s, UInt8s
 from drivers.samples import SampleStatus
+from drivers.simulated.protocol import MAX_COUNT
 from drivers.simulated.stream_sender import Signal
 
 _TABLE = np.uint8(SampleStatus.OVERLOAD_TABLE)
@@ -36,7 +37,7 @@ class StandSignal:
 
     Samples are made a tenth of a second ahead, since short arrays cost as much as long ones; always equally
     many, so that a seed gives the same noise however they are taken. `rate_hz` are samples a second of the
-    stand's own time, `started_s` is the time of the first one (s).
+    stand's own time, `started_s` is the time of the first one (s), `max_count` the largest that is sent.
     """
 
     _AHEAD_S = 0.1
@@ -49,13 +50,14 @@ class StandSignal:
         options: SimulatedStandOptions,
         rate_hz: float,
         started_s: float = 0.0,
+        max_count: float = MAX_COUNT,
     ) -> None:
         random = np.random.Generator(np.random.SFC64(options.seed))
         noise_m, bend_m = options.noise_m, options.nonlinearity_m
         table = GaugeFaults(noise_m, options.table_drift_m_per_s, bend_m, options.table_clip_m)
         relative = GaugeFaults(noise_m, options.relative_drift_m_per_s, bend_m, options.relative_clip_m)
-        self._table = SimulatedGauge(gauges.table, table, random)
-        self._relative = SimulatedGauge(gauges.relative, relative, random)
+        self._table = SimulatedGauge(gauges.table, table, random, max_count)
+        self._relative = SimulatedGauge(gauges.relative, relative, random, max_count)
         self._chain = GaugeChain(
             gauge_values(options.effects), motion.pullback_m, rate_hz,
             is_absolute=gauges.relative.measures == "plate",
@@ -90,9 +92,6 @@ class StandSignal:
         return self._motion.displacements(np.maximum(time_s, 0.0))  # before a start that lies ahead it rests
 
 
-ADC_MAX_COUNT = 2**23 - 1  # largest count of a 24-bit converter
-
-
 @dataclass(frozen=True, slots=True)
 class GaugeFaults:
     """What one gauge adds to the true displacement."""
@@ -106,13 +105,16 @@ class GaugeFaults:
 
 
 class SimulatedGauge:
-    """One gauge with its 24-bit converter."""
+    """One gauge with its converter, of 24 bits unless the device's is narrower."""
 
-    def __init__(self, gauge: Gauge, faults: GaugeFaults, random: np.random.Generator) -> None:
+    def __init__(
+        self, gauge: Gauge, faults: GaugeFaults, random: np.random.Generator, max_count: float = MAX_COUNT
+    ) -> None:
         self._gauge = gauge
         self._faults = faults
         self._random = random
-        ends = (np.array([-ADC_MAX_COUNT, ADC_MAX_COUNT]) - gauge.zero_count) * gauge.gain_m_per_count
+        self._max_count = max_count
+        ends = (np.array([-MAX_COUNT, MAX_COUNT]) - gauge.zero_count) * gauge.gain_m_per_count
         self._range_m = min(gauge.range_m or math.inf, float(np.abs(ends).min()))
         self._limit_m = min(self._range_m, faults.clip_m or math.inf)
 
@@ -126,4 +128,6 @@ class SimulatedGauge:
             shown += faults.noise_m * self._random.standard_normal(len(shown), dtype=np.float32)
         overloaded = np.abs(shown) > self._limit_m
         np.clip(shown, -self._limit_m, self._limit_m, out=shown)
-        return np.rint(self._gauge.counts(shown)).astype(np.int32), overloaded
+        counts = np.rint(self._gauge.counts(shown))
+        overloaded |= np.abs(counts) > self._max_count
+        return np.clip(counts, -self._max_count, self._max_count).astype(np.int32), overloaded

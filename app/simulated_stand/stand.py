@@ -29,7 +29,7 @@ class SimulatedStandDevice:
     def __init__(
         self, options: SimulatedStandOptions, transport: Transport, on_truth: Callable[[Truth], None]
     ) -> None:
-        self._options = options
+        self._options = options = options.completed()
         self._on_truth = on_truth
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
@@ -43,6 +43,7 @@ class SimulatedStandDevice:
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
         settings, self._is_swapped = options.device_settings()
         protocol = find_driver(options.protocol).make_simulated(settings)
+        self._max_count = protocol.max_count
         self._device = make_device(transport, protocol, self._signal_at, _setup(options))
         self._published: tuple[object, ...] = ()
 
@@ -78,7 +79,8 @@ class SimulatedStandDevice:
 
     def _signal_at(self, rate_hz: float, started_s: float) -> Signal:
         lag_s = self._options.lag_s
-        signal = StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s - lag_s)
+        timing = rate_hz, started_s - lag_s
+        signal = StandSignal(self._motion, self._gauges, self._options, *timing, self._max_count)
         return SwappedChannels(signal) if self._is_swapped else signal
 
     def _releases(self) -> int:
@@ -92,7 +94,7 @@ class SimulatedStandDevice:
 def _setup(options: SimulatedStandOptions) -> DeviceSetup:
     unix_s = options.start_at_unix_s
     return DeviceSetup(
-        rate_hz=options.rate_hz,
+        rate_hz=options.sample_rate_hz,
         clock_ppm=options.clock_ppm,
         rate_error=options.rate_error,
         first_sequence=options.first_sequence,

@@ -8,6 +8,7 @@ from enum import Enum, auto
 from drivers.arrays import Floats, Int32s, UInt8s
 
 MAX_RATE_HZ = 100_000.0  # rate at which the simulated stand still keeps up on a common computer
+MAX_COUNT = 2**23 - 1  # of a 24-bit converter
 
 
 class CommandKind(Enum):
@@ -52,6 +53,8 @@ class SimulatedProtocol(ABC):
 
     streams_on_open = False  # whether it sends once its port is open, or when a command starts it
     max_rate_hz = MAX_RATE_HZ
+    max_count: float = MAX_COUNT
+    """Largest count of its converter, and of its negative."""
     line_end = b""
     """What ends a frame; damage to its last byte damages the next frame too. b"" for frames of fixed form."""
     flags_overload = False  # whether a frame flags clipped readings

@@ -10,5 +10,7 @@ DRIVER = DeviceDriver(
     default_baud=1_000_000,
     verified=f"{UNVERIFIED}; harp-python 0.4.2 reads the simulated device's bytes",
     package=__name__,
+    simulated_rate_hz=1000.0,
+    simulated_gauges="gauges-16-bit.toml",
     frames_title=N_("Harp events"),
 )

@@ -11,11 +11,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s, record_type
+from drivers.arrays import Counts, Flags, Floats, Ints, Record, Records, UInt8s, record_type
 from drivers.clock import rate_from_steps
 from drivers.compiled import compiled, inlined
 from drivers.line_counting import BY_TIME, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder
+from messages.i18n import N_
+from messages.message import Message, message
 
 READ, WRITE, EVENT = 1, 2, 3
 ERROR = 0x08
@@ -73,13 +75,13 @@ class HarpMessage:
         return int.from_bytes(self.payload, "little")
 
 
-def encode(message: HarpMessage, payload_type: int, time_ticks: int | None = None) -> bytes:
+def encode(content: HarpMessage, payload_type: int, time_ticks: int | None = None) -> bytes:
     """One message; devices send it with a time (in 32 us)."""
-    payload = message.payload
+    payload = content.payload
     if time_ticks is not None:
         payload_type |= HAS_TIMESTAMP
         payload = struct.pack("<IH", *divmod(time_ticks, TICKS_PER_S)) + payload
-    data = bytes([message.kind, 4 + len(payload), message.address, PORT, payload_type]) + payload
+    data = bytes([content.kind, 4 + len(payload), content.address, PORT, payload_type]) + payload
     return data + bytes([sum(data) & 0xFF])
 
 
@@ -218,10 +220,18 @@ def _value(buffer: UInt8s, at: int) -> float:
 
 FULL_SCALE = 32767  # largest reading
 _MAX_HELD_BYTES = 1024
+BOARD_CHANNELS = 4
+"""Channels of one reader board; a board that is not plugged in gives 0 in all of them, without any flag
+(harp-tech, device.loadcells, Firmware/LoadCells/interrupts.c)."""
+ABSENT_EVENTS = 100
+"""So many events, 0.1 s, with 0 in all channels of a board show that it is absent: amplifiers have noise."""
+_MAX_ZERO_BYTES = 1 << 14  # of zeros that wait until they show whether the board is absent
 
 
-def encode_events(times_s: Floats, counts: Counts, table: int = 0, relative: int = 1) -> UInt8s:
-    """Events as a device without faults sends them; channels without a gauge are 0.
+def encode_events(
+    times_s: Floats, counts: Counts, table: int = 0, relative: int = 1, idle_count: int = 0
+) -> UInt8s:
+    """Events as a device without faults sends them; channels without a gauge are `idle_count`.
 
     `times_s` (n,) is device time, sent in steps of 32 us; `counts` (n, 2) table and relative, limited to 16
     bits and sent on channels `table` and `relative`, 0 to 7. Returns (n, 28) uint8, an event a row.
@@ -231,7 +241,7 @@ def encode_events(times_s: Floats, counts: Counts, table: int = 0, relative: int
     seconds, ticks = np.divmod(np.rint(np.asarray(times_s) * TICKS_PER_S).astype(np.int64), TICKS_PER_S)
     wire[:, 5:9] = seconds.astype("<u4").view(np.uint8).reshape(-1, 4)
     wire[:, 9:11] = ticks.astype("<u2").view(np.uint8).reshape(-1, 2)
-    values = np.zeros((len(counts), CHANNELS), dtype="<i2")
+    values = np.full((len(counts), CHANNELS), idle_count, dtype="<i2")
     values[:, [table, relative]] = np.clip(counts, -FULL_SCALE - 1, FULL_SCALE)
     wire[:, VALUES_OFFSET:-1] = values.view(np.uint8)
     wire[:, -1] = wire.sum(axis=1)
@@ -245,6 +255,7 @@ class EventDecoder(PacketDecoder):
     of them as the bytes between can have held are damaged. Other messages are skipped. A time out of sequence
     is believed only if the next event confirms it, because a checksum of eight bits passes one in 256 damaged
     events. `table` and `relative` are the channels of the gauges. Readings of `overload_count` are overloads.
+    Events without the reader board of a gauge are damaged; the first of them wait until that is certain.
     """
 
     def __init__(
@@ -260,11 +271,19 @@ class EventDecoder(PacketDecoder):
         tick_s, wraps = 1 / TICKS_PER_S, (float((1 << 32) * TICKS_PER_S), 0.0)
         self._rules = make_rules(BY_TIME, rate_hz, tick_s, tick_s, wraps, overload_count, max_gap_s)
         self._garbage = 0
+        self._is_absent = dict.fromkeys(sorted({table // BOARD_CHANNELS, relative // BOARD_CHANNELS}), False)
+        """By the number of each reader board that has a gauge."""
+        self._warnings: list[Message] = []
 
     def expect_restart(self) -> None:
         self._state["broken"] += self._state["started"] * bool(self._unfinished)
         self._garbage = 0
+        self._is_absent = dict.fromkeys(self._is_absent, False)
         super().expect_restart()
+
+    def take_warnings(self) -> list[Message]:
+        warnings, self._warnings = self._warnings, []
+        return warnings
 
     def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         lines, used, discarded, self._garbage = _scan(data, self._channels, self._garbage)
@@ -273,13 +292,63 @@ class EventDecoder(PacketDecoder):
         counts = np.empty((found, 2))
         self._state["restart_rows"] = self._rows_since(arrival_ns, found)
         hold_from = len(data) - _MAX_HELD_BYTES
-        good, done = count_lines(lines, hold_from, self._state, self._rules, packets, counts)
+        certain = self._reject_absent_boards(data, lines)
+        good, done = count_lines(lines[:certain], hold_from, self._state, self._rules, packets, counts)
         if done < found:
             self._unfinished = data[int(lines[done]["start"]) :]
             discarded = int(lines[done]["discarded"])
             self._garbage = 0
         self._state["discarded_bytes"] += discarded
         return packets[:good], counts[:good]
+
+    def _reject_absent_boards(self, data: bytes, lines: Records) -> int:
+        """Make events without a board bad; returns how many lines come before zeros that are yet too few."""
+        events, certain = np.flatnonzero(lines["good"]), len(lines)
+        if not len(events):
+            return certain
+        starts = lines["start"][events]
+        for board, was_absent in self._is_absent.items():
+            self._is_absent[board] = False
+            for begin, end in _true_runs(are_zeros(data, starts, board)):
+                goes_on, is_last = begin == 0 and was_absent, end == len(events)
+                waits_too_long = is_last and len(data) - starts[begin] > _MAX_ZERO_BYTES
+                if goes_on or waits_too_long or end - begin >= ABSENT_EVENTS:
+                    lines["good"][events[begin:end]] = 0
+                    self._is_absent[board] = is_last
+                    self._warnings += [] if was_absent else [absent_board_warning(board)]
+                elif is_last:
+                    certain = min(certain, int(events[begin]))
+        return certain
+
+
+def are_zeros(data: bytes, starts: Ints, board: int) -> Flags:
+    """Whether all channels of a reader board (0 or 1) are 0 in the events that begin at `starts` (n,)."""
+    first = VALUES_OFFSET + 2 * BOARD_CHANNELS * board
+    places = np.add.outer(starts, np.arange(first, first + 2 * BOARD_CHANNELS))
+    zeros: Flags = (np.frombuffer(data, dtype=np.uint8)[places] == 0).all(axis=1)
+    return zeros
+
+
+def absent_board_warning(board: int) -> Message:
+    """What to do about a reader board that is not plugged in."""
+    first = BOARD_CHANNELS * board
+    template = N_("channels {first} to {last} all read exactly 0: plug their reader board in")
+    return message(template, first=first, last=first + BOARD_CHANNELS - 1)
+
+
+def absent_boards(data: bytes) -> list[int]:
+    """Reader boards of whose channels all good events in `data` have 0; none without enough events."""
+    lines, *_ = _scan(data, np.zeros(2, dtype=np.int64), 0)
+    starts = lines["start"][lines["good"] != 0]
+    if len(starts) < ABSENT_EVENTS:
+        return []
+    return [board for board in range(CHANNELS // BOARD_CHANNELS) if are_zeros(data, starts, board).all()]
+
+
+def _true_runs(flags: Flags) -> list[tuple[int, int]]:
+    """First and last place, the latter exclusive, of each run of true values in (n,)."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _scan(data: bytes, channels: Ints, garbage: int) -> tuple[Records, int, int, int]:

@@ -12,6 +12,8 @@ SERIAL_NUMBER = 7
 MAX_RATE_HZ = 10_000.0
 _WRITABLE = (Register.OPERATION, Register.EVENTS, Register.ACQUISITION)
 _STANDBY = 0xE0
+_IDLE_COUNT = 1
+"""Of channels without a gauge: 0 on a whole board is what a device sends whose board is not plugged in."""
 _ALL_EVENTS = 0x0F
 
 
@@ -32,6 +34,7 @@ class SimulatedHarp(SimulatedProtocol):
     """Sends an event a sample. Readings are limited to 16 bits and show as overload there."""
 
     max_rate_hz = MAX_RATE_HZ
+    max_count = codec.FULL_SCALE
     find_commands = staticmethod(find_commands)
 
     def __init__(self, settings: HarpSettings) -> None:
@@ -51,7 +54,8 @@ class SimulatedHarp(SimulatedProtocol):
         self._ticks = round(float(times_s[-1]) * codec.TICKS_PER_S)
         if codec.with_active_mode(self._registers[Register.OPERATION]) != self._registers[Register.OPERATION]:
             return [b""] * len(counts)
-        return [row.tobytes() for row in codec.encode_events(times_s, counts, *self._channels)]
+        events = codec.encode_events(times_s, counts, *self._channels, _IDLE_COUNT)
+        return [row.tobytes() for row in events]
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         kind, given = command.parameters[0], command.parameters[1:]

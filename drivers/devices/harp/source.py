@@ -13,7 +13,7 @@ from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
 from messages.i18n import N_
-from messages.message import EMPTY, Message, message, option
+from messages.message import EMPTY, Message, joined, message, option
 
 RATE_HZ = 1000.0
 _TRIES = 2
@@ -117,6 +117,13 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     remark = message(template, option=option("--set"))
     found = Recognition(DRIVER.name, share, events, rate_hz=rate_hz, remark=remark)
     return unless_coincidence(found, has_checksum=True)
+
+
+def explain(received: bytes) -> Message | None:
+    """Which reader boards are not plugged in, by their events in `received`; None if all are."""
+    return (
+        joined([codec.absent_board_warning(board) for board in codec.absent_boards(received)], "; ") or None
+    )
 
 
 def _parse_who_am_i(received: bytes) -> Message | None:

@@ -1,6 +1,7 @@
 """Every amplifier that the simulated stand can be, recorded into a run that finds the friction it has."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,13 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from drivers.devices.modbus.source import make_source
+from drivers.registry import AVAILABLE
+from drivers.samples import SampleStatus
 from drivers.stream import SampleSource
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
 
+OVERLOADS = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
 QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3, "rate_hz": 1000.0}
 
 SIXTEEN_BITS = """
@@ -71,6 +75,36 @@ def test_a_recorded_pullback_has_the_true_friction(
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
+@pytest.mark.parametrize("protocol", [driver.name for driver in AVAILABLE])
+def test_the_command_that_probe_prints_records_from_the_defaults_of_the_simulated_device(
+    slipstand: Any, tmp_path: Path, protocol: str
+) -> None:
+    """No channel saturates or repeats its readings, and the friction is the true one."""
+    pauses = {name: value for name, value in QUICK.items() if name != "rate_hz"}
+    with SimulatedStand.start(SimulatedStandOptions(protocol=protocol, seed=2, **pauses)) as stand:
+        (found,) = slipstand("device", "probe", stand.port, "--write", "--json").json
+        command = shlex.split(found["speaks"]["command"])[1:]
+        command += ["--calibration", stand.calibration] if stand.calibration else []
+        wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        recorded = slipstand(*command, "--directory", tmp_path, *wanted).json
+        true = stand.truth().stand.friction_dynamic
+    run = open_run(recorded["run"])
+    skip_if_polls_were_late(recorded, protocol == "modbus")
+    good = run.status == 0
+    assert not (run.status & OVERLOADS).any()
+    for readings in load_counts(run)[good].T:
+        assert np.mean(readings == readings.max()) < 0.01
+        assert np.mean(np.diff(readings) == 0) < 0.05
+    (analysis,) = slipstand("analyze", recorded["run"], "--json").json
+    assert analysis["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
+def skip_if_polls_were_late(recorded: dict[str, Any], is_polled: bool) -> None:
+    lost = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
+    if is_polled and lost > 0.5:
+        pytest.skip(f"this computer is too busy for its polls: {lost:.0%} of them were late")
+
+
 def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_static(
     slipstand: Any, tmp_path: Path
 ) -> None:
@@ -86,9 +120,7 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
     assert "polled at 200 Hz, which is quasi-static" in recorded["message"]
     assert "quasi-static" in open_run(recorded["run"]).end.message
     assert_replays(recorded["run"], make_source(settings, 200.0))
-    lost = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
-    if lost > 0.5:
-        pytest.skip(f"this computer is too busy to ask 200 times a second: {lost:.0%} of the polls were late")
+    skip_if_polls_were_late(recorded, True)
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 

@@ -10,7 +10,6 @@ import pytest
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import (
-    ADC_MAX_COUNT,
     GaugeFaults,
     SimulatedGauge,
     StandSignal,
@@ -19,6 +18,7 @@ from app.simulated_stand.signal import (
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauge
 from drivers.samples import SampleStatus
+from drivers.simulated.protocol import MAX_COUNT
 
 TIMETABLE = Timetable(rest_s=1.0, pull_s=2.0, hold_s=1.5, decay_s=8.0, recentre_s=1.0)
 GOLDEN = Path(__file__).parents[2] / "golden" / "two_mass.json"
@@ -125,13 +125,13 @@ def test_counts_come_back_to_metres_by_the_calibration():
     assert not overloaded.any()
 
 
-@pytest.mark.parametrize(("range_m", "limit_m"), [(0.010, 0.010), (None, (ADC_MAX_COUNT - 12000) * 2e-9)])
+@pytest.mark.parametrize(("range_m", "limit_m"), [(0.010, 0.010), (None, (MAX_COUNT - 12000) * 2e-9)])
 def test_beyond_the_range_of_gauge_or_converter_readings_are_clipped_and_flagged(range_m, limit_m):
     gauge = Gauge(gain_m_per_count=2e-9, zero_count=12000.0, range_m=range_m)
     true_m = np.linspace(-0.03, 0.03, 2001)
     counts, overloaded = read(gauge, GaugeFaults(), true_m, 0 * true_m)
     np.testing.assert_array_equal(overloaded, np.abs(true_m) > limit_m)
-    assert np.abs(counts).max() <= ADC_MAX_COUNT
+    assert np.abs(counts).max() <= MAX_COUNT
     np.testing.assert_allclose((counts - 12000.0) * 2e-9, np.clip(true_m, -limit_m, limit_m), atol=1.0001e-9)
 
 

@@ -189,7 +189,7 @@ def test_the_truth_can_be_read_where_it_was_wanted(tmp_path):
     truth = msgspec.json.decode(path.read_bytes(), type=Truth)
     assert truth == stand.truth()
     assert truth.port == stand.port
-    assert truth.options == options
+    assert truth.options == options.completed()
     assert [entry.name for entry in tmp_path.iterdir()] == ["truth.json"]
 
 

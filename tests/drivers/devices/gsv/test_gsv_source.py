@@ -133,6 +133,9 @@ class Stream(ScriptedLink):
             scale = 1 if name.endswith("host_ns") else 1e-9
             monkeypatch.setattr(name, lambda scale=scale: self._now_ns * scale)
 
+    def _lag_s(self, elapsed_s: float) -> float:
+        return 0.0
+
     def write(self, data: bytes) -> None:
         super().write(data)
         if data[2] == Code.START:
@@ -142,7 +145,8 @@ class Stream(ScriptedLink):
         self._now_ns += 20_000_000
         if self._started_ns is None:
             return super().read()
-        due = int((self._now_ns - self._started_ns) * 1e-9 * self._sent_hz)
+        elapsed_s = (self._now_ns - self._started_ns) * 1e-9
+        due = int(self._sent_hz * (elapsed_s + self._lag_s(elapsed_s)))
         first, self._given = self._given, due
         return b"".join(frames(due - first, first=first)) if due > first else b""
 
@@ -153,12 +157,26 @@ def test_the_stream_is_timed_because_a_gsv_6_may_not_have_taken_its_rate(monkeyp
         make_source({}, 500).start(Stream(monkeypatch, 100.0))
     with pytest.raises(ProtocolError, match=r"says 500 Hz and sends 2\.99 Hz"):
         make_source({}, 500).start(Stream(monkeypatch, 3.0))
+    with pytest.raises(ProtocolError, match="says 500 Hz and sends 600 Hz"):
+        make_source({}, 500).start(Stream(monkeypatch, 600.0))
     for sent_hz in (500.0, 530.0):
         link = Stream(monkeypatch, sent_hz)
         source = make_source({}, 500)
         first = source.start(link)
         assert 0.5 <= len(first) / TWO.length / sent_hz < 0.7  # all of it is decoded
         assert source.rate_hz == 500.0
+
+
+def test_a_busy_computer_is_no_wrong_rate(monkeypatch):
+    class Late(Stream):
+        """Samples are lost, now more, now less."""
+
+        def _lag_s(self, elapsed_s: float) -> float:
+            return -0.6 * elapsed_s + 0.1 * np.sin(3 * elapsed_s)
+
+    monkeypatch.setattr(GsvSource, "timeout_s", 3.0)
+    assert make_source({}, 500).start(Late(monkeypatch, 500.0))
+    assert make_source({}, 500).start(Stream(monkeypatch, 350.0))  # lost as evenly as a short buffer loses
 
 
 def test_a_slow_stream_is_not_timed(monkeypatch):

@@ -160,6 +160,56 @@ def test_a_device_that_counts_anew_starts_anew():
     np.testing.assert_allclose(np.diff(block.device_time_s), 1 / RATE_HZ, atol=1e-4)
 
 
+def without_boards(samples: int, first: int, boards=(0, 1)) -> list[bytes]:
+    """Events in which the channels of `boards` are 0, as interrupts.c of the device fills them."""
+    wire = [bytearray(event) for event in events(samples, first, table=2, relative=6)]
+    for event in wire:
+        for board in boards:
+            event[11 + 8 * board : 19 + 8 * board] = bytes(8)
+        event[-1] = sum(event[:-1]) & 0xFF
+    return [bytes(event) for event in wire]
+
+
+@pytest.mark.parametrize(("boards", "channels"), [((0, 1), ["0 to 3", "4 to 7"]), ((1,), ["4 to 7"])])
+def test_a_pulled_reader_board_is_no_reading_of_0(boards, channels):
+    whole = [*events(200, table=2, relative=6), *events(200, 1200, table=2, relative=6)]
+    sent = [*whole[:200], *without_boards(1000, 200, boards), *whole[200:]]
+    for pieces in ([b"".join(sent)], cut_at(b"".join(sent), range(1000, 28 * 1400, 1500)), sent):
+        block, decoder = decode(pieces, table=2, relative=6)
+        assert block.status.tolist() == [GOOD] * 200 + [DAMAGED] * 1000 + [GOOD] * 200
+        np.testing.assert_array_equal(block.counts[block.status == GOOD], readings(1400)[block.status == 0])
+        assert (decoder.losses.damaged, decoder.losses.restarts) == (1000, 0)
+        assert [str(warning) for warning in decoder.take_warnings()] == [
+            f"channels {one} all read exactly 0: plug their reader board in" for one in channels
+        ]
+        assert decoder.take_warnings() == []
+
+
+def test_a_few_events_of_zeros_are_readings():
+    sent = [*events(50, table=2, relative=6), *without_boards(99, 50), *events(50, 149, table=2, relative=6)]
+    for pieces in ([b"".join(sent)], sent):
+        block, decoder = decode(pieces, table=2, relative=6)
+        assert not block.status.any()
+        np.testing.assert_array_equal(block.counts[50:149], 0)
+        assert decoder.take_warnings() == []
+        assert decoder.losses == Losses(samples=199)
+
+
+def test_a_gauge_that_reads_0_beside_others_that_do_not_is_plugged_in():
+    sent = encode_events(np.arange(500) / RATE_HZ, np.zeros((500, 2)), idle_count=1).tobytes()
+    block, _ = decode([sent])
+    assert len(block) == 500
+    assert not block.status.any()
+
+
+def test_zeros_that_wait_are_bounded():
+    decoder = EventDecoder(RATE_HZ)
+    list(decoder.feed(b"".join(events(3)), 0))
+    for k in range(20):
+        list(decoder.feed(b"".join(without_boards(4, 3 + 4 * k)) + LONG_REPLY * 200, 0))
+        assert decoder.unfinished_bytes <= (1 << 14) + 200 * len(LONG_REPLY)
+
+
 @given(st.lists(st.binary(max_size=60), min_size=10, max_size=10))
 @settings(deadline=None)
 def test_nothing_is_given_that_was_not_sent(rubbish):

@@ -17,6 +17,7 @@ from drivers.devices.harp.codec import (
 from drivers.devices.harp.simulated import SimulatedHarp, find_commands
 from drivers.devices.harp.source import HarpSettings, HarpSource, make_source
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
+from drivers.recognition import describe_unreadable
 from drivers.samples import DeviceIdentity
 from drivers.simulated.protocol import CommandKind, CommandParser
 
@@ -111,6 +112,17 @@ def test_a_device_that_sends_and_does_not_listen():
 def test_a_wrong_protocol_says_what_came():
     with pytest.raises(NoDataError, match=r"lines of text such as .* choose protocol csv"):
         make_source({}, None).start(ScriptedLink(lambda _: b"1000,12,13\r\n2000,14,15\r\n"))
+
+
+def test_what_an_absent_reader_board_sends_is_explained():
+    """The message of a recording that stalls."""
+    sent = encode_events(50 + np.arange(200) / 1000, np.zeros((200, 2))).tobytes()
+    said = "; ".join(
+        f"channels {one} all read exactly 0: plug their reader board in" for one in ("0 to 3", "4 to 7")
+    )
+    assert str(describe_unreadable(sent, "harp")).endswith(said)
+    plugged_in = encode_events(50 + np.arange(200) / 1000, np.zeros((200, 2)), idle_count=1).tobytes()
+    assert "plug their" not in str(describe_unreadable(plugged_in, "harp"))
 
 
 def test_a_device_that_goes_is_lost_and_stopping_it_is_quiet():
