@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from analysis.record import RecordError
 from analysis.uncertainty import noise_variance_factor
 
 _STEP = 1e-30
-COULOMB, OFFSET = 4, 5  # places of x_k and of the zero among the parameters
+DAMPING, COULOMB, OFFSET = 3, 4, 5  # places of n, x_k and of the zero among the parameters
 LINEAR_COUNT = 6  # parameters of a linear spring with viscous and Coulomb damping
 _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
@@ -103,11 +103,10 @@ class OneMassFit:
         unit = self.residual / max(self.rms, 1e-300)
         return max(1.0, noise_variance_factor(unit, self.channel.time_s, self.parameters.period_s / 4.0))
 
-    @property
-    def coulomb_is_negative(self) -> bool:
-        """Tell whether the 95 % interval of x_k lies below zero, as where damping rises with the swing."""
-        deviation = math.sqrt(self.noise_factor) * self.uncertainty(COULOMB)
-        return self.parameters.coulomb < -COVERAGE_FACTOR_95 * deviation
+    def is_negative(self, place: int) -> bool:
+        """Tell whether the 95 % interval of a parameter lies below zero."""
+        deviation = math.sqrt(self.noise_factor) * self.uncertainty(place)
+        return self.parameters[place] < -COVERAGE_FACTOR_95 * deviation
 
     def uncertainty(self, which: int) -> float:
         return math.sqrt(max(0.0, float(self.covariance[which, which])))
@@ -118,6 +117,12 @@ def curve(parameters: Parameters, time_s: Floats, order: int) -> Floats:
     if parameters.is_linear:
         return np.asarray(parameters.offset + free_decay(time_s, *parameters[:5], order=order))
     return parameters.offset + nonlinear_decay(time_s, np.array(parameters.motion), order)
+
+
+def envelope(parameters: Parameters, time_s: Floats) -> Floats:
+    """Swing (n,) at `time_s`, ascending, as that of a linear spring without losses in the same state."""
+    reach, speed = (nonlinear_decay(time_s, np.array(parameters.motion), order) for order in (0, 1))
+    return np.asarray(np.hypot(reach, speed / parameters.omega_rad_per_s))
 
 
 def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassFit:
@@ -147,9 +152,14 @@ def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMass
 
 
 def fit(
-    channel: Channel, start: Parameters, order: int, *, coulomb: bool = True, parts: tuple[int, ...] = ()
+    channel: Channel,
+    start: Parameters,
+    order: int,
+    *,
+    held: tuple[int, ...] = (),
+    parts: tuple[int, ...] = (),
 ) -> OneMassFit:
-    """Least squares from `start` to a minimum near it; without `coulomb`, x_k is held at zero.
+    """Least squares from `start` to a minimum near it; the parameters at the places `held` stay at zero.
 
     Of the parameters beyond the linear ones those are free that are not zero, or whose places are `parts`.
 
@@ -158,15 +168,30 @@ def fit(
     """
     if start.is_linear:
         start = start.from_turning_point_before(float(channel.time_s[0]))
-    if not coulomb:
-        start = start._replace(coulomb=0.0)
-    free = [place for place in used_places(start, *parts) if coulomb or place != COULOMB]
+    start = Parameters(*(0.0 if place in held else value for place, value in enumerate(start)))
+    free = [place for place in used_places(start, *parts) if place not in held]
     if order < 2:
         return _fit(channel, start, order, free)
     for _ in range(3):
         found = _fit(_away_from_turns(channel, start), start, order, free)
         start = found.parameters
     return found
+
+
+def within_bounds(found: OneMassFit) -> OneMassFit:
+    """Fit again with x_k and n held at 0 where they are negative: neither friction nor damping drives.
+
+    The covariance is that of the free fit, for the residuals left: what is held is not known any better.
+    """
+    held: tuple[int, ...] = ()
+    bounded = found
+    for place in (COULOMB, DAMPING):
+        if bounded.parameters[place] < 0.0:
+            held = (*held, place)
+            bounded = fit(found.channel, bounded.parameters, found.order, held=held)
+    if not held:
+        return found
+    return replace(bounded, covariance=found.covariance * bounded.cost / max(found.cost, 1e-300))
 
 
 def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
@@ -177,8 +202,7 @@ def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
 def readings_before_amplitude(limit: float, channel: Channel, parameters: Parameters) -> Channel:
     """Readings up to the first turning point inside `limit`; all if that is under two periods."""
     if not parameters.is_linear:
-        reach, speed = (nonlinear_decay(channel.time_s, np.array(parameters.motion), k) for k in (0, 1))
-        below = np.flatnonzero(np.hypot(reach, speed / parameters.omega_rad_per_s) < limit)
+        below = np.flatnonzero(envelope(parameters, channel.time_s) < limit)
         end_s = float(channel.time_s[below[0]]) if below.size else math.inf
         lasts = end_s - float(channel.time_s[0]) > 0.5 * _HALF_CYCLES_MIN * parameters.period_s
         return channel.between(-math.inf, end_s) if lasts else channel

@@ -11,13 +11,18 @@ from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
 from analysis.motion.one_mass import turning_magnitude
 from analysis.one_mass.fit import (
+    COULOMB,
     LINEAR_COUNT,
     OneMassFit,
+    Parameters,
     curve,
+    envelope,
     fit,
     fit_with_friction,
     readings_before_amplitude,
     readings_before_stop,
+    used_places,
+    within_bounds,
 )
 from analysis.one_mass.parts import add_parts, parts_of
 from analysis.one_mass.turning_points import Crossings, find_crossings
@@ -142,8 +147,7 @@ _GAP_PERIODS_MAX = 1000.0  # without a reading for longer than this, it was the 
 class FreeDecayFit:
     """A fitted decay with its assessment and warnings."""
 
-    fit: OneMassFit  # with viscous and Coulomb damping; `viscous` where x_k came out clearly negative
-    free: OneMassFit  # the same readings with x_k on either side of zero
+    fit: OneMassFit  # with viscous and Coulomb damping, neither of them negative
     viscous: OneMassFit  # the same readings without Coulomb damping
     verdict: ResidualAssessment
     adequate: bool  # the residuals are noise, and nothing moves after the motion should have ended
@@ -169,7 +173,7 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
         return assess_residuals(one.residual, interval_s, step, float(np.ptp(one.channel.value_m)))
 
     found, noted = _refined(found, step, unit)
-    verdict = assess(found)
+    bounded = within_bounds(found)
     explained = 1.0 - found.cost / max(_scatter(found), 1e-300)
     is_decay = _PROMISING < explained < 1.0 - _COMPUTED**2
     richer = add_parts(found) if is_decay else found
@@ -177,27 +181,25 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
         whole = readings.between(float(found.channel.time_s[0]), math.inf)
         whole = readings_before_stop(whole, richer.parameters)
         richer, noted_richer = _refined(fit(whole, richer.parameters, order), step, unit)
-        verdict_richer = assess(richer)
-        if verdict_richer.adequate or (richer.rms < _BETTER * found.rms and _parts_are_clear(richer)):
-            found, noted, verdict = richer, noted_richer, verdict_richer
+        bounded_richer = within_bounds(richer)
+        better = bounded_richer.rms < _BETTER * bounded.rms and _parts_are_clear(bounded_richer)
+        if better or assess(bounded_richer).adequate:
+            found, bounded, noted = richer, bounded_richer, noted_richer
+    verdict = assess(bounded)
     warnings += noted
     _refuse_what_is_no_decay(found, verdict)
-    viscous = fit(found.channel, found.parameters, order, coulomb=False)
-    quiet = _quiet_after(readings, found, step, unit, warnings)
+    viscous = fit(bounded.channel, bounded.parameters, order, held=(COULOMB,))
+    quiet = _quiet_after(readings, bounded, step, unit, warnings)
     if verdict.line is not None:
         text = message(
             "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at"
             " {period_s} Hz: a second mode, hum, or damping of another law.",
             frequency_hz=format_number(verdict.line.frequency_hz),
             amplitude=format_with_unit(verdict.line.amplitude, unit),
-            period_s=format_number(1.0 / found.parameters.period_s),
+            period_s=format_number(1.0 / bounded.parameters.period_s),
         )
         warnings.append(ResultWarning("second-mode", text))
-    free = found
-    if free.coulomb_is_negative:  # friction drives nothing: keep x_k at its bound, and judge that curve
-        found = viscous
-        verdict = assess(found)
-    return FreeDecayFit(found, free, viscous, verdict, verdict.adequate and quiet, unit, warnings)
+    return FreeDecayFit(bounded, viscous, verdict, verdict.adequate and quiet, unit, warnings)
 
 
 def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:
@@ -240,11 +242,10 @@ def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> 
 
 
 def _parts_are_clear(found: OneMassFit) -> bool:
-    """Tell whether x_k is physical and each part well above its uncertainty, correlated noise included."""
+    """Tell whether each part is well above its uncertainty, correlated noise included."""
     limit = _SIGMAS * math.sqrt(found.noise_factor)
     places = (part.place for part in parts_of(found.parameters))
-    clear = all(abs(found.parameters[place]) > limit * found.uncertainty(place) for place in places)
-    return clear and not found.coulomb_is_negative
+    return all(abs(found.parameters[place]) > limit * found.uncertainty(place) for place in places)
 
 
 def _refined(found: OneMassFit, step: float, unit: str) -> tuple[OneMassFit, list[ResultWarning]]:
@@ -326,6 +327,8 @@ def _scatter(found: OneMassFit) -> float:
 
 def _loss(found: OneMassFit) -> tuple[float, float]:
     """Share of the amplitude that is lost over the fitted stretch, and its standard uncertainty."""
+    if not found.parameters.is_linear:
+        return _loss_with_parts(found)
     length_s = float(found.channel.time_s[-1] - found.channel.time_s[0])
     reach, to_decrement = abs(found.parameters.turning), math.pi / found.parameters.omega_rad_per_s
     half_cycles = np.array([math.floor(length_s / to_decrement)])
@@ -338,6 +341,25 @@ def _loss(found: OneMassFit) -> tuple[float, float]:
     slopes = numerical_gradient(loss, point) * np.array([1.0 / reach, to_decrement, 1.0 / reach])
     variance = float(slopes @ found.covariance[np.ix_(_AMPLITUDE, _AMPLITUDE)] @ slopes)
     return loss(point), math.sqrt(max(0.0, variance))
+
+
+def _loss_with_parts(found: OneMassFit) -> tuple[float, float]:
+    """The same of a spring or damping that depends on the swing."""
+    places = used_places(found.parameters)
+    deviations = np.sqrt(np.diag(found.covariance))
+    ends_s = found.channel.time_s[[0, -1]]
+
+    def loss(place: int = 0, deviation: float = 0.0) -> float:
+        values = np.array(found.parameters)
+        values[place] += deviation
+        first, last = envelope(Parameters(*values.tolist()), ends_s).tolist()
+        return 1.0 - float(last / max(first, 1e-300))
+
+    slopes = np.zeros(len(deviations))
+    for place in places:
+        step = max(float(deviations[place]), 1e-300)
+        slopes[place] = (loss(place, step) - loss(place, -step)) / (2.0 * step)
+    return loss(), math.sqrt(max(0.0, float(slopes @ found.covariance @ slopes)))
 
 
 def _quiet_after(

@@ -39,12 +39,11 @@ def identify_one_mass(
     """Identify period, viscous and Coulomb damping of one free decay from gauge 1 of `record`.
 
     The motion m u'' + 2 m n u' + c u + F sign(u') = 0 is fitted in the time domain, from where it surely
-    moves freely until shortly before its stop, with x_k = F / c free to come out on either side of zero. So
-    the interval of n holds also where friction is too small to be seen; it is then not claimed
-    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Where x_k is
-    negative beyond its interval, as where damping rises with the swing, x_k is held at 0, and the distance
-    from the free fit is the budget's share "model". Uneven times, gaps, an initial hold, an offset, either
-    sign and coarse steps are taken as they are.
+    moves freely until shortly before its stop. Where x_k = F / c comes out negative, as where damping rises
+    with the swing, x_k is held at 0 and n fitted again; likewise n. Uncertainties are those with both free,
+    so the interval of n holds also where friction is too small to be seen; it is then not claimed
+    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times, gaps,
+    an initial hold, an offset, either sign and coarse steps are taken as they are.
 
     `quantity` is what gauge 1 reads, `unit` that of the displacement and x_k in any case: "m", "rad", "V".
     With the moving `mass` (kg) come stiffness and damping coefficient. See `single_channel`.
@@ -191,8 +190,6 @@ def _uncertainty_budget(
     noise[:-1, :-1] = found.noise_factor * found.covariance
     columns = _sources(found, record)
     columns[BudgetSource.MASS] = np.append(np.zeros(len(point) - 1), deviation)
-    if found is not solution.free:
-        columns[BudgetSource.MODEL] = np.append(np.subtract(solution.free.parameters, found.parameters), 0.0)
     budget = UncertaintyBudget()
     for name, function in _functions(found, with_mass=mass is not None).items():
         weights = numerical_gradient(function, point)
@@ -234,10 +231,9 @@ def _sources(found: OneMassFit, record: Record) -> dict[Source, Floats]:
 
 
 def _clip_coulomb(budget: UncertaintyBudget) -> None:
-    """Without significance, x_k is not below zero and its interval begins there."""
+    """Without significance, the interval of x_k begins at zero."""
     coulomb = budget.results[_COULOMB]
-    ends = 0.0, max(coulomb.interval_95[1], 0.0)
-    budget.results[_COULOMB] = replace(coulomb, value=max(coulomb.value, 0.0), interval_95=ends)
+    budget.results[_COULOMB] = replace(coulomb, interval_95=(0.0, coulomb.interval_95[1]))
 
 
 def _classical_figures(

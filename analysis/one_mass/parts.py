@@ -6,7 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.one_mass.fit import OneMassFit, Parameters, fit, gradient, used_places
+from analysis.one_mass.fit import (
+    COULOMB,
+    DAMPING,
+    OneMassFit,
+    Parameters,
+    fit,
+    gradient,
+    used_places,
+    within_bounds,
+)
 from analysis.record import RecordError
 from messages.i18n import N_
 
@@ -55,7 +64,7 @@ def parts_of(parameters: Parameters) -> tuple[Part, ...]:
 def add_parts(found: OneMassFit) -> OneMassFit:
     """Add one part after another for as long as the BIC falls clearly; `found` itself where none helps.
 
-    x_k comes out on either side of zero, but fits are compared with x_k at 0 where it is clearly negative.
+    x_k and n come out on either side of zero, but fits are compared with what is clearly negative at 0.
     """
     best = _Candidate(found)
     while True:
@@ -75,12 +84,12 @@ def add_parts(found: OneMassFit) -> OneMassFit:
 
 
 class _Candidate:
-    """A fit, and the same with x_k held at 0 if it is clearly negative."""
+    """A fit, and the same within its bounds if x_k or n is clearly negative."""
 
     def __init__(self, free: OneMassFit) -> None:
         self.free = self.bounded = free
-        if free.coulomb_is_negative:
-            self.bounded = fit(free.channel, free.parameters, free.order, coulomb=False)
+        if free.is_negative(COULOMB) or free.is_negative(DAMPING):
+            self.bounded = within_bounds(free)
         self.effective = len(free.residual) / self.bounded.noise_factor
 
     @property

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import curve_fit
 
 from analysis.identification import Degree, Identification
 from analysis.one_mass.identify import MeasuredQuantity, identify_one_mass, single_channel
@@ -21,25 +22,29 @@ def identified(
     coulomb_m: float = 0.0,
     reads: MeasuredQuantity = "displacement",
     seed: int = 1,
+    damping_per_s: float = DAMPING_PER_S,
+    noise: float = NOISE,
 ) -> Identification:
     omega = 2.0 * math.pi / PERIOD_S
-    stiffness = omega**2 + DAMPING_PER_S**2
+    stiffness = omega**2 + damping_per_s**2
 
     def motion(_: float, state: np.ndarray) -> list[float]:
         u, v = state
-        loss = 2.0 * DAMPING_PER_S * (1.0 + rise_per_m2 * u**2) * v + drag_per_m * abs(v) * v
+        loss = 2.0 * damping_per_s * (1.0 + rise_per_m2 * u**2) * v + drag_per_m * abs(v) * v
         friction = coulomb_m * math.tanh(v / (1e-4 * omega * SWING_M)) if coulomb_m else 0.0
         return [v, -stiffness * (u + cubic_per_m2 * u**3 + friction) - loss]
 
-    return fitted(motion, SWING_M, 5.0, omega, reads, seed)
+    return fitted(motion, SWING_M, 5.0, omega, reads, seed, noise)
 
 
-def fitted(motion, swing, duration_s, omega, reads: MeasuredQuantity, seed: int) -> Identification:
+def fitted(
+    motion, swing, duration_s, omega, reads: MeasuredQuantity, seed: int, noise: float = NOISE
+) -> Identification:
     time_s = np.arange(0.0, duration_s, 0.005)
     solution = solve_ivp(motion, (0.0, duration_s), [swing, 0.0], "DOP853", time_s, rtol=1e-9, atol=1e-13)
     order = ("displacement", "velocity").index(reads)
-    noise = NOISE * swing * omega**order * np.random.default_rng(seed).standard_normal(len(time_s))
-    return identify_one_mass(single_channel(time_s, solution.y[order] + noise), quantity=reads)
+    white = swing * omega**order * np.random.default_rng(seed).standard_normal(len(time_s))
+    return identify_one_mass(single_channel(time_s, solution.y[order] + noise * white), quantity=reads)
 
 
 def assert_holds(found: Identification, name: str, true: float) -> None:
@@ -106,6 +111,45 @@ def test_a_pendulum_is_identified_beyond_small_angles(swing_rad):
     assert found.results["spring_hardening"].value == pytest.approx(
         np.sinc(swing_rad / math.pi) - 1.0, rel=0.1
     )
+
+
+def test_pure_drag_is_a_decay():
+    found = identified(drag_per_m=4.0, damping_per_s=0.0)
+
+    assert found.model.parts == ("drag",)
+    assert_holds(found, "drag_per_m", 4.0)
+    assert_holds(found, "damping_n_per_s", 0.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_rise_of_damping_below_detection_leaves_n_between_its_ends(seed):
+    """x_k is negative then, and n of the fit with x_k free up to 40 % too large."""
+    rise = 0.5
+    found = identified(rise_per_m2=rise / SWING_M**2, noise=0.02, seed=seed)
+    damping = found.results["damping_n_per_s"]
+
+    assert found.model.parts == ()
+    assert found.results["coulomb_displacement_m"].value == 0.0
+    assert DAMPING_PER_S < damping.value < DAMPING_PER_S * (1.0 + 0.25 * rise)
+    assert damping.standard_uncertainty < 0.2 * DAMPING_PER_S
+
+
+def test_n_is_that_of_viscous_damping_alone_where_friction_came_out_negative():
+    time_s = np.arange(0.0, 6.0, 0.01)
+
+    def decay(t, swing, n, omega, phase, zero):
+        return zero + swing * np.exp(-n * t) * np.cos(omega * t + phase)
+
+    truth = (1.0, 0.3, 12.0, 0.4, 0.1)
+    at_bound = 0
+    for seed in range(10):
+        value = decay(time_s, *truth) + 0.01 * np.random.default_rng(seed).standard_normal(len(time_s))
+        found = identify_one_mass(single_channel(time_s, value))
+        if found.results["coulomb_displacement_m"].value == 0.0:
+            at_bound += 1
+            best, _ = curve_fit(decay, time_s, value, truth)
+            assert found.results["damping_n_per_s"].value == pytest.approx(best[1], rel=1e-4)
+    assert at_bound >= 2
 
 
 def test_linear_damping_keeps_its_free_fit():
