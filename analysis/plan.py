@@ -6,26 +6,43 @@ parabola (f_s close to f_d), a real test may report a larger uncertainty.
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
 
 from analysis.arrays import Floats
 from analysis.catalogue import MILLIMETRE
-from analysis.fitting.problem import FitProblem
+from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
 from analysis.fitting.search import Fit, build_problem_from_channels, fit_at_minimum
+from analysis.fitting.stand_search import stand_problem
 from analysis.laws.catalogue import compared_law, default_point
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import (
+    CORNER_NAMES,
+    EFFECTS,
+    PULLBACK_POWERS,
+    StandEffect,
+    StandModel,
+    compose,
+    extended_point,
+    squared_constant_s2,
+)
 from analysis.motion.two_mass import Motion, TwoMassParameters
 from analysis.preparation.channels import SAMPLES_MIN, Channel
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN
-from analysis.quantities import BudgetLine, Quantity, ResultWarning, result_warning
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning, result_warning
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
+from analysis.results.diagnosis import result_names
 from analysis.results.fitted_quantities import msk64_degree
-from analysis.results.joint_fit import FRICTION_PARAMETERS, add_systematic_uncertainty
+from analysis.results.joint_fit import (
+    FRICTION_PARAMETERS,
+    SIGNED_PARAMETERS,
+    add_systematic_uncertainty,
+    law_places,
+)
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
 from messages.i18n import N_
 from messages.message import joined, message
@@ -60,6 +77,11 @@ class PlannedTest:
     table_gauge: GaugeUncertainty = _NOTHING_STATED
     relative_gauge: GaugeUncertainty = _NOTHING_STATED
     gauge_2_measures_plate: bool = False  # gauge 2 measures against the base instead of the table
+    effects: Mapping[str, float] = field(default_factory=dict)
+    """Sizes of the stand's effects at `effects_pullback_m`, by the names of their results. The analysis is
+    expected to find these effects, and fits their sizes."""
+    effects_pullback_m: float | None = None  # None: the planned one
+    model_spread: float = 0.0  # standard uncertainty of f_d as a share, by what models leave unexplained
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "duration_s", "hold_s", "noise_m"):
@@ -91,7 +113,26 @@ class PlannedTest:
     @property
     def law(self) -> FrictionLaw:
         static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
-        return compared_law(static_friction=static, tilt=self.parameters.tilt_rad != 0.0)
+        law = compared_law(static_friction=static, tilt=self.parameters.tilt_rad != 0.0)
+        return compose(law, self.stand_effects) if self.stand_effects else law
+
+    @property
+    def stand_effects(self) -> tuple[StandEffect, ...]:
+        """Effects of which all sizes are given."""
+        return tuple(
+            effect
+            for effect in EFFECTS
+            if (names := result_names(effect)) and all(name in self.effects for name in names)
+        )
+
+    @property
+    def stand_values(self) -> dict[str, float]:
+        """Parameters of the effects at the planned pullback, by name."""
+        pullback_m = abs(self.parameters.pullback_m)
+        over = pullback_m / abs(self.effects_pullback_m) if self.effects_pullback_m else 1.0
+        values = {name: size * over ** PULLBACK_POWERS.get(name, 0) for name, size in self.effects.items()}
+        corners = {own: values.pop(name) for own, name in CORNER_NAMES.items() if name in values}
+        return values | {own: squared_constant_s2(corner_hz) for own, corner_hz in corners.items()}
 
     @property
     def period_s(self) -> float:
@@ -99,7 +140,10 @@ class PlannedTest:
         return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
 
     def motion(self) -> Motion:
-        return self.parameters.simulate(max(self.duration_s, _SETTLED_S))
+        duration_s, law = max(self.duration_s, _SETTLED_S), self.law
+        if not self.stand_effects:
+            return self.parameters.simulate(duration_s)
+        return law.simulate(self.parameters, [self.stand_values[own.name] for own in law.own], duration_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +223,10 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
     for place, name in FRICTION_PARAMETERS.items():
         if place in test.law.free_parameters and fit.determines(place):
-            budget.add(name, fit.value(place), fitted.parameter_contributions(place))
+            value, shares = fit.value(place), fitted.parameter_contributions(place)
+            if place == Parameter.FRICTION_DYNAMIC:
+                shares[BudgetSource.MODEL] = test.model_spread * value
+            budget.add(name, value, shares)
     return budget
 
 
@@ -203,13 +250,20 @@ def _record(test: PlannedTest) -> Record:
     count = held + math.floor(test.duration_s * test.rate_hz)
     time_s = np.arange(count) / test.rate_hz
     since_s = np.minimum((np.arange(count) - held - _RELEASE_PHASE) / test.rate_hz, test.duration_s)
-    table, relative = test.motion().sample_displacements(since_s)
-    side = -1.0 if test.parameters.pullback_m < 0.0 else 1.0
     parameters = test.parameters
+    if test.stand_effects:
+        point, law = _true_point(test), test.law
+        table = predict_gauge_1(point, time_s, law)
+        second = predict_gauge_2(point, time_s, law, test.gauge_2_measures_plate)
+    else:
+        side = -1.0 if parameters.pullback_m < 0.0 else 1.0
+        table, relative = test.motion().sample_displacements(since_s)
+        second = side * (relative + table if test.gauge_2_measures_plate else relative)
+        table = side * table
     return Record(
         time_s,
-        side * table,
-        side * (relative + table if test.gauge_2_measures_plate else relative),
+        table,
+        second,
         StandMasses(
             parameters.table_mass_kg,
             parameters.plate_mass_kg,
@@ -234,9 +288,11 @@ def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
     if min(map(len, channels)) < SAMPLES_MIN:
         return None
     noise_m = (max(test.noise_m, _NOISE_MIN_M),) * 2
-    return build_problem_from_channels(
+    problem = build_problem_from_channels(
         record, channels, noise_m, test.period_s, absolute=test.gauge_2_measures_plate
     )
+    law = test.law
+    return stand_problem(problem, law) if isinstance(law, StandModel) else problem
 
 
 def _within(time_s: Floats, value_m: Floats | None, range_m: float | None) -> Channel:
@@ -248,13 +304,22 @@ def _within(time_s: Floats, value_m: Floats | None, range_m: float | None) -> Ch
 
 def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
     """Fit at the true parameters."""
-    point = default_point()
+    return fit_at_minimum(problem, test.law, problem.minimise(_true_point(test), test.law, 1))
+
+
+def _true_point(test: PlannedTest) -> Floats:
+    """Parameters of the fit (p,), turned so that the pullback is positive."""
+    point, law = default_point(), test.law
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)
-    if test.parameters.pullback_m < 0.0:
-        motion[[Parameter.PULLBACK, Parameter.TILT]] *= -1.0
     point[: len(motion)] = motion
-    return fit_at_minimum(problem, test.law, problem.minimise(point, test.law, 1))
+    if isinstance(law, StandModel):
+        point, values = extended_point(point), test.stand_values
+        for place, name in law_places(law).items():
+            point[place] = values[name]
+    if test.parameters.pullback_m < 0.0:
+        point[[place for place in SIGNED_PARAMETERS if place < len(point)]] *= -1.0
+    return point
 
 
 def _rest_s(test: PlannedTest) -> float | None:

@@ -50,10 +50,11 @@ class ReductionOption:
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyParts:
-    """Standard uncertainty of f_d: from noise of the readings (type A), and from stated sources (type B)."""
+    """Standard uncertainty of f_d: from noise of the readings (type A), and from other sources (type B)."""
 
     noise: float
     stated: float
+    model: float = 0.0  # share of `stated` by what models leave unexplained
 
     @property
     def total(self) -> float:
@@ -78,7 +79,8 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
     lines = [line for line in budget.lines if line.contribution_to == "friction_dynamic"]
     noise = [line.standard_uncertainty for line in lines if line.source is BudgetSource.NOISE]
     stated = [line.standard_uncertainty for line in lines if line.source is not BudgetSource.NOISE]
-    return UncertaintyParts(math.hypot(*noise), math.hypot(*stated))
+    model = [line.standard_uncertainty for line in lines if line.source is BudgetSource.MODEL]
+    return UncertaintyParts(math.hypot(*noise), math.hypot(*stated), math.hypot(*model))
 
 
 def reduction_options(test: PlannedTest) -> list[ReductionOption]:
@@ -190,10 +192,13 @@ def _largest(allowed: Callable[[float], bool]) -> float:
 
 
 def _floor(now: UncertaintyParts) -> Message:
-    return message(
-        "without any noise {stated} would be left, of gauges, masses, gravity and levelling.",
-        stated=format_number(now.stated, 2),
-    )
+    template = N_("without any noise {stated} would be left, of gauges, masses, gravity and levelling.")
+    if now.model:
+        template = N_(
+            "without any noise {stated} would be left, of gauges, masses, gravity, levelling and the model"
+            " of the stand."
+        )
+    return message(template, stated=format_number(now.stated, 2))
 
 
 def _improved(gauge: GaugeUncertainty, share: float) -> GaugeUncertainty:

@@ -11,19 +11,10 @@ from analysis.campaign.pooling import PooledQuantity, RunValue, pool, run_value
 from analysis.campaign.series import RunResult, run_names
 from analysis.catalogue import MILLIMETRE, Place, definition
 from analysis.formatting import format_number
-from analysis.laws.stand_parts import CORNER_NAMES, EFFECTS, StandEffect
+from analysis.laws.stand_parts import CORNER_NAMES, EFFECTS, PULLBACK_POWERS, StandEffect
 from analysis.results.diagnosis import SENTENCES, diagnosis, main_result, result_names
 from messages.message import Message, joined, message
 
-_PULLBACK_POWERS = {
-    "spring_hardening": 2,
-    "spring_asymmetry": 1,
-    "gauge_1_bend": 2,
-    "gauge_2_bend": 2,
-    "gauge_1_square": 1,
-    "gauge_2_square": 1,
-}
-"""Sizes that are stated at the pullback, and the power of it with which they rise (`stand_motion`)."""
 _CHANCE = 0.05  # share of runs in which a wrong effect is named at most (docs/validation.md)
 _SCATTER_MAX = 1.0 / 3.0  # of the size, between runs: with more, not even the sign of the next is sure
 _SCATTER_MAX_OF = {"second_mode_frequency_hz": 0.1, "base_frequency_hz": 0.2}
@@ -92,7 +83,7 @@ class _Shown:
 
     def at(self, name: str, pullback_m: float) -> RunValue:
         """A size at another pullback."""
-        size, factor = self.sizes[name], (pullback_m / self.pullback_m) ** _PULLBACK_POWERS.get(name, 0)
+        size, factor = self.sizes[name], (pullback_m / self.pullback_m) ** PULLBACK_POWERS.get(name, 0)
         return replace(
             size,
             value=factor * size.value,
@@ -108,7 +99,7 @@ def _summary(effect: StandEffect, contact: str, runs: Sequence[RunResult]) -> Ef
     sizes, far = _pooled_sizes(effect, shown, reference_m)
     told = main_result(effect, {name: one.quantity.value for name, one in sizes.items()})
     visibility, having = _visibility(shown, told, reference_m), {one.run.name for one in shown}
-    power = _PULLBACK_POWERS.get(told, 0)
+    power = PULLBACK_POWERS.get(told, 0)
     without = {
         run.name
         for run in runs
@@ -188,7 +179,7 @@ def _visibility(shown: Sequence[_Shown], name: str, pullback_m: float) -> float:
         for one in shown
         for size in [one.sizes[name]]
     ]
-    powers = [(pullback_m / one.pullback_m) ** _PULLBACK_POWERS.get(name, 0) for one in shown]
+    powers = [(pullback_m / one.pullback_m) ** PULLBACK_POWERS.get(name, 0) for one in shown]
     return float(np.median(np.array(ratios) * powers))
 
 

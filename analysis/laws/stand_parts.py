@@ -1,5 +1,6 @@
 """Deviations from the ideal stand that a fit can add to a friction law, one part at a time."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -136,6 +137,15 @@ STAND_PLACES = {own.name: place for place, own in STAND_PARAMETERS.items()}
 
 CORNER_NAMES = {"filter_s2": "gauge_filter_hz", "gauge_2_filter_s2": "gauge_2_filter_hz"}
 """Results that are given in place of squared time constants."""
+PULLBACK_POWERS = {
+    "spring_hardening": 2,
+    "spring_asymmetry": 1,
+    "gauge_1_bend": 2,
+    "gauge_2_bend": 2,
+    "gauge_1_square": 1,
+    "gauge_2_square": 1,
+}
+"""Sizes that are stated at the pullback, and the power of it with which they rise (`stand_motion`)."""
 SHARED_NAMES = {
     Parameter.LAG: ("gauge_2_lag_s", "s"),
     Parameter.RELATIVE_GAIN: ("relative_gain", "1"),
@@ -217,6 +227,7 @@ def _constant_friction(_speed: float, parameters: Floats) -> float:
     return coefficient
 
 
+_SQUARED_CONSTANT_MIN_S2 = 1e-12  # a corner of 100 kHz: no stand shows a higher one
 _LAG_STEP_S = 1e-6
 _STEP_SHARE = 1e-5
 """Step of differences over the range of a parameter of the stand, or over the value of one of the motion."""
@@ -348,6 +359,20 @@ def simulate_fit(law: FrictionLaw, fitted: Mapping[str, float], duration_s: floa
     if isinstance(law, StandModel):
         return law.simulate(TwoMassParameters.from_fit(fitted), own, duration_s)
     return law.solver.simulate(TwoMassParameters.from_fit(fitted), own, duration_s)
+
+
+def corner_frequency_hz(squared_constant_s2: float) -> float:
+    """Corner frequency of an RC filter that rounds readings as much as a fitted filter.
+
+    What is left of a filter without its delay is its second moment: half the squared time constant of an RC
+    filter, the whole of a critically damped one.
+    """
+    return 1.0 / (2.0 * math.pi * math.sqrt(2.0 * max(squared_constant_s2, _SQUARED_CONSTANT_MIN_S2)))
+
+
+def squared_constant_s2(corner_hz: float) -> float:
+    """The inverse of `corner_frequency_hz`."""
+    return 0.5 / (2.0 * math.pi * corner_hz) ** 2
 
 
 def extended_point(point: Floats) -> Floats:

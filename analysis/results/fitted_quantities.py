@@ -15,7 +15,7 @@ from analysis.identification import Events
 from analysis.laws.catalogue import compared_law
 from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, Parameter
-from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, StandModel
+from analysis.laws.stand_parts import CORNER_NAMES, SHARED_NAMES, StandModel, corner_frequency_hz
 from analysis.motion.two_mass import PEAK_RATES
 from analysis.preparation.channels import Channel
 from analysis.preparation.free_decay import FreeDecay
@@ -71,12 +71,8 @@ def add_fitted_quantities(
 def _add_corner(
     name: str, squared_constant_s2: float, shares: dict[Source, float], budget: UncertaintyBudget
 ) -> None:
-    """Add the corner frequency of an RC filter that rounds the readings as much as the fitted one.
-
-    What is left of a filter without its delay is its second moment: half the squared time constant of an RC
-    filter, the whole of a critically damped one.
-    """
-    corner_hz = 1.0 / (2.0 * math.pi * math.sqrt(2.0 * max(squared_constant_s2, 1e-12)))
+    """Add the corner frequency of an RC filter that rounds the readings as much as the fitted one."""
+    corner_hz = corner_frequency_hz(squared_constant_s2)
     slope = 0.5 * corner_hz / max(squared_constant_s2, 1e-12)
     budget.add(name, corner_hz, {source: slope * share for source, share in shares.items()})
 

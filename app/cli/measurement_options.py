@@ -113,6 +113,7 @@ class PlanOptions:
     """Predict what a test will show, before it is made.
 
     Shows motion, u_s, use of the gauges' ranges, the uncertainty of f_d, and what would halve it.
+    Effects that the stand shows in its last runs are planned with.
     Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
     Options override the values of the series.
     """
@@ -124,4 +125,10 @@ class PlanOptions:
     )
     duration: float = number("--duration", "Seconds after release that are recorded.", 10.0, above=0.0)
     calibration: Path | None = shared.calibration()
+    last_runs: Path | None = option(
+        "--last-runs",
+        "Folder of runs whose kept results tell the stand's effects; that of recordings if absent.",
+        metavar="DIR",
+    )
+    ideal_stand: bool = flag("--ideal-stand", "Leave out what the last runs show of the stand.")
     as_json: bool = shared.as_json()

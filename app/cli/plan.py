@@ -4,11 +4,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from analysis.catalogue import MILLIMETRE, definition
-from analysis.formatting import format_value
+from analysis.formatting import format_uncertainty, format_value
 from app.cli import output as out
 from app.cli.analysis_text import budget_shares, largest_rates
 from app.cli.measurement_options import PlanOptions
 from app.cli.motion_parameters import check_samples, motion_parameters
+from app.runs.campaign.last_runs import LastRuns, read_last_runs
+from app.runs.listing import check_folder_exists
+from app.runs.paths import recordings_directory
 from app.runs.plan_json import build_planned_test, plan_document
 from config.files import load_gauges, load_stand
 
@@ -17,17 +20,28 @@ def plan(options: PlanOptions) -> None:
     check_samples(options.duration, options.rate)
     parameters = motion_parameters(options.motion)
     gauges = load_gauges(options.calibration.expanduser() if options.calibration else None)
+    stand = load_stand()
     test = build_planned_test(
         parameters,
-        load_stand(),
+        stand,
         gauges,
         rate_hz=options.rate, noise_m=options.noise, duration_s=options.duration,
     )  # fmt: skip
-    document = {"series": options.motion.series} | plan_document(test)
+    document = {"series": options.motion.series} | plan_document(test, _last_runs(options, stand.name))
     if options.as_json:
         out.print_json(document)
     else:
         _print_plan(document)
+
+
+def _last_runs(options: PlanOptions, stand_name: str) -> LastRuns | None:
+    """Last runs of the stand; None where they are left out."""
+    if options.ideal_stand:
+        return None
+    folder = options.last_runs.expanduser().absolute() if options.last_runs else None
+    if folder is not None:
+        check_folder_exists(folder)
+    return read_last_runs(folder or recordings_directory(), stand_name)
 
 
 def _print_plan(document: dict[str, Any]) -> None:
@@ -48,9 +62,25 @@ def _print_plan(document: dict[str, Any]) -> None:
     if document["noise_part"] is not None:
         rows += [("  of which", ", ".join(budget_shares(document["budget"]))), ("what would halve it", "")]
     rows += [(f"  {option['means']}", option["message"]) for option in document["halved_by"]]
+    if (last := document["last_runs"]) is not None:
+        rows += _last_runs_rows(last)
     out.print_fields(rows, 23)
     for warning in document["warnings"]:
         out.print_line(f"warning {warning['code']}: {warning['message']}")
+
+
+def _last_runs_rows(last: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What the last runs show of the stand, and what it costs."""
+    yield "last runs", f"{len(last['runs'])} kept results in {last['folder']}"
+    for effect in last["effects_of_stand"]:
+        yield f"  {effect['name']}", effect["message"]
+    if not last["effects_of_stand"]:
+        yield "  effects", "they show no effects of the stand"
+    if (ideal := last["ideal_standard_uncertainty"]) is not None and last["planned_with"]:
+        names = " and ".join(last["planned_with"])
+        yield "  planned with", f"{names}; without, f_d would be uncertain by {format_uncertainty(ideal)}"
+    if (observed := last["friction_dynamic"]) is not None:
+        yield "  one of them", observed["message"]
 
 
 def _gauge_rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:

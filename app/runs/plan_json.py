@@ -4,18 +4,22 @@ from typing import Any
 
 import msgspec
 
+from analysis.campaign.observed import observe_uncertainty, planned_sizes
+from analysis.campaign.stand_effects import summarize_effects
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.plan import PlannedTest, plan, smallest_pullback_m
+from analysis.plan import PlannedTest, expected_budget, plan, smallest_pullback_m
 from analysis.uncertainty_reduction import reduction_options, uncertainty_parts
 from app.runs.analysis_input import gauge_uncertainty
 from app.runs.analysis_json import budget_documents, warning_documents
+from app.runs.campaign.documents import effect_documents
+from app.runs.campaign.last_runs import LastRuns
 from config.schema import Gauges, Stand
 
 Document = dict[str, Any]
 
 
 def build_planned_test(
-    parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **facts: float
+    parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **facts: Any
 ) -> PlannedTest:
     """A test on a stand with these gauges; `facts` are fields of `PlannedTest`. Raises AnalysisError."""
     return PlannedTest(
@@ -30,8 +34,46 @@ def build_planned_test(
     )
 
 
-def plan_document(test: PlannedTest) -> Document:
-    """JSON of what a test will show, and of what would halve the uncertainty of f_d. Raises AnalysisError."""
+def plan_document(test: PlannedTest, last: LastRuns | None = None) -> Document:
+    """JSON of what a test will show, and of what would halve the uncertainty of f_d. Raises AnalysisError.
+
+    Effects that the stand shows in its last runs are planned with.
+    """
+    of_last: Document | None = None
+    if last is not None and last.results:
+        test, of_last = _with_last_runs(test, last)
+    return {**_document(test), "last_runs": of_last}
+
+
+def _with_last_runs(test: PlannedTest, last: LastRuns) -> tuple[PlannedTest, Document]:
+    """The test with the stand's effects in it, and what the last runs say."""
+    effects = summarize_effects(last.results)
+    observed = observe_uncertainty(last.results, effects)
+    changed = test.replace(
+        effects=planned_sizes(effects, test.parameters.pullback_m),
+        effects_pullback_m=test.parameters.pullback_m,
+        model_spread=observed.model if observed and observed.model_is_shared else 0.0,
+    )
+    ideal = expected_budget(test).results.get("friction_dynamic")
+    described = None
+    if observed is not None:
+        described = msgspec.to_builtins(observed) | {
+            "standard_uncertainty": observed.standard_uncertainty,
+            "runs_to_halve": observed.runs_to_halve,
+            "message": str(observed.message),
+        }
+    return changed, {
+        "folder": str(last.folder),
+        "runs": [result.name for result in last.results],
+        "effects_of_stand": effect_documents(effects),
+        "planned_with": [effect.name for effect in changed.stand_effects],
+        "model_spread": changed.model_spread,
+        "ideal_standard_uncertainty": None if ideal is None else ideal.standard_uncertainty,
+        "friction_dynamic": described,
+    }
+
+
+def _document(test: PlannedTest) -> Document:
     found, parts = plan(test), uncertainty_parts(test)
     motion = found.motion
     return {

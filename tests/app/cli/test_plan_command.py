@@ -1,10 +1,18 @@
 """`slipstand plan`: prediction of a test."""
 
+import math
+
 import pytest
 
 from analysis.plan import PlannedTest, plan
 from app.runs.plan_json import build_planned_test
 from config.files import load_gauges, load_stand, settings_file
+
+
+@pytest.fixture(autouse=True)
+def no_recordings(tmp_path, monkeypatch):
+    """No runs of the user's: the last ones are planned with."""
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "runs"))
 
 
 def test_plan_tells_what_simulate_simulates(slipstand):
@@ -82,3 +90,42 @@ def test_plan_refuses_what_cannot_be_in_one_line(slipstand, options, fault):
     assert said.out == ""
     assert fault in said.err
     assert said.err.count("\n") == 1
+
+
+def test_effects_of_the_last_runs_are_planned_with(slipstand, real_stand_runs):
+    test = ("plan", "--series", "1FFM0", "--rate", 500, "--duration", 5, "--last-runs", real_stand_runs)
+    planned = slipstand(*test, "--json").json
+    ideal = slipstand(*test, "--ideal-stand", "--json").json
+    last = planned["last_runs"]
+    friction = planned["results"]["friction_dynamic"]
+
+    assert [effect["name"] for effect in last["effects_of_stand"]] == ["second-mode", "release-ramp"]
+    assert last["planned_with"] == ["second-mode"]
+    assert len(last["runs"]) == 3
+    assert last["model_spread"] > 0.0
+    assert planned["residual_displacement_m"] != ideal["residual_displacement_m"]
+    assert last["ideal_standard_uncertainty"] == ideal["results"]["friction_dynamic"]["standard_uncertainty"]
+    assert friction["standard_uncertainty"] > last["ideal_standard_uncertainty"]
+    # what runs of this stand report, at the same rate and for the same time; a plan knows no scatter between
+    observed = last["friction_dynamic"]
+    reported = math.hypot(observed["noise"], observed["model"], observed["shared"])
+    assert friction["standard_uncertainty"] == pytest.approx(0.1 * reported, rel=0.05)
+    assert planned["noise_part"] == pytest.approx(0.1 * observed["noise"], rel=0.3)
+    assert ideal["last_runs"] is None
+
+
+def test_plan_says_what_the_last_runs_show_and_what_it_costs(slipstand, real_stand_runs, monkeypatch):
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(real_stand_runs))
+    said = slipstand("plan", "--series", "1FFM0").out
+
+    assert f"last runs              3 kept results in {real_stand_runs}" in said
+    assert "  second-mode          3 of 3 runs: a second mode at " in said
+    assert "  planned with         second-mode; without, f_d would be uncertain by 0.00022" in said
+    assert "  one of them          One run gives f_d to 0.2" in said
+
+
+def test_plan_refuses_a_folder_of_last_runs_that_does_not_exist(slipstand, tmp_path):
+    said = slipstand("plan", "--series", "1FFM0", "--last-runs", tmp_path / "nowhere")
+
+    assert (said.code, said.out) == (1, "")
+    assert "nowhere: there is no such folder" in said.err
