@@ -1,11 +1,12 @@
 """A test before it is made: from the stand's settings and a calibration to what it will show, as JSON."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 
-from analysis.campaign.observed import observe_uncertainty, planned_sizes
-from analysis.campaign.stand_effects import summarize_effects
+from analysis.campaign.observed import ObservedUncertainty, observe_uncertainty, planned_sizes
+from analysis.campaign.stand_effects import EffectSummary, summarize_effects
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.plan import PlannedTest, expected_budget, plan, smallest_pullback_m
 from analysis.uncertainty_reduction import reduction_options, uncertainty_parts
@@ -34,6 +35,17 @@ def build_planned_test(
     )
 
 
+def with_effects(
+    test: PlannedTest, effects: Sequence[EffectSummary], observed: ObservedUncertainty | None
+) -> PlannedTest:
+    """The test on a stand that shows `effects` in its runs, with the uncertainty that these reached."""
+    return test.replace(
+        effects=planned_sizes(effects, test.parameters.pullback_m),
+        effects_pullback_m=test.parameters.pullback_m,
+        model_spread=observed.model if observed and observed.model_is_shared else 0.0,
+    )
+
+
 def plan_document(test: PlannedTest, last: LastRuns | None = None) -> Document:
     """JSON of what a test will show, and of what would halve the uncertainty of f_d. Raises AnalysisError.
 
@@ -49,11 +61,7 @@ def _with_last_runs(test: PlannedTest, last: LastRuns) -> tuple[PlannedTest, Doc
     """The test with the stand's effects in it, and what the last runs say."""
     effects = summarize_effects(last.results)
     observed = observe_uncertainty(last.results, effects)
-    changed = test.replace(
-        effects=planned_sizes(effects, test.parameters.pullback_m),
-        effects_pullback_m=test.parameters.pullback_m,
-        model_spread=observed.model if observed and observed.model_is_shared else 0.0,
-    )
+    changed = with_effects(test, effects, observed)
     ideal = expected_budget(test).results.get("friction_dynamic")
     described = None
     if observed is not None:

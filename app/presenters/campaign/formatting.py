@@ -8,6 +8,7 @@ from pathlib import Path
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.effects import Effect
+from analysis.campaign.observed import observe_uncertainty
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
@@ -34,7 +35,7 @@ from app.presenters.campaign.state import (
 )
 from app.presenters.results import in_words, sentence
 from app.runs.campaign.collect import CollectedRuns
-from app.runs.plan_json import build_planned_test
+from app.runs.plan_json import build_planned_test, with_effects
 from config.files import load_gauges, load_stand, published_row
 from config.schema import ConfigError, Stand
 from messages.i18n import N_, gettext, ngettext, translate
@@ -64,7 +65,7 @@ def summarise(runs: CollectedRuns, all_series: Sequence[str]) -> CampaignSummary
         tuple(map(_effect_row, campaign.effects.effects)),
         tuple(map(_stand_effect, campaign.effects_of_stand)),
         _repeatability_rows(campaign),
-        plan_next_test(campaign, all_series),
+        plan_next_test(runs, campaign, all_series),
         _excluded_rows(runs, campaign),
         tuple(f"{Path(failure.run).name}: {sentence(failure.error)}" for failure in runs.failures),
         _warning_texts(runs, campaign),
@@ -248,8 +249,8 @@ def _with_uncertainty(quantity: Quantity) -> str:
     return f"{value} ± {uncertainty}" if uncertainty else value
 
 
-def plan_next_test(campaign: Campaign, all_series: Sequence[str]) -> NextTest:
-    """Plan a test of the series with the fewest runs."""
+def plan_next_test(runs: CollectedRuns, campaign: Campaign, all_series: Sequence[str]) -> NextTest:
+    """Plan a test of the series with the fewest runs, with the effects that the stand shows in all runs."""
     counts = dict.fromkeys(all_series, 0)
     for row in campaign.rows:
         if row.series.code in counts:
@@ -266,12 +267,12 @@ def plan_next_test(campaign: Campaign, all_series: Sequence[str]) -> NextTest:
             wanted=TARGET_REPEATS,
         )
     try:
-        return NextTest(code, reason, tuple(_expectations(code, campaign, load_stand())))
+        return NextTest(code, reason, tuple(_expectations(code, runs, campaign, load_stand())))
     except (AnalysisError, ConfigError):  # the stand of the series is not configured here
         return NextTest(code, reason)
 
 
-def _expectations(code: str, campaign: Campaign, stand: Stand) -> Iterator[str]:
+def _expectations(code: str, runs: CollectedRuns, campaign: Campaign, stand: Stand) -> Iterator[str]:
     """What a test will show by T, n1 and f_d of its series, else of the published table."""
     series, published = stand.series(code), published_row(code)
     found = next((row.quantities for row in campaign.rows if row.series.code == code), {})
@@ -285,7 +286,9 @@ def _expectations(code: str, campaign: Campaign, stand: Stand) -> Iterator[str]:
         pullback_m=series.pullback_m,
         **values,
     )
-    planned = plan(build_planned_test(parameters, stand, load_gauges()))
+    effects = campaign.effects_of_stand
+    observed = observe_uncertainty([run for run in runs.runs if not run.excluded], effects)
+    planned = plan(with_effects(build_planned_test(parameters, stand, load_gauges()), effects, observed))
     if _FRICTION in found:
         so_far = _with_uncertainty(found[_FRICTION].quantity)
         yield gettext("f<sub>d</sub> so far: {value}", value=so_far)

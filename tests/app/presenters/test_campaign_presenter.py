@@ -147,6 +147,20 @@ def test_the_next_test_is_said_with_what_to_expect(stage: Stage) -> None:
     )
 
 
+def test_the_next_test_is_planned_with_the_stands_effects(stage: Stage) -> None:
+    shown = runs_with_a_mode()
+    stage.gather(found(shown))
+    with_mode = stage.presenter.state.summary.next_test
+    stage.gather(found([replace(run, effects=(), warnings=()) for run in shown]))
+    ideal = stage.presenter.state.summary.next_test
+    assert with_mode is not None
+    assert ideal is not None
+    assert with_mode.series == ideal.series == "1FFM1"
+    (_, ends_with), (_, ends_ideal) = with_mode.expectations, ideal.expectations
+    assert ends_with.startswith("the plate ends")
+    assert ends_with != ends_ideal
+
+
 def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -> None:
     stage.gather()
     path = path_of("1FFM0", 1)
