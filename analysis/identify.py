@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from analysis.arrays import Floats
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.search import (
@@ -29,8 +31,8 @@ from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import StandEffect, StandModel
 from analysis.motion.stand_motion import INTEGRATION_ERROR_M
 from analysis.plate.friction import estimate_plate_friction
-from analysis.preparation.free_decay import FreeDecay, prepare
-from analysis.preparation.oscillation import pullback_warnings
+from analysis.preparation.free_decay import TAIL_PERIODS_MIN, FreeDecay, prepare
+from analysis.preparation.oscillation import no_decay_error, pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError
 from analysis.results import fitted_quantities, joint_fit
@@ -79,6 +81,24 @@ def identify(
     AnalysisError
         Unknown model.
     """
+    try:
+        return _identify(record, model, progress, monte_carlo)
+    except np.linalg.LinAlgError as error:
+        raise RecordError(
+            "no law of motion can be fitted to the readings ({fault}). Check that gauge 1 shows the free"
+            " decay of a table, and gauge 2 the plate on it.",
+            fault=str(error),
+        ) from error
+
+
+def warm_up() -> None:
+    """Compile and load everything that an identification needs, before anybody waits for a result."""
+    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
+
+
+def _identify(
+    record: Record, model: str, progress: Progress | None, monte_carlo: int | None
+) -> Identification:
     laws = COMPARED_LAWS if model == "auto" else (law_by_name(model),)
     report = progress or (lambda _share, _what: None)
 
@@ -173,16 +193,14 @@ def identify(
     )
 
 
-def warm_up() -> None:
-    """Compile and load everything that an identification needs, before anybody waits for a result."""
-    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
-
-
 def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo: bool) -> Identification:
     """Period, damping and a lower bound of f_s: all that a record without slip gives."""
     if decay.tail is None:
+        length_s = float(decay.table.time_s[-1]) - decay.release.time_s
+        if length_s >= TAIL_PERIODS_MIN * decay.period_s:
+            raise no_decay_error(length_s)
         template = N_("the decay lasts {length} s, under two periods. Record until rest.")
-        raise RecordError(template, length=format_number(decay.table.time_s[-1] - decay.release.time_s))
+        raise RecordError(template, length=format_number(length_s))
     budget = UncertaintyBudget()
     constants = joint_fit.constants_from_tail(record, decay)
     joint_fit.add_constants(constants, budget)
@@ -298,7 +316,10 @@ def _is_refuted(warning: ResultWarning, joint: JointFit) -> bool:
 
 
 def _no_tail_warning() -> ResultWarning:
-    text = message("the stick tail is shorter than two periods: period and damping come from the joint fit.")
+    text = message(
+        "the stick tail is shorter than two periods, or no damped oscillation: period and damping come from"
+        " the joint fit."
+    )
     return ResultWarning("tail-too-short", text)
 
 

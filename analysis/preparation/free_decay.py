@@ -25,7 +25,7 @@ from analysis.preparation.channels import (
 )
 from analysis.preparation.oscillation import DampedCosine, Release
 from analysis.quantities import ResultWarning, result_warning
-from analysis.record import Record
+from analysis.record import Record, RecordError
 from messages.i18n import N_
 from messages.message import message
 
@@ -243,12 +243,20 @@ def prepare(record: Record) -> FreeDecay:
 
 
 def fit_tail(table: Channel, start_s: float | None, period_s: float) -> DampedCosine | None:
-    """Fit the stick tail from `start_s` to the end; None where it is too short or does not begin."""
+    """Fit the stick tail from `start_s` to the end.
+
+    None where it is too short or does not begin, or is no damped oscillation.
+    """
     if start_s is None:
         return None
     tail = table.between(start_s, np.inf)
     length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
-    return oscillation.fit_damped_cosine(tail, period_s) if length_s >= TAIL_PERIODS_MIN * period_s else None
+    if length_s < TAIL_PERIODS_MIN * period_s:
+        return None
+    try:
+        return oscillation.fit_damped_cosine(tail, period_s)
+    except RecordError:
+        return None
 
 
 def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:

@@ -220,13 +220,17 @@ def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
 
 
 def _release_time(rising: Channel, level: float) -> float:
-    """Time at which the square root of the travel, a line at first, passes zero."""
+    """Time at which the square root of the travel, a line at first, passes zero.
+
+    The first of the `rising` readings where steps of a coarse converter hide that line.
+    """
     travel = np.abs(rising.value_m - level)
     used = (travel > 0.04 * travel.max()) & (travel < 0.3 * travel.max())
     if used.sum() < 3:
         return float(rising.time_s[0])
     slope, offset = np.polyfit(rising.time_s[used] - rising.time_s[0], np.sqrt(travel[used]), 1)
-    return float(rising.time_s[0] - offset / slope)
+    since_s = -offset / slope if slope > 0.0 else np.inf
+    return float(rising.time_s[0] + (since_s if abs(since_s) < _RISE_S else 0.0))
 
 
 def _turning_points(slopes: Floats, fast: int, dead: float) -> NDArray[np.int64]:
@@ -392,6 +396,8 @@ def check_friction(friction_dynamic: float) -> None:
 
 
 _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)
+_PERIOD_FACTOR = 2.0  # between the fitted period and the one started from, which is known to a tenth
+_GROWTH_EXPONENT_MAX = 50.0  # of a swing that grows; some hundred overflow, and no free swing grows by ten
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -464,7 +470,7 @@ def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
     """Fit a damped cosine with offset by least squares, over two periods first and then over twice as many.
 
     `period_s` is the period to start from, within a tenth. Raises RecordError when the channel is shorter
-    than a period or holds fewer than ten readings.
+    than a period, holds fewer than ten readings, or no damped cosine of about that period fits it.
     """
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:
@@ -479,12 +485,23 @@ def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
         if stretch_s > length_s:
             break
         stretch_s *= 2.0
+    if not 1.0 / _PERIOD_FACTOR < parameters[_FREQUENCY] * period_s / (2.0 * np.pi) < _PERIOD_FACTOR:
+        raise no_decay_error(length_s)
     return _finished(channel, parameters)
 
 
 def refit_damped_cosine(channel: Channel, before: DampedCosine) -> DampedCosine:
     """Fit a channel that begins where an earlier fit began and has grown since."""
     return _finished(channel, _refine(channel, before.parameters[:2]))
+
+
+def no_decay_error(length_s: float) -> RecordError:
+    """Error for readings over `length_s` that are no damped oscillation."""
+    return RecordError(
+        "{length_s} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay"
+        " of some periods.",
+        length_s=format_number(length_s),
+    )
 
 
 def envelope_curvature(channel: Channel, decay: DampedCosine) -> float:
@@ -529,9 +546,17 @@ def _refine(channel: Channel, shape: Floats) -> Floats:
         step = np.linalg.lstsq(columns @ columns.T, columns @ residual, rcond=1e-14)[0]
         step[:2] = np.clip(step[:2], -0.05 * parameters[1], 0.05 * parameters[1])
         parameters = parameters + step
+        if not _is_swing(parameters, float(tau[-1])):
+            raise no_decay_error(float(tau[-1]))
         if abs(before - cost) <= 1e-10 * cost:
             break
     return np.asarray(parameters)
+
+
+def _is_swing(parameters: Floats, length_s: float) -> bool:
+    """Whether a fit still is an oscillation that may decay; one that is not has no sums of squares."""
+    n, w = parameters[:2]
+    return bool(abs(n) < w and -n * length_s < _GROWTH_EXPONENT_MAX)
 
 
 def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
@@ -542,9 +567,5 @@ def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
     try:
         covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
     except np.linalg.LinAlgError:
-        raise RecordError(
-            "{length_s} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay"
-            " of some periods.",
-            length_s=format_number(tau[-1]),
-        ) from None
+        raise no_decay_error(float(tau[-1])) from None
     return DampedCosine(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

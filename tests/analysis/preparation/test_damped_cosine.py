@@ -79,3 +79,12 @@ def test_dry_friction_in_the_stand_bends_the_envelope():
 
     assert envelope_curvature(coulomb, fit_damped_cosine(coulomb, 0.32)) < -8.0
     assert abs(envelope_curvature(viscous, fit_damped_cosine(viscous, 0.32))) < 4.0
+
+
+@pytest.mark.parametrize("seed", [1, 19, 28, 36])
+def test_noise_over_many_periods_is_refused_and_no_crash(seed):
+    """Fitted to noise, a swing may grow until it overflows."""
+    time_s = np.arange(0.0, 60.0, 0.005)
+    at_rest = Channel(time_s, 1e-3 * np.random.default_rng(seed).standard_normal(len(time_s)))
+    with pytest.raises(RecordError, match="no damped cosine fits"):
+        fit_damped_cosine(at_rest, 0.04)

@@ -1,0 +1,35 @@
+"""Two oscillators that do not touch, as ranging sensors see them: no friction may be believed."""
+
+import numpy as np
+import pytest
+from coupled_oscillators import coupled_oscillators
+from synthetic import Truth, simulate_record
+
+from analysis.identify import identify
+from analysis.record import RecordError
+
+
+@pytest.mark.parametrize(
+    ("period_s", "frequency_ratio", "mass_ratio", "damping_ratio"),
+    [(0.5, 0.7, 0.4, 0.02), (0.6, 0.8, 0.2, 0.05), (1.0, 0.9, 0.1, 0.05)],
+)
+def test_a_tuned_mass_damper_read_in_steps_is_no_crash(period_s, frequency_ratio, mass_ratio, damping_ratio):
+    """Steps of 1 mm hide when the table began, and the release was sought 10^14 s away."""
+    damper = coupled_oscillators(period_s, frequency_ratio, mass_ratio, (0.005, damping_ratio), step_m=1e-3)
+    refusal, adequate = "", False
+    try:
+        found = identify(damper)
+        adequate = found.model is not None and found.model.adequate
+    except RecordError as error:
+        refusal = str(error)
+    assert not adequate
+    assert "\n" not in refusal
+
+
+def test_least_squares_without_a_solution_are_one_line(monkeypatch):
+    def fail(*_):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    monkeypatch.setattr("analysis.identify.build_problem", fail)
+    with pytest.raises(RecordError, match=r"no law of motion .* \(Eigenvalues did not converge\)"):
+        identify(simulate_record(Truth(rate_hz=200.0)))
