@@ -40,6 +40,7 @@ from analysis.results.diagnosis import diagnose
 from analysis.results.joint_fit import DecayConstants, JointFit
 from analysis.results.mass_check import mass_warnings
 from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
+from analysis.results.plausibility import check_period
 from analysis.results.verdict import judge
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import UncertaintyBudget, unstated_gains
@@ -151,6 +152,7 @@ def _identify(
 
     budget = UncertaintyBudget()
     joint_fit.add_constants(constants, budget)
+    check_period(budget.results["period_s"])
     labels = fitted_quantities.add_fitted_quantities(joint, budget, slip_ended=slip_ended)
     fitted_quantities.add_static_friction_bounds(joint, budget)
     if plate is not None:

@@ -44,4 +44,6 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 """Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
+TILT_MAX_RAD = 0.02
+"""A plane is levelled to 2 mrad (`analysis.uncertainty`); a tenfold tilt is seen by eye."""
 TRAVEL_MAX_M = 0.5  # no stand for dry friction on a table moves so far: readings that do are in another unit

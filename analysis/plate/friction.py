@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
+from analysis.laws.parameters import TILT_MAX_RAD
 from analysis.plate.slips import Sliding, Slip, find_slips
 from analysis.plate.spline import (
     GAIN,
@@ -32,7 +33,6 @@ _MISFIT_SIGMAS = 5.0  # by which chi-square may be too large before edges grow
 _READINGS_MIN = 50
 _SLIPS_MIN = 3  # scatter between fewer slips is not known
 _FRICTION_UNCERTAINTY_MAX = 0.5  # of a slip, as a share of the median: others tell nothing
-_TILT_PRIOR_RAD = 0.02  # a plate that leans more slides off
 _LAG_STEPS = 4
 _LAG_SIGMAS = 2.0
 _SMALL_LAG_S = 4e-3
@@ -220,7 +220,7 @@ def _pool(
     for share in _SCATTERS:
         scatter = max(share, 1e-5) * typical
         prior = np.zeros(len(normal))
-        prior[1], prior[2 : 2 + k] = _TILT_PRIOR_RAD**-2, scatter**-2
+        prior[1], prior[2 : 2 + k] = TILT_MAX_RAD**-2, scatter**-2
         prior[2 + k + LAG] = _NO_LAG_S**-2 if without_lag else 0.0
         precision = normal + np.diag(prior)
         covariance = _inverse(precision)

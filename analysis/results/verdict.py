@@ -14,6 +14,7 @@ from analysis.laws.parameters import Parameter
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, result_warning
 from analysis.results.joint_fit import JointFit
+from analysis.results.plausibility import remove_friction_of_tilted_plane, remove_undetermined
 from analysis.uncertainty import UncertaintyBudget
 from messages.i18n import N_
 
@@ -39,12 +40,22 @@ def judge(
 ) -> tuple[JointFit, list[ResultWarning]]:
     """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for.
 
-    `ideal` is the likeliest fit on an ideal stand. A law that was asked for keeps its f_d.
+    `ideal` is the likeliest fit on an ideal stand. A law that was asked for keeps its f_d. Results that
+    cannot be leave the budget.
     """
+    warnings = list(remove_friction_of_tilted_plane(budget))
+    joint, found = _compare_estimates(joint, plate, budget, ideal, law_is_given=law_is_given)
+    warnings += [*found, *remove_undetermined(budget)]
+    return joint if _NAME in budget.results else _with_degree(joint, Degree.NONE), warnings
+
+
+def _compare_estimates(
+    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget, ideal: Fit, *, law_is_given: bool
+) -> tuple[JointFit, list[ResultWarning]]:
     selection, results = joint.selection, budget.results
     own = results.get(_NAME)
     if own is None:
-        return _with_degree(joint, Degree.NONE), []
+        return joint, []
     difference = math.inf if plate is None else abs(plate.friction_dynamic - own.value)
     if selection.adequate:
         if selection.degree is Degree.IDEAL:

@@ -5,6 +5,7 @@ import pytest
 from coupled_oscillators import coupled_oscillators
 from synthetic import Truth, simulate_record
 
+from analysis.identification import Degree
 from analysis.identify import identify
 from analysis.record import RecordError
 
@@ -33,3 +34,26 @@ def test_least_squares_without_a_solution_are_one_line(monkeypatch):
     monkeypatch.setattr("analysis.identify.build_problem", fail)
     with pytest.raises(RecordError, match=r"no law of motion .* \(Eigenvalues did not converge\)"):
         identify(simulate_record(Truth(rate_hz=200.0)))
+
+
+@pytest.mark.parametrize(
+    ("period_s", "frequency_ratio", "mass_ratio", "damping_ratio"),
+    [(0.84, 0.91, 0.5, 0.018), (0.46, 0.9, 0.5, 0.002)],
+)
+def test_no_friction_is_believed_between_two_carts(period_s, frequency_ratio, mass_ratio, damping_ratio):
+    """Without contact the fit took f_d 0.7 with a tilt of 0.5 rad, or an f_d of 0.7 that may be 0."""
+    carts = coupled_oscillators(
+        period_s,
+        frequency_ratio,
+        mass_ratio,
+        (damping_ratio, damping_ratio),
+        between="walls",
+        rate_hz=30.0,
+        hold_s=2.0,
+        pullback_m=0.05,
+        noise_m=1e-4,
+    )
+    found = identify(carts)
+    assert not {"friction_dynamic", "friction_static", "friction_dynamic_plate"} & found.results.keys()
+    assert "implausible-result" in [warning.code for warning in found.warnings]
+    assert found.model.degree is Degree.NONE
