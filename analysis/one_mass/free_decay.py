@@ -132,6 +132,7 @@ _BEFORE_CROSSING = 0.2  # of a period before it first passes the middle the mass
 _SIGNAL_MIN = 20.0  # least ratio of mean squares, oscillation over residual: noise reaches about 5
 _EXPLAINED_MIN = 0.75
 _PROMISING = 0.5  # share of the motion that a linear fit explains of a decay that parts may explain
+_LOSS_SHOWN_MAX = 1.0  # of the amplitude: a swing that doubles, or may, is no decay of some per cent
 _LOSS_MIN = 3e-3  # of the amplitude, lost over the record: with less, damping is not determined
 _AMPLITUDE = (1, 3, 4)  # places of swing, damping and friction; the frequency is known far better
 _SIGMAS = 3.0
@@ -310,6 +311,11 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> 
             explained=100.0 * explained,
         )
     loss, uncertainty = _loss(found)
+    if not (-loss < _LOSS_SHOWN_MAX and uncertainty < _LOSS_SHOWN_MAX):
+        raise RecordError(
+            "no free decay: the swing grows, or nothing tells whether it dies away. Take a record after the"
+            " release, with the drive off."
+        )
     if not loss > max(_SIGMAS * uncertainty, _LOSS_MIN):
         raise RecordError(
             "no free decay: the swing changes by {change:+.2f} ± {uncertainty:.2f} % over the"

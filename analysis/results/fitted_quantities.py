@@ -497,12 +497,16 @@ def _fitted_slip_end(joint: JointFit, largest: float) -> SlipEnd | None:
 
 
 def build_events(joint: JointFit, slip_end: SlipEnd | None) -> Events:
-    """Events in the record's time."""
+    """Events in the record's time; no end of a slip that was not fitted, or may as well be the release."""
     decay, chosen = joint.decay, joint.chosen
     to_record, scale = decay.channels.to_record_time, decay.channels.clock_scale
     index = int(np.flatnonzero(chosen.free == Parameter.RELEASE)[0])
     release_uncertainty_s = float(np.sqrt(covariance(chosen.normal_matrix)[0][index, index]))
     rest = find_rest(decay)
+    if slip_end is not None:
+        lasts_s = slip_end.time_s - chosen.value(Parameter.RELEASE)
+        if not chosen.determines(Parameter.FRICTION_DYNAMIC) or slip_end.uncertainty_s >= lasts_s:
+            slip_end = None
     return Events(
         release_s=to_record(chosen.value(Parameter.RELEASE)),
         slip_end_s=None if slip_end is None else to_record(slip_end.time_s),

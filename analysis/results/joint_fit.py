@@ -108,7 +108,7 @@ def identifiability_warnings(
             "friction-not-identified",
             "f_d does not change the fitted motion, so that it has no value: no slip was fitted.",
         )
-    if BudgetSource.LEVELLING in uncertainty.shifts:
+    elif BudgetSource.LEVELLING in uncertainty.shifts:
         yield result_warning(
             "tilt-not-identified",
             "the plate slips one way only: tilt and f_d act alike. f_d holds for a plane level to 2"

@@ -15,6 +15,8 @@ _LARGEST: Final = ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
 _SHOWN: Final = 0.01
 """Sources of a smaller share of the largest one are left to the JSON."""
 
+_LISTED: Final = 8  # values of f_d that fill a line
+
 
 def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
     """Write one analysis, of readings in the unit `reading`, to stdout."""
@@ -115,7 +117,10 @@ def _classical_rows(classical: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if parts:
         yield "classical", ", ".join(parts)
     if allowed := classical.get("friction_of_residual"):
-        yield "u_s allows", f"f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}"
+        values = f"f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}"
+        if len(allowed) > _LISTED:
+            values = f"{len(allowed)} values of f_d from {min(allowed):.4f} to {max(allowed):.4f}"
+        yield "u_s allows", values
 
 
 def _monte_carlo_rows(drawn: dict[str, Any]) -> Iterator[tuple[str, str]]:

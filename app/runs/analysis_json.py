@@ -240,9 +240,8 @@ def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
         if abs(away) > _OFF * (own**2 + fitted.standard_uncertainty**2) ** 0.5:
             bends = any(caution.code == "tail-not-exponential" for caution in result.warnings)
             cause = "dry friction in the stand" if bends else "noise or an offset"
-            notes.append(
-                f"the plain log decrement is {away / fitted.value:+.1%} off the fitted one: {cause} biases it"
-            )
+            share = f" {away / fitted.value:+.1%}" if abs(fitted.value) > fitted.standard_uncertainty else ""
+            notes.append(f"the plain log decrement is{share} off the fitted one: {cause} biases it")
     count = len(checks.friction_candidates)
     if count > 1:
         notes.append(f"the residual displacement alone allows {count} values of f_d, so it cannot choose one")

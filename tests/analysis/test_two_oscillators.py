@@ -57,3 +57,15 @@ def test_no_friction_is_believed_between_two_carts(period_s, frequency_ratio, ma
     assert not {"friction_dynamic", "friction_static", "friction_dynamic_plate"} & found.results.keys()
     assert "implausible-result" in [warning.code for warning in found.warnings]
     assert found.model.degree is Degree.NONE
+
+
+def test_no_slip_that_was_not_fitted_ends():
+    """Gauge 2 moves until its swing dies, which was told as an end of slip beside "no slip was fitted"."""
+    carts = coupled_oscillators(
+        0.46, 0.7, 1.0, (0.011, 0.011), between="walls", hold_s=2.0, pullback_m=0.05, noise_m=5e-4
+    )
+    found = identify(carts)
+    codes = [warning.code for warning in found.warnings]
+    assert "friction-not-identified" in codes
+    assert "tilt-not-identified" not in codes
+    assert found.events.slip_end_s is None

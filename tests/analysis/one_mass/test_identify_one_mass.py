@@ -309,6 +309,16 @@ def test_what_is_no_free_decay_is_refused_in_one_line(kind, quantity):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("growth_per_s", "noise_m"), [(0.1, 1e-5), (0.01, 1e-3)])
+def test_a_swing_that_grows_many_times_is_not_told_in_percent(growth_per_s, noise_m):
+    time_s = np.arange(0.0, 20.0, 0.01)
+    growing = 1e-3 * np.exp(growth_per_s * time_s) * np.cos(9.0 * time_s)
+    readings_m = growing + noise_m * np.random.default_rng(1).standard_normal(len(time_s))
+    with pytest.raises(RecordError, match="no free decay: the swing grows") as refused:
+        identify_one_mass(single_channel(time_s, readings_m))
+    assert "%" not in str(refused.value)
+
+
 def damped(period_s, damping, size=1.0, phase=0.4):
     return size * np.exp(-damping * TIME_S) * np.cos(2 * math.pi * TIME_S / period_s + phase)
 

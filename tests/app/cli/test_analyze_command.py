@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from cli_kit import assert_one_error_line
 
+from app.cli.analysis_text import print_analysis
 from app.cli.measurement_options import MotionOptions, SimulateOptions
 from app.cli.simulate import simulate
 from app.runs.reader import open_run
@@ -64,6 +65,16 @@ def test_json_holds_friction_slip_by_slip(slipstand: Any, simulated_run: Path) -
     assert len(slips) > 5
     assert all(slip["friction"] == pytest.approx(mean, rel=0.02) for slip in slips)
     assert set(document["plate"]["variation"]) == {"sliding velocity", "position", "slid path"}
+
+
+def test_many_values_of_friction_are_counted(
+    slipstand: Any, simulated_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A residual displacement of nothing allows 541 of them."""
+    (document,) = slipstand("analyze", simulated_run, "--json").json
+    document["classical"]["friction_of_residual"] = np.linspace(0.03, 0.3, 541).tolist()
+    print_analysis(document)
+    assert "u_s allows    541 values of f_d from 0.0300 to 0.3000" in capsys.readouterr().out
 
 
 def test_a_run_that_fails_does_not_stop_the_rest(slipstand: Any, simulated_run: Path, tmp_path: Path) -> None:
