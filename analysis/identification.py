@@ -1,8 +1,9 @@
 """Result of an identification: numbers with uncertainties, the chosen law and its verdict, and warnings."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Self
 
 import numpy as np
 
@@ -51,6 +52,14 @@ class ModelSelection:
     @property
     def full_name(self) -> str:
         return " + ".join((self.name, *self.parts))
+
+    def with_friction(self, friction_dynamic: float) -> Self:
+        """The same with f_d of the chosen model: with effects on friction it is a mean, and no parameter."""
+        tried = tuple(
+            replace(model, friction_dynamic=friction_dynamic) if model.full_name == self.full_name else model
+            for model in self.tried
+        )
+        return replace(self, tried=tried)
 
 
 def residual_share(residual_rms: float, readings: Floats) -> float:

@@ -159,6 +159,7 @@ def _identify(
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     own = budget.results.get("friction_dynamic")
     fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
+    joint = replace(joint, selection=joint.selection.with_friction(fitted_friction))
     joint, verdict_warnings = judge(
         joint, plate, budget, min(fits, key=lambda fit: fit.bic), law_is_given=model != "auto"
     )

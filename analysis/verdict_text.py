@@ -41,6 +41,14 @@ def effect_title(name: str) -> Message:
     return Message(EFFECT_TITLES.get(name, name))
 
 
+def model_title(name: str, effects: tuple[str, ...]) -> Message:
+    """A friction law and the effects of the stand beside it."""
+    if not effects:
+        return Message(name)
+    titles = joined([effect_title(effect) for effect in effects], ", ")
+    return message("{law} with {effects}", law=name, effects=titles)
+
+
 def describe_verdict(model: ModelSelection, kind: str = "two-mass") -> Message:
     """What a model explains of a record, and whether f_d holds."""
     if model.adequate and not model.parts:

@@ -76,8 +76,10 @@ class PlateFriction:
     """(k,) float64: friction of each slip, with `tilt_rad` taken off, and its standard uncertainty by noise,
     given lag, gain and tilt."""
     friction_standard_uncertainty: Floats
-    position_m: Floats  # (k,) float64: middle of each slip on the table
-    speed_m_per_s: Floats  # (k,) float64: mean of each slip
+    position_m: Floats
+    """(k,) float64: where on the table, and how fast, the friction of each slip is that of the trend: means
+    with the weight that a parabola gives to friction, largest in the middle."""
+    speed_m_per_s: Floats
     path_m: Floats  # (k,) float64: slid in each slip
     scatter: float  # standard deviation of friction between slips beyond noise
     variation: dict[str, Variation]
@@ -302,13 +304,25 @@ def _summarise(
         time_s=decay.channels.to_record_time(ends.mean(axis=1)),
         friction=best.sign * (friction + chosen.tilt),
         friction_standard_uncertainty=np.sqrt(np.diag(covariance)),
-        position_m=at.mean(axis=1),
-        speed_m_per_s=path_m / np.diff(ends, axis=1)[:, 0],
+        position_m=_means(slips, relative.time_s, relative.value_m),
+        speed_m_per_s=_means(slips, relative.time_s, np.abs(sliding.speed_m_per_s)),
         path_m=path_m,
         scatter=chosen.scatter,
         variation=variation,
         misfit=best.misfit,
     )
+
+
+def _means(slips: list[Slip], time_s: Floats, value: Floats) -> Floats:
+    """Mean of a covariate (n,) over each slip (k,), as its friction is the mean of friction in time.
+
+    Least squares of a parabola take u2'' with the weight (1 - x^2)^2, x from -1 to 1 over the slip.
+    """
+    means = []
+    for slip in slips:
+        x = (2.0 * time_s[slip.readings] - slip.begin_s - slip.end_s) / (slip.end_s - slip.begin_s)
+        means.append(float(np.average(value[slip.readings], weights=(1.0 - x * x) ** 2)))
+    return np.array(means)
 
 
 def _varying_instead_of_lag(fitted: _Fitted, path_m: Floats, chosen: _Pooled) -> dict[int, _Pooled]:

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from analysis.verdict_text import model_title
 from app.presenters import results
 from app.presenters.analysed_run import AUTO_MODEL, AnalysedRun, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
@@ -249,8 +250,9 @@ def _model_of(run: AnalysedRun) -> str:
 
 
 def _model_note(shown: _Shown) -> Chip:
-    likeliest = _model_of(shown.first_analysis)
-    if shown.run is shown.first_analysis or not likeliest:
+    best, model = shown.first_analysis.model, shown.run.model
+    if shown.run is shown.first_analysis or best is None or model is None:
         return EMPTY_CHIP
-    words = gettext("Shown: {law}. The likeliest law is {best}.", law=_model_of(shown.run), best=likeliest)
+    law, likeliest = (translate(model_title(each.name, each.parts)) for each in (model, best))
+    words = gettext("Shown: {law}. The likeliest law is {best}.", law=law, best=likeliest)
     return Chip(words, Tone.WARN)

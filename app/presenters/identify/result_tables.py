@@ -10,6 +10,7 @@ from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import uncertainty_decimals, with_unit
 from analysis.identification import Degree, FittedModel, ModelSelection
 from analysis.quantities import BudgetLine, Quantity
+from analysis.verdict_text import effect_title
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -37,9 +38,11 @@ def model_rows(first: AnalysedRun, run: AnalysedRun) -> tuple[ModelRow, ...]:
     return tuple(
         ModelRow(
             name=tried.full_name,
+            law=tried.name,
             friction=number_text.format_fixed(tried.friction_dynamic, 5),
             ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
             status=_judged(tried, tried.bic - best, model),
+            effects=_effects(tried),
             is_shown=tried.full_name == shown.full_name,
         )
         for tried in sorted(all_tried, key=lambda tried: tried.bic)
@@ -113,6 +116,11 @@ def no_scan_reason(run: AnalysedRun) -> str:
             " Found are T, n<sub>1</sub> and what f<sub>s</sub> is at least."
         )
     return gettext("This law has no f<sub>d</sub> that could be varied alone.")
+
+
+def _effects(tried: FittedModel) -> str:
+    titles = [translate(effect_title(name)) for name in tried.parts]
+    return gettext("with {effects}", effects=", ".join(titles)) if titles else ""
 
 
 def _judged(tried: FittedModel, above_best: float, model: ModelSelection) -> Chip:

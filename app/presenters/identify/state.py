@@ -134,13 +134,15 @@ class BudgetRow:
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """One fitted friction law, as text."""
+    """One fitted model, as text: its friction law, and the effects of the stand in words."""
 
-    name: str
+    name: str  # by which it is chosen
+    law: str
     friction: str
     ratio: str
     """Residual rms over noise rms."""
     status: Chip
+    effects: str = ""
     is_shown: bool = False
 
 

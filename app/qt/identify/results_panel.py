@@ -1,6 +1,6 @@
 """The right column of Identify: f_d with verdict and warnings, laws, results, classical figures, budget."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
@@ -28,37 +28,48 @@ class ResultsPanel(QWidget):
         _add_headline(layout, state, result)
         if state.models:
             titles = ("", "f<sub>d</sub>", gettext("residual / noise"), "")
-            models = _grid([_heads(titles), *map(self._model_cells, state.models)], 0, right=(1, 2, 3))
+            rows = [cells for row in state.models for cells in self._model_cells(row)]
+            models = _grid([_heads(titles), *rows], (0, 3), right=(1, 2, 3))
             _add_section(layout, gettext("Friction laws"), models)
         quantities = [
-            (label(row.symbol), label(row.name, muted=True), label(row.value), label(row.uncertainty_text))
+            (
+                label(row.symbol),
+                label(row.name, muted=True, wrap=True),
+                label(row.value),
+                label(row.uncertainty_text),
+            )
             for row in state.rows
         ]
-        _add_section(layout, gettext("Results"), _grid(quantities, 1, right=(2,)))
+        _add_section(layout, gettext("Results"), _grid(quantities, (1,), right=(2,)))
         layout.addLayout(self._classical)
         self.show_classical(state.classical)
         if state.budget:
             title = gettext("Uncertainty of {quantity}", quantity=result.headline.symbol)
-            _add_section(layout, title, _grid(map(_budget_cells, state.budget), 1, right=(2,)))
+            _add_section(layout, title, _grid(map(_budget_cells, state.budget), (0, 1), right=(2,)))
         layout.addStretch(1)
         layout.addWidget(label(break_path(result.path), TextRole.LABEL, muted=True, wrap=True))
 
     def show_classical(self, rows: tuple[ClassicalRow, ...]) -> None:
         if rows and not self._classical.count():
             heads = _heads(("", "", gettext("classical"), gettext("fitted")))
-            grid = _grid([heads, *map(_classical_cells, rows)], 2, right=(2, 3))
+            grid = _grid([heads, *map(_classical_cells, rows)], (1, 2), right=(2, 3))
             _add_section(self._classical, gettext("Classical figures"), grid)
 
-    def _model_cells(self, row: ModelRow) -> Sequence[QWidget]:
-        button = QPushButton(row.name)
+    def _model_cells(self, row: ModelRow) -> Iterator[Sequence[QWidget]]:
+        button = QPushButton(row.law)
         button.setProperty("role", "row")
         button.setCheckable(True)
         button.setChecked(row.is_shown)
         button.setToolTip(gettext("Show the curves and results of this law"))
-        button.setAccessibleName(gettext("{law}: show its curves and results", law=row.name))
+        law = " ".join(filter(None, (row.law, row.effects)))
+        button.setAccessibleName(gettext("{law}: show its curves and results", law=law))
         button.clicked.connect(lambda: self._choose(button, row))
         role = TextRole.STRONG if row.is_shown else TextRole.TEXT
-        return button, label(row.friction, role), label(row.ratio, role), _chip(row.status, role, wrap=False)
+        yield button, label(row.friction, role), label(row.ratio, role), _chip(row.status, role)
+        if row.effects:
+            effects = label(row.effects, TextRole.LABEL, muted=True, wrap=True)
+            effects.setContentsMargins(7, 0, 0, 4)
+            yield (effects,)
 
     def _choose(self, button: QPushButton, row: ModelRow) -> None:
         button.setChecked(row.is_shown)  # the presenter decides which is shown
@@ -88,21 +99,26 @@ def _add_section(layout: QVBoxLayout, title: str, grid: QGridLayout) -> None:
     layout.addLayout(grid)
 
 
-def _grid(rows: Iterable[Sequence[QWidget]], stretched: int, *, right: Collection[int]) -> QGridLayout:
-    """Lay out cells; those of the columns `right` are aligned there."""
+def _grid(
+    rows: Iterable[Sequence[QWidget]], stretched: Collection[int], *, right: Collection[int]
+) -> QGridLayout:
+    """Lay out cells; those of the columns `right` are aligned there. A cell alone takes all columns."""
     grid = QGridLayout()
     grid.setHorizontalSpacing(8)
     grid.setVerticalSpacing(4)
-    grid.setColumnStretch(stretched, 1)
+    for column in stretched:
+        grid.setColumnStretch(column, 1)
     for row, cells in enumerate(rows):
         for column, cell in enumerate(cells):
-            if isinstance(cell, QLabel) and cell.wordWrap():  # aligned itself, it keeps all the width
-                cell.setAlignment(Qt.AlignmentFlag.AlignRight)
+            if len(cells) == 1:
+                grid.addWidget(cell, row, column, 1, -1)
+            elif column not in right:
                 grid.addWidget(cell, row, column)
-            elif column in right:
-                grid.addWidget(cell, row, column, Qt.AlignmentFlag.AlignRight)
+            elif isinstance(cell, QLabel) and cell.wordWrap():  # aligned itself, it keeps all the width
+                cell.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                grid.addWidget(cell, row, column)
             else:
-                grid.addWidget(cell, row, column)
+                grid.addWidget(cell, row, column, Qt.AlignmentFlag.AlignRight)
     return grid
 
 
@@ -113,7 +129,7 @@ def _heads(titles: Iterable[str]) -> Sequence[QWidget]:
 def _classical_cells(row: ClassicalRow) -> Sequence[QWidget]:
     classical = label(row.classical, wrap=len(row.classical) > 24)
     classical.setToolTip(row.hint)
-    return label(row.symbol), label(row.name, muted=True), classical, label(row.fitted)
+    return label(row.symbol), label(row.name, muted=True, wrap=True), classical, label(row.fitted)
 
 
 def _budget_cells(row: BudgetRow) -> Sequence[QWidget]:
@@ -122,10 +138,10 @@ def _budget_cells(row: BudgetRow) -> Sequence[QWidget]:
     bar.setRange(0, 1000)
     bar.setValue(round(1000 * row.share))
     bar.setAccessibleName(f"{row.source}: {row.value}")
-    return label(row.source), bar, label(row.value, muted=not row.share)
+    return label(row.source, wrap=True), bar, label(row.value, muted=not row.share)
 
 
-def _chip(chip: Chip, role: TextRole, *, wrap: bool = True) -> QLabel:
-    made = label(role=role, wrap=wrap)
+def _chip(chip: Chip, role: TextRole) -> QLabel:
+    made = label(role=role, wrap=True)
     show_chip(made, chip)
     return made

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QSizePolicy
@@ -17,6 +18,7 @@ from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
 
 _HEIGHT = 176
+_HIGHEST = 10.0  # residual that is drawn, over that of the fit: where it is larger, f_d is ruled out
 _STEP, _LONG_STEP = 1.0 / 400.0, 1.0 / 40.0
 """Shares of the range of the scan by which an arrow key moves the handle, and one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
@@ -79,7 +81,9 @@ class ScanPlot(QFrame):
         self._interval.setRegion(scan.interval_95)
         self._interval.show()
         self._fitted.setValue(scan.fitted)
-        self._stack.plots[0].fit_values(residual_um)
+        self._stack.plots[0].fit_values(
+            np.minimum(residual_um, _HIGHEST * 1e6 * scan.residual_at(scan.fitted))
+        )
         self._stack.set_time_range(float(scan.friction[0]), float(scan.friction[-1]))
         self._handle.setBounds((float(scan.friction[0]), float(scan.friction[-1])))
         self.show_manual_fit(None, "")

@@ -10,7 +10,7 @@ from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import Plot, PlotStack, pen, shade
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, set_subscripts
 
 _POINT = 5  # in pixels
 _BAND = 0.16  # opacity
@@ -34,7 +34,7 @@ class SlipPages(QWidget):
 
     def show_plots(self, shown: SlipPlots) -> None:
         self._shown = shown
-        self._statement.setText(shown.statement)
+        self._statement.setText(set_subscripts(shown.statement))
         for stack, plot in zip(self._stacks, shown.plots, strict=True):
             stack.set_title(0, plot.title)
             ends = plot.scale * plot.trend.grid()[[0, -1]]

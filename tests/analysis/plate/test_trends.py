@@ -47,6 +47,16 @@ def test_a_film_gives_its_slope_with_velocity_and_contradicts_the_paper() -> Non
     assert "f_d depends on velocity, against the paper" in str(velocity_statement(plate))
 
 
+def test_slips_lie_on_the_line_of_a_film() -> None:
+    """At mean speeds they once lay on a line a third steeper: a parabola weighs the fast middle of a slip."""
+    trend = trend_with_velocity(_plate(film_s_per_m=1.0))
+    away = trend.friction - trend.level - trend.slope * (trend.at - trend.centre)
+    is_clear = trend.half_width_95 < 1e-3
+    assert is_clear.sum() > 5
+    assert np.abs(away[is_clear]).max() < 1e-3
+    assert np.ptp(trend.friction[is_clear]) > 1e-2
+
+
 def test_friction_that_rises_along_the_track_is_not_taken_for_one_that_rises_with_velocity() -> None:
     """Velocity and position of slips are related: each slope alone stands for both."""
     plate = _plate(friction_gradient_per_m=3.0)

@@ -1,5 +1,6 @@
 """The Identify screen: record against simulation, or words for what is missing."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -11,11 +12,12 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker, analysed
 
-from analysis.identification import Events
+from analysis.catalogue import CATALOGUE
+from analysis.identification import Degree, Events, FittedModel, ModelSelection
 from analysis.plate.friction import estimate_plate_friction
 from analysis.plate.trends import FrictionBySlip, friction_by_slip
 from analysis.preparation.free_decay import prepare
-from analysis.quantities import BudgetLine, BudgetSource
+from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning
 from analysis.synthetic import Truth, simulate_record
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
@@ -25,6 +27,7 @@ from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack
 from app.qt.widgets.shortcuts import list_shortcuts
+from messages.message import message
 
 RUN = str(analysed().path)
 
@@ -130,7 +133,7 @@ def test_friction_by_slip_has_a_tab_with_what_it_says_of_the_paper(stage: Stage)
     assert not stage.screen._tabs.isTabEnabled(place)
     stage.presenter.on_analysed(analysed(friction_by_slip=by_slip()))
     stage.screen._tabs.setCurrentIndex(place)
-    assert "this run agrees with the paper that f_d does not depend on velocity" in stage.words()
+    assert "this run agrees with the paper that fd does not depend on velocity" in stage.words()
     page = stage.screen._plots.slips
     assert page.isVisible()
     titles = [stack.plots[0].title.text for stack in page._stacks]
@@ -283,6 +286,95 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
         show()
         QApplication.processEvents()
         assert clipped_words(stage.screen) == []
+
+
+MARKS = {Degree.FRICTION: "▲", Degree.NONE: "■"}
+EFFECTS = ("release-ramp", "second-mode", "stand-friction", "log-velocity")
+
+
+def of_stand(degree: Degree = Degree.STAND) -> AnalysedRun:
+    """A run of a stand with four effects, and all results that there are."""
+    adequate = degree is Degree.STAND
+    tried = (
+        FittedModel("stribeck+tilt", 5e6, 6.2e-4, 0.11),
+        FittedModel("coulomb+tilt", 10.0, 2.1e-5, 0.1003, EFFECTS),
+    )
+    warnings = (
+        ResultWarning("release-ramp", message("the release took 11.006 ± 0.012 ms: use a sharper hook.")),
+        ResultWarning("tilt-not-identified", message("the tilt is not identified.")),
+    )
+    model = ModelSelection("coulomb+tilt", adequate, 2.1e-5, 2e-5, tried, degree, EFFECTS, 0.0025)
+    results = {row.name: Quantity.normal(-12.34567, 0.00123, "1") for row in CATALOGUE}
+    shares = {source: 1e-3 / (1 + number) for number, source in enumerate(BudgetSource)}
+    budget = tuple(BudgetLine(source, "friction_dynamic", share) for source, share in shares.items())
+    return replace(with_scan(), model=model, results=results, warnings=warnings, budget=budget)
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize("degree", list(Degree), ids=lambda degree: degree.value)
+def test_no_word_of_a_stand_that_is_not_ideal_is_cut_off(
+    stage: Stage, degree: Degree, language: str, use_language: Callable[[str], None]
+) -> None:
+    """Names of models and quantities once made the results wider than their column."""
+    use_language(language)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(of_stand(degree))
+    found = ClassicalRow("f", "by the paper's method", "0.1000, 0.1288, 0.1300", "0.1000")
+    stage.screen._results.show_classical((found,))
+    for _ in range(3):  # the column first learns its height
+        QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
+
+
+def test_a_stand_is_told_in_words_beside_its_law(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(of_stand())
+    shown, other = stage.presenter.state.models
+    assert (shown.law, shown.is_shown, other.effects) == ("coulomb+tilt", True, "")
+    assert shown.effects.startswith("with a slow release, a second mode, ")
+    words = stage.words()
+    assert shown.effects in words
+    assert "Model fits, with effects of the stand" in words
+    assert "About the stand\n▲ The release took 11.006 ± 0.012 ms: use a sharper hook." in words
+    assert "release-ramp" not in words
+    qtbot.mouseClick(stage.button("stribeck+tilt"), Qt.MouseButton.LeftButton)
+    assert stage.worker.calls[-1].arguments[0].model == "stribeck+tilt"
+
+
+@pytest.mark.parametrize(
+    ("degree", "status", "verdict"),
+    [
+        (
+            Degree.FRICTION,
+            "Model does not fit, but f_d holds",
+            "(0.25 % of the swing is left), but f_d holds",
+        ),
+        (Degree.NONE, "Model does not fit", "(0.25 % of the swing is left): f_d cannot be told"),
+    ],
+)
+def test_a_model_that_fails_says_how_far(stage: Stage, degree: Degree, status: str, verdict: str) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(of_stand(degree))
+    words = stage.words().replace("fd", "f_d")
+    assert f"\n{MARKS[degree]} {status}\n" in words
+    assert verdict in words
+
+
+def test_an_ideal_stand_has_nothing_about_it(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
+    assert "Model fits" in stage.words()
+    assert "About the stand" not in stage.words()
+    assert "effects" not in stage.words()
+
+
+def test_the_scan_of_a_model_that_fails_stays_readable(stage: Stage) -> None:
+    """Its far ends once made the minimum a flat line."""
+    scan = Objective(np.array([0.01, 0.1, 0.2]), np.array([0.15, 2e-4, 0.09]), 0.1, (0.08, 0.12))
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed(objective=scan))
+    (plot,) = stage.screen._scan._stack.plots
+    assert plot.view.viewRange()[1][1] < 2500.0
 
 
 def test_a_click_on_a_law_asks_for_its_curves(stage: Stage, qtbot: QtBot) -> None:
