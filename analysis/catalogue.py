@@ -211,7 +211,7 @@ CATALOGUE: Final = (
          N_("mass of the second mode over the table's"), _PERCENT),
     _Row("second_mode_frequency_hz", Symbol("f", "3"), "Hz",
          N_("frequency of the second mode"), Unit("Hz")),
-    _Row("second_mode_damping", Symbol("ζ", "3", ascii="damping of second mode"), "1",
+    _Row("second_mode_damping", Symbol("ζ", "3", ascii="zeta3"), "1",
          N_("damping ratio of the second mode"), _NUMBER),
     _Row("film_s_per_m", Symbol("b", "f"), "s/m",
          N_("relative rise of friction with velocity"), Unit("s/m")),

@@ -96,12 +96,12 @@ def _print_model(document: dict[str, Any], scale: float, unit: str) -> None:
     if chosen is not None:
         out.print_line(f"  {describe_verdict(chosen, document['kind'])} ({sizes})")
     if len(model["tried"]) > 1:
-        tried = (
+        tried = [
             f"{' + '.join([law['name'], *law.get('parts', ())])} (BIC {law['bic']:.1f},"
             f" residual {law['residual_rms_m'] * scale:.3g} {unit})"
             for law in model["tried"]
-        )
-        _print_rows([("tried", ", ".join(tried))])
+        ]
+        _print_rows(zip(["tried", *[""] * (len(tried) - 1)], tried, strict=True))
 
 
 def _classical_rows(classical: dict[str, Any]) -> Iterator[tuple[str, str]]:

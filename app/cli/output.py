@@ -50,9 +50,9 @@ def print_status(text: str) -> None:
 
 
 def print_fields(rows: Iterable[tuple[str, object]], width: int) -> None:
-    """Write a line for each label and value to stdout; the values begin in column `width`."""
+    """Write a line for each label and value to stdout; the values begin in column `width`, or a blank on."""
     for label, value in rows:
-        print_line(f"{label:{width}}{value}")
+        print_line(f"{label:{width - 1}} {value}")
 
 
 def print_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:

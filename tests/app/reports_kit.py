@@ -27,10 +27,12 @@ def truth_of(series: str = "1FFM0", **changes) -> Truth:
     ).replace(**changes)
 
 
-def write_run(path: Path, series: str = "1FFM0", *, facts: dict | None = None, **changes) -> Path:
-    """Store the readings of a test of a series."""
+def write_run(
+    path: Path, series: str = "1FFM0", *, facts: dict | None = None, displacements=None, **changes
+) -> Path:
+    """Store the readings of a test of a series, of other `displacements` than the exact ones if given."""
     truth = truth_of(series, **changes)
-    _, table, relative = simulate_readings(truth)
+    _, table, relative = simulate_readings(truth, displacements)
     metadata = create_metadata(
         load_stand(),
         load_gauges(),

@@ -19,7 +19,7 @@ from analysis.formatting import format_interval, format_uncertainty, typeset, ty
 from analysis.identification import Degree, Identification
 from analysis.plate.trends import velocity_statement
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
-from analysis.verdict_text import EFFECT_TITLES, describe_verdict
+from analysis.verdict_text import EFFECT_TITLES, describe_verdict, model_title
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.style import print_style, reading_units
 from app.reports.test_report import blocks, shared
@@ -176,7 +176,8 @@ def _results(found: Identification) -> Iterator[blocks.Block]:
         laws: list[list[Cell]] = []
         for law in found.model.tried:
             friction, bic = f"{law.friction_dynamic:.6f}", typeset(f"{law.bic:.1f}")
-            laws.append([law.name, friction, bic, MICROMETRE.number(law.residual_rms_m, 2)])
+            title = str(model_title(law.name, law.parts))
+            laws.append([title, friction, bic, MICROMETRE.number(law.residual_rms_m, 2)])
         heads: list[Cell] = ["friction law", blocks.Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
         yield blocks.Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
 
