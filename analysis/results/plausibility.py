@@ -19,7 +19,6 @@ _FRICTION = (
     "friction_static_lower",
     _UPPER_BOUND,
 )
-_CODE = "implausible-result"
 _POSITIVE = (*_FRICTION, "pullback_m")
 """Zero is no value of these, or no finding."""
 
@@ -52,7 +51,7 @@ def remove_friction_of_tilted_plane(budget: UncertaintyBudget) -> Iterator[Resul
         " plane, or check what gauge 2 shows."
     )
     shown = _shown("tilt_rad", tilt)
-    yield result_warning(_CODE, template, tilt=shown, largest_mrad=1e3 * TILT_MAX_RAD)
+    yield result_warning("implausible-result", template, tilt=shown, largest_mrad=1e3 * TILT_MAX_RAD)
 
 
 def remove_undetermined(budget: UncertaintyBudget) -> Iterator[ResultWarning]:
@@ -65,7 +64,7 @@ def remove_undetermined(budget: UncertaintyBudget) -> Iterator[ResultWarning]:
     for name in names:
         budget.remove(name)
     template = N_("the record does not tell {quantities}: less certain than large, and left out.")
-    yield result_warning(_CODE, template, quantities=shown)
+    yield result_warning("implausible-result", template, quantities=shown)
 
 
 def _is_undetermined(name: str, quantity: Quantity) -> bool:
