@@ -5,6 +5,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from analysis.formatting import format_number
 from analysis.preparation import oscillation
 from analysis.preparation.channels import (
     NOISE_FLOOR_M,
@@ -23,6 +24,7 @@ from analysis.preparation.channels import (
     remove_invalid_readings,
     third_difference_noise,
 )
+from analysis.preparation.disturbance import find_moved_plate, find_stopped_table
 from analysis.preparation.oscillation import DampedCosine, Release
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError
@@ -137,6 +139,7 @@ _KEPT_MIN = 0.5  # gauge 2 is left out where a smaller share of its readings is 
 _LONG_S = 1.5  # a decay this long after a hold is preferred to any that begins in motion
 _EARLY_PERIODS = 2.0  # slip comes in the first swings
 _CHANCE = 5.0  # two mean squares of the same noise differ by this many standard deviations at most
+_SLIPPING_SHARE = 1.0 / 3.0  # of a motion without gauge 2, in which the plate may slip
 _NOISE_SHARE = 0.2
 """Last part of the record in which gauge 2 against the base is taken for at rest relative to the table."""
 
@@ -214,6 +217,7 @@ def prepare(record: Record) -> FreeDecay:
     channels = _valid_channels(record, warnings)
     release = _choose_release(oscillation.find_releases(channels.table), warnings)
     stretch, period_s = _oriented_stretch(channels, release, record.gauge_2_measures_plate, warnings)
+    stretch = _until_disturbance(stretch, period_s, warnings)
     if stretch.relative is None:
         slip, drift, table_drift = _slip_by_table_alone(stretch, period_s), 0.0, 0.0
     else:
@@ -336,6 +340,32 @@ def _oriented_stretch(
     relative = relative.scaled(turn)
     stretch = replace(stretch, relative=relative, gauge_2_absolute=absolute, relative_sign=sign * turn)
     return stretch, period_s
+
+
+def _until_disturbance(stretch: _Stretch, period_s: float, warnings: list[ResultWarning]) -> _Stretch:
+    """The stretch up to where a hand moves the plate or stops the table, with a warning if one does."""
+    release_s, table = stretch.release.time_s, stretch.table
+    still_s, moved_s = release_s + _SLIPPING_SHARE * (float(table.time_s[-1]) - release_s), None
+    if stretch.relative is not None:
+        slip = relative_to_table(table, stretch.relative, stretch.gauge_2_absolute)
+        noise = noise_with_floor(third_difference_noise(slip), stretch.channels.quantisation_m[1])
+        moved_s = find_moved_plate(slip, release_s, period_s, noise)
+        before = slip.between(-np.inf, np.inf if moved_s is None else moved_s)
+        slip_end_s = oscillation.find_last_slip(before, release_s, period_s, noise)
+        still_s = np.inf if slip_end_s is None else slip_end_s
+    noise = noise_with_floor(third_difference_noise(table), stretch.channels.quantisation_m[0])
+    stopped_s = find_stopped_table(table.between(still_s, np.inf), period_s, noise)
+    end_s = min((end_s for end_s in (moved_s, stopped_s) if end_s is not None), default=None)
+    if end_s is None:
+        return stretch
+    template = N_(
+        "the plate or the table was moved {after_s} s after the release: only readings before are used. Leave"
+        " the stand alone until the record has ended."
+    )
+    warnings.append(result_warning("moved-again", template, after_s=format_number(end_s - release_s)))
+    relative = None if stretch.relative is None else stretch.relative.between(-np.inf, end_s)
+    release = replace(stretch.release, end_s=end_s)
+    return replace(stretch, table=table.between(-np.inf, end_s), relative=relative, release=release)
 
 
 def _slip_by_gauge_2(

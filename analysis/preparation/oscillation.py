@@ -104,9 +104,26 @@ def white_noise(channel: Channel) -> float:
 def find_last_slip(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
     """Last time that gauge 2 moves, to a quarter period; None if it moves until the end.
 
+    The fitted motion shows later whether there was a slip too small to be seen.
+    """
+    quarters = quarter_steps(relative, release_s, period_s, noise_m)
+    if quarters is None:
+        return None
+    ends, moved = quarters
+    if not moved.any():
+        return release_s
+    last = int(np.flatnonzero(moved)[-1]) + 1
+    return None if last >= len(ends) - 2 else float(ends[last])
+
+
+def quarter_steps(
+    relative: Channel, release_s: float, period_s: float, noise_m: float
+) -> tuple[Floats, NDArray[np.bool_]] | None:
+    """Ends (n,) of quarter periods up to the last reading, and whether gauge 2 moved into each but the first.
+
     Means of quarter periods are compared with their neighbours, against the noise and a steady drift.
-    A slip smaller than about five standard deviations of such a mean is not seen: the fitted motion
-    shows later whether there was one.
+    A slip smaller than about five standard deviations of such a mean is not seen. None with under four of
+    them.
     """
     moving = relative.between(release_s, np.inf)
     edges = np.arange(relative.time_s[-1], release_s, -period_s / 4.0)[::-1]
@@ -120,11 +137,7 @@ def find_last_slip(relative: Channel, release_s: float, period_s: float, noise_m
     steps = np.diff(means)
     drift = float(np.median(steps[len(steps) // 2 :]))
     limit = _STEP_SIGMAS * noise_m * np.sqrt(1.0 / counts[1:] + 1.0 / counts[:-1]) + 1e-9
-    moved = np.flatnonzero(np.abs(steps - drift) > limit)
-    if len(moved) == 0:
-        return release_s
-    last = int(moved[-1]) + 1
-    return None if last >= len(ends) - 2 else float(ends[last])
+    return ends, np.abs(steps - drift) > limit
 
 
 def _why_none(smooth: Channel, noise_m: float) -> str:

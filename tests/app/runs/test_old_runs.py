@@ -98,3 +98,17 @@ def test_old_runs_are_listed_with_the_same_facts(folder, expected, capsys, monke
     now = {run["path"]: run for run in printed(capsys, monkeypatch, "runs", folder)}
     then = {run["path"]: run for run in expected["runs"]}
     assert_same(now, then, "runs")
+
+
+@pytest.mark.parametrize(
+    ("name", "friction"), [("gsv", 0.12), ("csv", 0.12), ("tilt", 0.12), ("slipstand-binary", 0.1)]
+)
+def test_old_runs_that_end_with_the_plate_put_back_give_the_friction_before(
+    folder, capsys, monkeypatch, name, friction
+):
+    """The stand was simulated with this f_d; its operator puts the plate back after 6 s, which was fitted too."""
+    (now,) = printed(capsys, monkeypatch, "analyze", folder / f"recorded-{name}.h5")
+    found = now["results"]["friction_dynamic"]
+    assert now["model"]["adequate"]
+    assert abs(found["value"] - friction) < 4.0 * found["standard_uncertainty"]
+    assert "moved-again" in [warning["code"] for warning in now["warnings"]]
