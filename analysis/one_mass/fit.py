@@ -237,7 +237,8 @@ def _fit(channel: Channel, start: Parameters, order: int, free: list[int]) -> On
         return np.asarray(np.nan_to_num(misfit, nan=_FAR, posinf=_FAR, neginf=-_FAR))
 
     def slopes(steps: Floats) -> Floats:
-        columns = gradient(unpack(steps), channel.time_s, order, free)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is replaced
+            columns = gradient(unpack(steps), channel.time_s, order, free)
         columns *= scale[free] / scale[OFFSET]
         return np.asarray(np.nan_to_num(columns, posinf=_FAR, neginf=-_FAR))
 

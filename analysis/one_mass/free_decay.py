@@ -1,11 +1,10 @@
-"""Finds and fits the free decay of one mass in readings, and tests whether the residuals are noise."""
+"""Finds and fits the free decay of one mass in readings."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import kolmogorov
 
 from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
@@ -25,6 +24,14 @@ from analysis.one_mass.fit import (
     within_bounds,
 )
 from analysis.one_mass.parts import add_parts, parts_of
+from analysis.one_mass.residuals import (
+    COMPUTED,
+    ResidualAssessment,
+    assess_residuals,
+    find_second_mode,
+    is_rounding,
+    rounding_step,
+)
 from analysis.one_mass.turning_points import Crossings, find_crossings
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import check_gap, median_of_three
@@ -33,99 +40,6 @@ from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient
 from messages.i18n import N_
 from messages.message import message
-
-_RARE = 1e-3  # chance at which noise alone is called a pattern, per test
-_BAND = 3.29  # standard deviations within which 99.9 % of a normal distribution lie
-_COMPUTED = 1e-9
-_ROUNDED_SHARE = 0.25  # rounding makes residuals of any colour once it makes this share of their variance
-_ROUNDED_LINE = 1.0 / 3.0  # lines up to this share of a rounding step may be harmonics of the rounding itself
-
-
-@dataclass(frozen=True, slots=True)
-class SpectralLine:
-    """A line that stands out of the spectrum of residuals."""
-
-    frequency_hz: float
-    amplitude: float  # as a steady sine, in the unit of the residuals
-
-
-@dataclass(frozen=True, slots=True)
-class ResidualAssessment:
-    """Assessment of residuals."""
-
-    adequate: bool  # they are noise, or the rounding of the converter
-    rms: float
-    noise: float  # root mean square of their part which neighbours do not share
-    line: SpectralLine | None
-
-
-def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:
-    """Judge residuals (n,) of readings every `interval_s`, rounded to `step` (0: not rounded).
-
-    Residuals under a billionth of the `swing` are those of computed readings, and good enough.
-
-    White noise must pass four tests, each of which it fails once in a thousand: mean square against the half
-    mean squared difference of neighbours (von Neumann), the cumulative periodogram (Bartlett), its largest
-    ordinate (Fisher), and the mean square of the first eighth against that of the rest. Where rounding makes
-    a good part of the residuals no colour is asked for, and only lines above a third of a step count.
-    """
-    rms = math.sqrt(float(np.mean(residual**2)))
-    noise = math.sqrt(0.5 * float(np.mean(np.diff(residual) ** 2)))
-    if rms < _COMPUTED * swing:
-        return ResidualAssessment(adequate=True, rms=rms, noise=noise, line=None)
-    power = _ordinates(residual)
-    line = _strongest_line(residual, power, interval_s)
-    if is_rounding(rms, step):
-        line = line if line is not None and line.amplitude > _ROUNDED_LINE * step else None
-        return ResidualAssessment(line is None, rms, noise, line)
-    small = rms**2 <= noise**2 * (1.0 + _BAND / math.sqrt(len(residual)))
-    adequate = small and line is None and _is_flat(power) and _is_even(residual)
-    return ResidualAssessment(adequate, rms, noise, line)
-
-
-def is_rounding(rms: float, step: float) -> bool:
-    """Tell whether rounding to `step` makes a good part of residuals of size `rms`."""
-    return step**2 / 12.0 >= _ROUNDED_SHARE * rms**2
-
-
-def rounding_step(value: Floats) -> float:
-    """Step to which readings are rounded; 0 where they lie on no lattice."""
-    levels = np.unique(value)
-    if not 2 <= len(levels) < 0.6 * len(value):
-        return 0.0
-    steps = np.diff(levels)
-    step = float(np.median(steps[steps > 0.5 * np.median(steps)]))
-    off = (steps / step) - np.round(steps / step)
-    return step if float(np.mean(np.abs(off) < 0.1)) > 0.95 else 0.0
-
-
-def _ordinates(residual: Floats) -> Floats:
-    """Periodogram without its ends, over its mean: for white noise independent and exponential."""
-    power = np.abs(np.fft.rfft(residual - residual.mean())[1 : (len(residual) + 1) // 2]) ** 2
-    return np.asarray(power / max(float(power.mean()), 1e-300))
-
-
-def _strongest_line(residual: Floats, power: Floats, interval_s: float) -> SpectralLine | None:
-    peak = int(np.argmax(power))
-    if power[peak] < math.log(len(power) / _RARE):
-        return None
-    total = 2.0 * float(np.var(residual)) * float(power[max(0, peak - 2) : peak + 3].sum() / power.sum())
-    return SpectralLine((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
-
-
-def _is_flat(power: Floats) -> bool:
-    share, even = np.cumsum(power) / power.sum(), np.arange(1, len(power) + 1) / len(power)
-    distance = float(np.abs(share - even).max())
-    return bool(kolmogorov(distance * math.sqrt(len(power))) > _RARE)
-
-
-def _is_even(residual: Floats) -> bool:
-    first, rest = np.split(residual**2, [len(residual) // 8])
-    if len(first) < 5:
-        return True
-    spread = math.sqrt(2.0 / len(first) + 2.0 / len(rest))
-    return bool(abs(math.log(float(first.mean() / max(rest.mean(), 1e-300)))) < _BAND * spread)
-
 
 PERIODS_MIN = 2.0
 _BEFORE_CROSSING = 0.2  # of a period before it first passes the middle the mass surely moves freely
@@ -174,9 +88,10 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
         return assess_residuals(one.residual, interval_s, step, float(np.ptp(one.channel.value_m)))
 
     found, noted = _refined(found, step, unit)
-    bounded = within_bounds(found)
+    dies_away = _loss(found)[0] > 0.0
+    bounded = within_bounds(found) if dies_away else found
     explained = 1.0 - found.cost / max(_scatter(found), 1e-300)
-    is_decay = _PROMISING < explained < 1.0 - _COMPUTED**2
+    is_decay = dies_away and _PROMISING < explained < 1.0 - COMPUTED**2
     richer = add_parts(found) if is_decay else found
     if richer is not found:
         whole = readings.between(float(found.channel.time_s[0]), math.inf)
@@ -191,16 +106,25 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     _refuse_what_is_no_decay(found, verdict)
     viscous = fit(bounded.channel, bounded.parameters, order, held=(COULOMB,))
     quiet = _quiet_after(readings, bounded, step, unit, warnings)
-    if verdict.line is not None:
-        text = message(
-            "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at"
-            " {period_s} Hz: a second mode, hum, or damping of another law.",
-            frequency_hz=format_number(verdict.line.frequency_hz),
-            amplitude=format_with_unit(verdict.line.amplitude, unit),
-            period_s=format_number(1.0 / bounded.parameters.period_s),
-        )
-        warnings.append(ResultWarning("second-mode", text))
+    if not verdict.adequate:
+        warnings += _second_mode(bounded, step, unit)
     return FreeDecayFit(bounded, viscous, verdict, verdict.adequate and quiet, unit, warnings)
+
+
+def _second_mode(found: OneMassFit, step: float, unit: str) -> list[ResultWarning]:
+    period_s = found.parameters.period_s
+    line = find_second_mode(found.channel.time_s, found.residual, period_s, step)
+    if line is None:
+        return []
+    text = message(
+        "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at {period_s} Hz"
+        " ({share:.2g} % of its swing): a second mode, or hum. Tighten what is mounted, ground the cables.",
+        frequency_hz=format_number(line.frequency_hz),
+        amplitude=format_with_unit(line.amplitude, unit),
+        period_s=format_number(1.0 / period_s),
+        share=200.0 * line.amplitude / float(np.ptp(found.channel.value_m)),
+    )
+    return [ResultWarning("second-mode", text)]
 
 
 def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:

@@ -42,8 +42,8 @@ def identify_one_mass(
     moves freely until shortly before its stop. Where x_k = F / c comes out negative, as where damping rises
     with the swing, x_k is held at 0 and n fitted again; likewise n. Uncertainties are those with both free,
     so the interval of n holds also where friction is too small to be seen; it is then not claimed
-    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times, gaps,
-    an initial hold, an offset, either sign and coarse steps are taken as they are.
+    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times,
+    gaps, an initial hold, an offset, either sign and coarse steps are taken as they are.
 
     `quantity` is what gauge 1 reads, `unit` that of the displacement and x_k in any case: "m", "rad", "V".
     With the moving `mass` (kg) come stiffness and damping coefficient. See `single_channel`.

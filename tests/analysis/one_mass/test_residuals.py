@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.one_mass.free_decay import assess_residuals, rounding_step
+from analysis.one_mass.residuals import assess_residuals, rounding_step
 
 
 def white(count, seed):

@@ -81,6 +81,8 @@ def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypat
     runs = [folder / analysis["run"] for analysis in two_gauges]
     now = printed(capsys, monkeypatch, "analyze", *runs)
     now += printed(capsys, monkeypatch, "analyze", folder / one_gauge["run"], "--kind", "one-mass")
+    # What dry friction of a plate leaves of the decay itself was called a second mode.
+    one_gauge["warnings"] = [one for one in one_gauge["warnings"] if one["code"] != "second-mode"]
     for one, other in zip(now, [*two_gauges, one_gauge], strict=True):
         one["budget"] = _of_old_results(one, other)
     assert_same(now, [*two_gauges, one_gauge], "analyze")
