@@ -221,6 +221,12 @@ class FitProblem:
             free -= _GAUGE_2_PARAMETERS
         return np.array(sorted(free, key=lambda place: (not _moves(place), place)), dtype=np.int64)
 
+    def prior_weights(self, places: Indices) -> Floats:
+        """Inverse variances (k,) of what is known beforehand of parameters; 0 for those without a prior."""
+        deviation = self.prior_deviation[places]
+        informed = (deviation > 0.0) & np.isfinite(deviation)
+        return np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
+
     def residuals(self, parameters: Floats, law: FrictionLaw) -> tuple[Floats, Floats]:
         """Reading minus curve of each channel (m); the second is empty without gauge 2."""
         table = self.table.value_m - predict_gauge_1(parameters, self.table.time_s, law)
@@ -289,10 +295,8 @@ class GaussNewton:
         self._directions = law.directions(
             np.array([place for place in free if _moves(place)], dtype=np.int64)
         )
-        deviation = problem.prior_deviation[free]
-        informed = (deviation > 0.0) & np.isfinite(deviation)
         self._mean = problem.prior_mean[free]
-        self._weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
+        self._weight = problem.prior_weights(free)
         self._prior_normal = np.diag(self._weight)
 
     def evaluate(self, point: Floats) -> QuadraticModel:

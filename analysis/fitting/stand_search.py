@@ -278,34 +278,40 @@ class StandSearch:
     def _linear_points(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
     ) -> tuple[dict[str, list[Floats]], dict[str, float]]:
-        """Minimum of a linear motion with each of the effects that lower the BIC, and fall of the BIC."""
+        """Minimum of a linear motion with each of the effects that lower the BIC, and fall of the BIC.
+
+        What is stated of lag and gain of gauge 2 holds for all effects but those that free them.
+        """
         point = trial.point.copy()
         fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
         point[fixed] = frequency_hz
         if _PLACES[StandParameter.MODE_FREQUENCY] in fixed:
             point[_PLACES[StandParameter.MODE_DAMPING]] = _MODE_DAMPING
         model = compose(self._law, (*trial.model.effects, *candidates))
-        opened = _open_shared(window, model)
-        free = opened.free_parameters(model)
+        free = window.free_parameters(model)
         free = free[~np.isin(free, [*fixed, *(_PLACES[place] for place in _SECOND_ORDER)])]
         base = set(window.free_parameters(trial.model).tolist())
-        quadratic = GaussNewton(opened, model, free).evaluate(point)
+        quadratic = GaussNewton(window, model, free).evaluate(point)
         self._effort += len(free) * self._periods(window)
-        own = np.array([place in base for place in free.tolist()])
-        inverse, _ = covariance(quadratic.normal[np.ix_(own, own)])
+        present = np.array([place in base for place in free.tolist()])
+        away, stated = window.prior_mean[free] - point[free], window.prior_weights(free)
         points: dict[str, list[Floats]] = {}
         promises: dict[str, float] = {}
         for effect in candidates:
             mine = np.isin(free, [*(_PLACES[place] for place in effect.own), *effect.shared])
+            own, freed = present & ~mine, stated[mine]
+            inverse, _ = covariance(quadratic.normal[np.ix_(own, own)])
             cross = quadratic.normal[np.ix_(mine, own)]
-            left = quadratic.normal[np.ix_(mine, mine)] - cross @ inverse @ cross.T
-            pull = quadratic.descent[mine] - cross @ inverse @ quadratic.descent[own]
+            left = quadratic.normal[np.ix_(mine, mine)] - np.diag(freed) - cross @ inverse @ cross.T
+            pull = quadratic.descent[mine] - freed * away[mine] - cross @ inverse @ quadratic.descent[own]
             amount = np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull
             points[effect.name] = []
-            promises[effect.name] = float(pull @ amount) - self._price(window, effect)
+            fall = float(pull @ amount) + float(freed @ away[mine] ** 2)
+            promises[effect.name] = fall - self._price(window, effect)
             if promises[effect.name] < _PROMISE_MIN:
                 continue
             extended = compose(self._law, (*trial.model.effects, effect))
+            opened = _open_shared(window, extended)
             for share in _STEP_SHARES:
                 moved = point.copy()
                 moved[free[mine]] += share * amount

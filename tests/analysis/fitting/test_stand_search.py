@@ -5,6 +5,7 @@ from synthetic import Truth, simulate_record
 
 from analysis.identification import Degree
 from analysis.identify import identify
+from analysis.record import GaugeUncertainty
 from benchmarks.real_stand import REL, RealStand, U
 
 KINDS = {
@@ -39,6 +40,29 @@ def test_the_effect_is_named_with_its_size_and_f_d_holds(changes, effect, name, 
     assert effect in [warning.code for warning in found.warnings]
     assert found.results[name].value == pytest.approx(size, rel=0.05)
     assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+@pytest.mark.parametrize("f_s", [None, 0.13], ids=["f_s as f_d", "f_s above f_d"])
+def test_a_lag_beyond_what_is_stated_of_the_gauges_is_found(f_s):
+    stated = GaugeUncertainty(gain_relative=3e-3, delay_s_uncertainty=2e-5)
+    truth = Truth(rate_hz=500.0, duration_s=6.0, friction_static=f_s, lag_s=1e-3)
+    found = identify(simulate_record(truth, table_gauge=stated, relative_gauge=stated))
+
+    assert found.model.adequate
+    assert "gauge-lag" in [warning.code for warning in found.warnings]
+    assert set(found.model.parts) <= {"gauge-lag", "static-friction"}
+    assert found.results["gauge_2_lag_s"].value == pytest.approx(1e-3, rel=0.05)
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, rel=2e-3)
+
+
+def test_a_ratio_of_gauges_beyond_their_stated_gains_is_found():
+    stated = GaugeUncertainty(gain_relative=1e-3, delay_s_uncertainty=2e-5)
+    truth = Truth(rate_hz=500.0, duration_s=6.0)
+    record = simulate_record(truth, table_gauge=stated, relative_gauge=stated)
+    found = identify(record.replace(relative_displacement_m=1.05 * record.relative_displacement_m))
+
+    assert "gauge-ratio" in [warning.code for warning in found.warnings]
+    assert found.results["relative_gain"].value == pytest.approx(0.05, rel=0.05)
 
 
 def test_an_ideal_stand_shows_no_effect():
