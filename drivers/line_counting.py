@@ -19,8 +19,8 @@ STATE = state_type("broken", "last_sequence last_time")
 RULES = record_type("place", "period_s unit_s clock_step_s time_wrap sequence_wrap max_gap overload_count")
 """What does not change during a stream: the unit of the time column, 0 without one; the step of the device's
 clock; where time and sequence wrap, in their units, 0 where they do not; the gap in samples."""
-LINE = record_type("start end good", "time sequence table relative")
-"""A line: where it is, whether it is good, and its values."""
+LINE = record_type("start end good overload", "time sequence table relative")
+"""A line: where it is, whether it is good, the overloads that it reports (`SampleStatus`), and its values."""
 
 _NEW_START = -1
 _CORRUPT = -2
@@ -134,7 +134,7 @@ def _fill_packet(stream: Record, rule: Record, line: Record, step: int, packet: 
     packet.damaged = min(gap, stream.broken)
     packet.missing = gap - packet.damaged
     packet.samples = 1
-    packet.status = 0
+    packet.status = line.overload
     if abs(line.table) >= rule.overload_count:
         packet.status |= _TABLE
     if abs(line.relative) >= rule.overload_count:

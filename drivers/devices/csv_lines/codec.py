@@ -6,25 +6,35 @@ from operator import xor
 
 import numpy as np
 
-from drivers.arrays import Counts, Floats, Records
+from drivers.arrays import Counts, Floats, Records, UInt8s
 from drivers.clock import rate_from_steps
 from drivers.crc import crc16
 from drivers.devices.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STATE, count_lines, make_rules
 from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder
+from drivers.samples import SampleStatus
 
+_BOTH_OVERLOADED = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
 MAX_LINE_BYTES = 1024  # a longer line is garbage
 _MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
 _LINES_EXAMINED = 200
 
 
-def encode_line(layout: LineFormat, time_s: float, table: float, relative: float, sequence: int = 0) -> bytes:
-    r"""One line, ended by `\r\n` as Arduino's `println` does.
+def encode_line(
+    layout: LineFormat,
+    time_s: float,
+    table: float,
+    relative: float,
+    sequence: int = 0,
+    *,
+    is_overloaded: bool = False,
+) -> bytes:
+    """One line with its end.
 
     `time_s` is the device's time; us and ms columns are whole numbers that wrap, as `sequence` does. Whole
     readings have no decimal point; a `value` column has that of `table`. `ignore` columns become 0, units
-    "kg" where none is given.
+    "kg" where none is given, words "S".
     """
     fields = []
     for column in layout.columns:
@@ -43,16 +53,32 @@ def encode_line(layout: LineFormat, time_s: float, table: float, relative: float
                 fields.append(f"{reduce(xor, layout.separator.join(fields).encode('ascii'), 0):02X}")
             case Column.CRC:
                 fields.append(f"{crc16(layout.separator.join(fields).encode('ascii')):04X}")
+            case Column.STATUS:
+                is_told = is_overloaded and layout.overload_status
+                fields.append(layout.overload_status[0] if is_told else layout.good_status)
             case _:
-                fields.append({Column.UNIT: layout.unit or "kg", Column.EMPTY: ""}.get(column, "0"))
-    return layout.separator.join(fields).encode("ascii") + b"\r\n"
+                texts = {Column.UNIT: layout.unit or "kg", Column.EMPTY: "", Column.WORD: "S"}
+                fields.append(texts.get(column, "0"))
+    return (layout.separator.join(fields) + layout.line_end).encode("ascii")
 
 
-def encode_lines(layout: LineFormat, times_s: Floats, counts: Counts, first_sequence: int = 0) -> list[bytes]:
-    """A line for each row of `counts` (n, 2), at device times `times_s` (n,); see `encode_line`."""
+def encode_lines(
+    layout: LineFormat,
+    times_s: Floats,
+    counts: Counts,
+    first_sequence: int = 0,
+    status: UInt8s | None = None,
+) -> list[bytes]:
+    """A line for each row of `counts` (n, 2), at device times `times_s` (n,); see `encode_line`.
+
+    `status` (n,) are flags of `SampleStatus`; None: no reading is overloaded.
+    """
+    shown = (SampleStatus.OVERLOAD_TABLE, _BOTH_OVERLOADED)[layout.channels - 1]
+    overloads = [False] * len(counts) if status is None else (status & shown != 0).tolist()
+    rows = zip(times_s.tolist(), counts.tolist(), overloads, strict=True)
     return [
-        encode_line(layout, time_s, table, relative, first_sequence + row)
-        for row, (time_s, (table, relative)) in enumerate(zip(times_s.tolist(), counts.tolist(), strict=True))
+        encode_line(layout, time_s, table, relative, first_sequence + row, is_overloaded=is_overloaded)
+        for row, (time_s, (table, relative), is_overloaded) in enumerate(rows)
     ]
 
 

@@ -19,7 +19,9 @@ class Column(StrEnum):
     SEQUENCE = "sequence"
     XOR = "xor"  # two hex digits: exclusive or of all characters before its separator
     CRC = "crc"  # four hex digits: CRC-16/CCITT-FALSE of all characters before its separator
-    UNIT = "unit"  # a word, such as kg
+    UNIT = "unit"  # a word, such as kg; blanks may part it from the number before it
+    STATUS = "status"  # a word or a mark that tells whether the reading is good
+    WORD = "word"  # characters that are not used, without a blank
     EMPTY = "empty"  # nothing, as after a separator at the end of a line
     IGNORE = "ignore"  # a number that is not used
 
@@ -29,7 +31,9 @@ CHECKSUMS = (Column.XOR, Column.CRC)
 _READINGS = (Column.TABLE, Column.RELATIVE, Column.VALUE)
 SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
 DECIMALS = {"point": ".", "comma": ","}
+LINE_ENDS = {"crlf": "\r\n", "lf": "\n", "cr": "\r"}
 _OF_NUMBERS = "0123456789+-."
+MAX_STATUS_BYTES = 8
 _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
 
@@ -49,6 +53,11 @@ class LineFormat:
     sequence_bits: int = 32
     unit: str = ""
     """The word in `unit` columns; "" for any word."""
+    overload_status: tuple[str, ...] = ()
+    """Words in the status column of an overload, whose value may lack."""
+    fault_status: tuple[str, ...] = ()  # words in the status column of a line without a reading
+    good_status: str = "ok"  # what a simulated device sends there with a good reading
+    line_end: str = "\r\n"  # what a simulated device sends; any of CR, LF and both is read
 
     def __post_init__(self) -> None:
         _check_columns(self.columns)
@@ -60,6 +69,7 @@ class LineFormat:
             raise SettingsError(template, comment=self.comment)
         if self.unit and not (self.unit.isascii() and self.unit.isalpha()):
             raise SettingsError("unit {unit!r} is no word: give letters, for example kg", unit=self.unit)
+        self._check_status()
         if self.decimal not in (".", ","):
             raise SettingsError("decimal {decimal!r} is not known: give . or ,", decimal=self.decimal)
         if self.decimal == self.separator:
@@ -69,6 +79,26 @@ class LineFormat:
             if bits != 0 and not _MIN_BITS <= bits <= _MAX_BITS:
                 template = N_("{name} {bits} is out of range: give {least} to {most}, or 0 for no wrap")
                 raise SettingsError(template, name=name, bits=bits, least=_MIN_BITS, most=_MAX_BITS)
+
+    def _check_status(self) -> None:
+        words = (*self.overload_status, *self.fault_status)
+        if words and Column.STATUS not in self.columns:
+            template = N_("overload_status and fault_status {words} need a status column: name it in columns")
+            raise SettingsError(template, words=words)
+        counters = (self.time_column, Column.SEQUENCE)
+        at = [number for number, column in enumerate(self.columns) if column in counters]
+        if self.overload_status and at and self.columns.index(Column.STATUS) < max(at):
+            template = N_(
+                "columns {columns}: a line of an overload may end after its status, name time before it"
+            )
+            raise SettingsError(template, columns=",".join(self.columns))
+        for word in (*words, self.good_status):
+            is_possible = word.isascii() and word.isprintable() and not {" ", self.separator} & set(word)
+            if not (is_possible and 0 < len(word) <= MAX_STATUS_BYTES):
+                template = N_(
+                    "status {word!r} cannot be: give 1 to {most} characters without blank or separator"
+                )
+                raise SettingsError(template, word=word, most=MAX_STATUS_BYTES)
 
     @property
     def channels(self) -> int:
@@ -102,5 +132,7 @@ def _check_columns(columns: tuple[Column, ...]) -> None:
     if sum(column in TIME_UNIT_S for column in columns) > 1 or columns.count(Column.SEQUENCE) > 1:
         template = N_("columns {columns} hold more than one time or sequence: name others ignore")
         raise SettingsError(template, columns=names)
+    if columns.count(Column.STATUS) > 1:
+        raise SettingsError("columns {columns} hold more than one status: name others word", columns=names)
     if any(column in CHECKSUMS for column in columns[:-1]):
         raise SettingsError("columns {columns}: a checksum (xor, crc) can only be the last", columns=names)

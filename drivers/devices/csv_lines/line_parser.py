@@ -6,22 +6,26 @@ from numpy.typing import NDArray
 from drivers.arrays import Ints, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_slice
-from drivers.devices.csv_lines.columns import Column, LineFormat
+from drivers.devices.csv_lines.columns import MAX_STATUS_BYTES, Column, LineFormat
 from drivers.line_counting import LINE
+from drivers.samples import SampleStatus
 
 ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
-ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)
+ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC, ROLE_STATUS, ROLE_WORD = range(5, 11)
 _ROLES = dict.fromkeys((Column.TIME_US, Column.TIME_MS, Column.TIME_S), ROLE_TIME)
 _ROLES |= {Column.TABLE: ROLE_TABLE, Column.RELATIVE: ROLE_RELATIVE, Column.VALUE: ROLE_TABLE}
 _ROLES |= {Column.SEQUENCE: ROLE_SEQUENCE, Column.IGNORE: ROLE_IGNORE, Column.UNIT: ROLE_UNIT}
 _ROLES |= {Column.EMPTY: ROLE_EMPTY, Column.XOR: ROLE_XOR, Column.CRC: ROLE_CRC}
+_ROLES |= {Column.STATUS: ROLE_STATUS, Column.WORD: ROLE_WORD}
 
-MARKS = record_type("separator decimal", "")
+MARKS = record_type("separator decimal overload", "")
+"""Characters, and the flags of an overload that the status column reports."""
+_GOOD, _OVERLOAD, _FAULT = range(3)
 
 _LF, _CR, _BLANK, _PLUS, _MINUS, _ZERO = b"\n\r +-0"
 _EXPONENT = 0x65  # "e", after setting the bit that makes a letter small
 _SMALL = 0x20
-_FIRST_LETTER, _LAST_LETTER = b"az"
+_FIRST_LETTER, _LAST_LETTER, _LAST_PRINTABLE = b"az~"
 _BROKEN = -1
 _MAX_MANTISSA = 10**17
 _MAX_EXPONENT_DIGITS = 3
@@ -45,7 +49,11 @@ class LineParser:
 
     def __init__(self, layout: LineFormat) -> None:
         self._roles = np.array([_ROLES[column] for column in layout.columns], dtype=np.int64)
-        self._marks = np.array([(ord(layout.separator), ord(layout.decimal))], dtype=MARKS)
+        overload = SampleStatus.OVERLOAD_TABLE
+        overload |= SampleStatus.OVERLOAD_RELATIVE if layout.channels > 1 else 0
+        marks = ord(layout.separator), ord(layout.decimal), int(overload)
+        self._marks = np.array([marks], dtype=MARKS)
+        self._words = _status_words(layout)
         self._lines = np.zeros(0, dtype=LINE)
         self._comment = np.frombuffer(layout.comment.encode("ascii"), dtype=np.uint8)
         self._unit = np.frombuffer(layout.unit.encode("ascii"), dtype=np.uint8)
@@ -56,13 +64,28 @@ class LineParser:
         if len(self._lines) < most:
             self._lines = np.zeros(most, dtype=LINE)  # what has no column stays 0
         buffer = np.frombuffer(data, dtype=np.uint8)
-        found = read_lines(buffer, self._roles, self._marks, self._comment, self._unit, self._lines)
+        texts = self._comment, self._unit, self._words
+        found = read_lines(buffer, self._roles, self._marks, *texts, self._lines)
         return self._lines[:found]
+
+
+def _status_words(layout: LineFormat) -> UInt8s:
+    """(n, 2 + longest) of the words in the status column: what it means, length, characters."""
+    kinds = {_OVERLOAD: layout.overload_status, _FAULT: layout.fault_status}
+    words = [(kind, word.encode("ascii")) for kind, given in kinds.items() for word in given]
+    rows = [bytes([kind, len(word)]) + word.ljust(MAX_STATUS_BYTES, b"\0") for kind, word in words]
+    return np.frombuffer(b"".join(rows), dtype=np.uint8).reshape(len(rows), 2 + MAX_STATUS_BYTES)
 
 
 @compiled
 def read_lines(
-    buffer: UInt8s, roles: Ints, marks: Records, comment: UInt8s, unit: UInt8s, lines: Records
+    buffer: UInt8s,
+    roles: Ints,
+    marks: Records,
+    comment: UInt8s,
+    unit: UInt8s,
+    words: UInt8s,
+    lines: Records,
 ) -> int:
     """Read all lines of `buffer`, whose last byte is a terminator; returns how many have content.
 
@@ -78,7 +101,7 @@ def read_lines(
         line = lines[found]
         line.start = at
         commented = _is_in(buffer[at], comment)
-        end = _BROKEN if commented else _read_line(buffer, at, roles, marks[0], unit, line)
+        end = _BROKEN if commented else _read_line(buffer, at, roles, marks[0], unit, words, line)
         line.good = end != _BROKEN
         if end == _BROKEN:
             end = at
@@ -100,7 +123,25 @@ def _is_in(character: int, characters: UInt8s) -> bool:
 
 
 @inlined
-def _read_line(buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt8s, line: Record) -> int:
+def _read_line(
+    buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt8s, words: UInt8s, line: Record
+) -> int:
+    """Position of the line's end; `_BROKEN` if it is damaged. One of an overload may end after its status."""
+    line.overload = 0
+    at = _read_columns(buffer, start, roles, mark, unit, words, line)
+    if at != _BROKEN or not line.overload or roles[-1] == ROLE_XOR or roles[-1] == ROLE_CRC:
+        return at
+    line.table = line.relative = 0.0
+    at = start
+    while buffer[at] != _LF and buffer[at] != _CR:
+        at += 1
+    return at
+
+
+@inlined
+def _read_columns(
+    buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt8s, words: UInt8s, line: Record
+) -> int:
     at = start
     for column in range(len(roles)):
         role = roles[column]
@@ -114,6 +155,14 @@ def _read_line(buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt
                 line.relative = value
             elif role == ROLE_SEQUENCE:
                 line.sequence = value
+        elif role == ROLE_STATUS:
+            kind, at = _read_status(buffer, at, mark.separator, words)
+            if kind == _FAULT:
+                return _BROKEN
+            if kind == _OVERLOAD:
+                line.overload = mark.overload
+        elif role == ROLE_WORD:
+            at = _end_of_word(buffer, _skip_blanks(buffer, at, -1), mark.separator)
         elif role >= ROLE_XOR:
             at = _check(buffer, start, at, role)
         elif role == ROLE_UNIT:
@@ -123,11 +172,38 @@ def _read_line(buffer: UInt8s, start: int, roles: Ints, mark: Record, unit: UInt
         if at == _BROKEN:
             return _BROKEN
         if column < len(roles) - 1:
-            if buffer[at] != mark.separator:
+            if buffer[at] == mark.separator:
+                at += 1
+            elif roles[column + 1] != ROLE_UNIT or buffer[at - 1] != _BLANK:
                 return _BROKEN
-            at += 1
     at = _skip_blanks(buffer, at, -1)
     return at if buffer[at] == _LF or buffer[at] == _CR else _BROKEN
+
+
+@inlined
+def _end_of_word(buffer: UInt8s, start: int, separator: int) -> int:
+    """Position after characters that can be printed; `_BROKEN` if there is none."""
+    at = start
+    while _BLANK < buffer[at] <= _LAST_PRINTABLE and buffer[at] != separator:
+        at += 1
+    return at if at > start else _BROKEN
+
+
+@inlined
+def _read_status(buffer: UInt8s, start: int, separator: int, words: UInt8s) -> tuple[int, int]:
+    """What a status means and the position after it; `_BROKEN` if there is none."""
+    first = _skip_blanks(buffer, start, -1)
+    end = _end_of_word(buffer, first, separator)
+    if end == _BROKEN:
+        return _FAULT, _BROKEN
+    kind = _GOOD
+    for word in words:
+        is_same = word[1] == end - first
+        for place in range(word[1] if is_same else 0):
+            is_same = is_same and buffer[first + place] == word[2 + place]
+        if is_same:
+            kind = int(word[0])
+    return kind, _skip_blanks(buffer, end, separator)
 
 
 @inlined
@@ -148,7 +224,7 @@ def _read_number(buffer: UInt8s, at: int, separator: int, decimal: int) -> tuple
     at = _skip_blanks(buffer, at, -1)
     negative = buffer[at] == _MINUS
     if negative or buffer[at] == _PLUS:
-        at += 1
+        at = _skip_blanks(buffer, at + 1, separator)  # balances right-justify the digits behind the sign
     first = at
     mantissa, kept, at = _read_digits(buffer, at, 0)
     digits = at - first

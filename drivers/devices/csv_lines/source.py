@@ -1,13 +1,17 @@
 """A device that sends lines of values, as a `SampleSource`."""
 
 import math
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 import msgspec
 
 from drivers.devices.csv_lines import DRIVER, codec
 from drivers.devices.csv_lines.codec import LineDecoder
-from drivers.devices.csv_lines.columns import CHECKSUMS, DECIMALS, SEPARATORS, Column, LineFormat
+from drivers.devices.csv_lines.columns import CHECKSUMS, DECIMALS, LINE_ENDS, SEPARATORS, Column, LineFormat
 from drivers.devices.csv_lines.inference import (
     OPENSCALE_FORMAT,
     InferredColumns,
@@ -15,13 +19,28 @@ from drivers.devices.csv_lines.inference import (
     infer_columns,
 )
 from drivers.devices.csv_lines.line_parser import LineParser
-from drivers.errors import NoDataError, SettingsError
+from drivers.devices.csv_lines.presets import Preset, shipped_presets, with_preset
+from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.polling import (
+    TOO_BUSY,
+    TRIALS,
+    PollSchedule,
+    ResponseTiming,
+    Transaction,
+    drain,
+    poll_rate_error,
+    quasi_static_note,
+    transact,
+)
 from drivers.recognition import Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
 from drivers.stream import SampleSource, parse_settings
 from messages.i18n import N_
+from messages.message import EMPTY, Message, joined, message
 
+_LINE_END = b" \r\n"
+_HOST_STEP_S = 1e-6  # of the host's time in front of a line that was asked for
 _DOUBTED_BYTES = 1 << 14
 """Some hundred lines, few of which are damaged: if their rate is wrong, the settings are."""
 
@@ -30,7 +49,7 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What `--set` and `[device.settings]` may give; see `LineFormat`. Raises SettingsError."""
 
     format: Literal["columns", "openscale"] = "columns"
-    """`openscale` infers the columns of a SparkFun OpenScale."""
+    """`openscale` infers the columns of a SparkFun OpenScale; presets were put in before (`with_preset`)."""
     columns: str = "time_us,table,relative"
     separator: str = "comma"
     decimal: str = "point"
@@ -41,6 +60,14 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sequence_bits: int = 32
     overload_count: float = math.inf
     """Readings of this size and more are marked as overloaded."""
+    start: str = ""  # what is sent to start, stop and ask, with escapes such as \\r and \\x11
+    stop: str = ""
+    poll: str = ""
+    """Asks for each line, which then gets the host's time; "" for a device that sends by itself."""
+    overload_status: str = ""  # words of the status column, with commas between
+    fault_status: str = ""
+    good_status: str = "ok"
+    line_end: Literal["crlf", "lf", "cr"] = "crlf"
 
     def __post_init__(self) -> None:
         if not self.overload_count > 0:
@@ -60,28 +87,79 @@ class CsvSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if unknown is not None:
             template = N_("column {name!r} is not known: allowed are {allowed}")
             raise SettingsError(template, name=unknown, allowed=list(Column))
-        marks = SEPARATORS.get(self.separator, self.separator), DECIMALS.get(self.decimal, self.decimal)
-        bits = self.time_bits, self.sequence_bits
-        return LineFormat(tuple(map(Column, columns)), *marks, self.comment, *bits, self.unit)
+        return LineFormat(
+            tuple(map(Column, columns)),
+            SEPARATORS.get(self.separator, self.separator),
+            DECIMALS.get(self.decimal, self.decimal),
+            self.comment,
+            self.time_bits,
+            self.sequence_bits,
+            self.unit,
+            _words(self.overload_status),
+            _words(self.fault_status),
+            self.good_status,
+            LINE_ENDS[self.line_end],
+        )
+
+    def commands(self) -> "Commands":
+        """What is sent to the device. Raises SettingsError."""
+        names = ("start", "stop", "poll")
+        return Commands(*(unescape(name, getattr(self, name)) for name in names))
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """What is sent to a device; b"" for nothing."""
+
+    start: bytes = b""
+    stop: bytes = b""
+    poll: bytes = b""
+
+
+def unescape(name: str, text: str) -> bytes:
+    r"""Bytes of a setting such as `\x1bP\r\n`. Raises SettingsError for an escape that is none."""
+    try:
+        return text.encode("ascii").decode("unicode_escape").encode("latin-1")
+    except UnicodeError:
+        template = N_("{name} {text!r} cannot be sent: write characters and escapes such as {examples}")
+        raise SettingsError(template, name=name, text=text, examples=r"\r \n \x11") from None
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
 class CsvLinesSource(SampleSource):
-    """The device sends by itself and takes no commands.
+    """The device sends by itself, or once it is started; of commands it takes only those.
 
     `layout` is None for a device whose lines show it (`find_layout`). `rate_hz` is needed where no column
-    holds the time. Readings of `overload_count` and more are marked as overloaded.
+    holds the time. Readings of `overload_count` and more are marked as overloaded. `preset` describes a known
+    device.
     """
 
     name = "CSV lines"
 
     def __init__(
-        self, layout: LineFormat | None, rate_hz: float | None, overload_count: float = math.inf
+        self,
+        layout: LineFormat | None,
+        rate_hz: float | None,
+        overload_count: float = math.inf,
+        commands: Commands | None = None,
+        preset: Preset | None = None,
     ) -> None:
-        super().__init__(DeviceIdentity(DRIVER.name, self.name), DRIVER.default_baud, rate_hz)
+        identity = DeviceIdentity(DRIVER.name, preset.title if preset else self.name)
+        super().__init__(identity, (preset.baud if preset else 0) or DRIVER.default_baud, rate_hz)
         self._layout = layout
         self._overload_count = overload_count
+        self._commands = commands or Commands()
+        self._caution = preset.caution if preset else ""
+        self.stop_command = self._commands.stop
         if layout is not None:
             self._check_rate(layout)
+
+    @property
+    def run_note(self) -> Message:
+        return message("{caution}", caution=self._caution) if self._caution else EMPTY
 
     @property
     def channels(self) -> int:
@@ -95,6 +173,8 @@ class CsvLinesSource(SampleSource):
         """Wait for the first good line, and with a time column for as many as show the rate."""
         self.prepare()
         link.read()  # what waited in the port is old, and some of it may be lost
+        if self._commands.start:
+            link.write(self._commands.start)
         first = self.await_stream(link, self._has_good_line, self.timeout_s)
         if self._layout is None:
             raise self.no_data_error(first)
@@ -164,21 +244,165 @@ class OpenScaleSource(CsvLinesSource):
         return find_openscale_format(data)
 
 
+@dataclass(frozen=True, slots=True)
+class LineRequest:
+    """Asks for one line."""
+
+    data: bytes
+
+    def encode(self) -> bytes:
+        return self.data
+
+    def is_complete(self, received: bytes) -> bool:
+        return bool(received.strip(_LINE_END)) and received[-1:] in (b"\r", b"\n")
+
+
+class PolledLinesSource(CsvLinesSource):
+    """A device that sends a line when it is asked.
+
+    Each line gets the host's time of its measurement in front, in microseconds, so that the stored bytes make
+    the same samples again. Polls are made at the beginning of the cells of a grid, or not at all. A line that
+    may be the answer to an earlier request, or was not measured at its place in its cell, gets no time: it is
+    a damaged one.
+    """
+
+    is_polled = True
+    _answer_s = 0.5  # balances and multimeters integrate for up to some tenths of a second
+
+    def __init__(
+        self,
+        layout: LineFormat,
+        rate_hz: float | None,
+        overload_count: float,
+        commands: Commands,
+        preset: Preset | None,
+    ) -> None:
+        super().__init__(_with_host_time(layout), rate_hz, overload_count, commands, preset)
+        self._mark = layout.separator.encode("ascii")
+        self._request = LineRequest(commands.poll)
+        self._schedule: PollSchedule | None = None
+        self._timing: ResponseTiming | None = None
+        self._warnings: deque[Message] = deque()
+        self._was_busy = self._answer_overdue = False
+
+    @property
+    def run_note(self) -> Message:
+        return joined([note for note in (quasi_static_note(self.rate_hz), super().run_note) if note], "; ")
+
+    def start(self, link: Link) -> bytes:
+        """Wait for a good line, and choose or check the rate."""
+        self.prepare()
+        if self._commands.start:
+            link.write(self._commands.start)
+        self._await_line(link)
+        timing = ResponseTiming([[transact(link, self._request, self._answer_s)] for _ in range(TRIALS)])
+        if self._rate_hz is None:
+            self._rate_hz = timing.max_rate_hz
+        elif timing.poll_s * self._rate_hz > 1:
+            raise poll_rate_error(self._rate_hz, timing)
+        self._timing, self._schedule = timing, PollSchedule(self._rate_hz)
+        return b""
+
+    def resume(self, link: Link) -> bytes:
+        if self._commands.start:
+            link.write(self._commands.start)
+        self._await_line(link)
+        self._answer_overdue = False
+        return b""
+
+    def set_poll_rate(self, rate_hz: float) -> None:
+        self._rate_hz, self._schedule = rate_hz, PollSchedule(rate_hz)
+
+    def read(self, link: Link) -> bytes:
+        """Wait for the next poll and make it; b"" where it is not due within 50 ms, or nothing came."""
+        if self._schedule is None or self._timing is None:
+            raise ProtocolError("the device was not started: start it before it is read")
+        is_due = self._schedule.wait()
+        if self._schedule.is_computer_busy and not self._was_busy:
+            self._warnings.append(message(TOO_BUSY, rate_hz=self.rate_hz))
+        self._was_busy = self._schedule.is_computer_busy
+        if not is_due:
+            return b""
+        transaction = transact(link, self._request, self._answer_s)
+        is_stale = self._answer_overdue or self._timing.is_stale(transaction)
+        is_late = is_stale or not self._timing.is_on_schedule(0, transaction, self._schedule)
+        is_complete = self._request.is_complete(transaction.data)
+        self._answer_overdue = not is_complete
+        if is_complete and not is_stale:
+            self._timing.update(0, transaction, self._schedule)
+        elif transaction.data:
+            drain(link)  # so that what comes next is the answer to the next request
+        self._schedule.mark_used(transaction.measured_ns)
+        return b"".join(_lines(transaction.data)) if is_late else self._with_time(transaction)
+
+    def take_warnings(self) -> list[Message]:
+        return [self._warnings.popleft() for _ in range(len(self._warnings))] + super().take_warnings()
+
+    def make_decoder(self, data: bytes) -> LineDecoder | None:  # noqa: ARG002 - the rate is that of the polls
+        if self._layout is None or self._rate_hz is None:
+            return None
+        return LineDecoder(self._layout, self._rate_hz, _HOST_STEP_S, self._overload_count)
+
+    def _await_line(self, link: Link) -> None:
+        received = drain(link)
+
+        def read() -> bytes:
+            return self._with_time(transact(link, self._request, self._answer_s))
+
+        deadline_s = time.monotonic() + self.timeout_s
+        while not self._has_good_line(received):
+            received += read()
+            if time.monotonic() > deadline_s:
+                raise self.no_data_error(received)
+
+    def _with_time(self, transaction: Transaction) -> bytes:
+        """What came, each line on its own and the last one with its time; b"" for nothing."""
+        lines = _lines(transaction.data)
+        if lines:
+            lines[-1] = b"%d%s%s" % (transaction.measured_ns // 1000, self._mark, lines[-1])
+        return b"".join(lines)
+
+    def _check_rate(self, layout: LineFormat) -> None:
+        """The host's time tells it."""
+
+
+def _lines(data: bytes) -> list[bytes]:
+    """Lines that are not empty, each with one terminator."""
+    return [line + b"\n" for line in data.replace(b"\r", b"\n").split(b"\n") if line.strip()]
+
+
+def _with_host_time(layout: LineFormat) -> LineFormat:
+    if layout.time_column is not None or Column.SEQUENCE in layout.columns or layout.checksum is not None:
+        template = N_(
+            "columns {columns}: a line that is polled has the host's time, name others ignore or word"
+        )
+        raise SettingsError(template, columns=",".join(layout.columns))
+    return replace(layout, columns=(Column.TIME_US, *layout.columns), time_bits=0)
+
+
 def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
     if rate_hz is not None and not 0 < rate_hz < math.inf:
         template = N_("rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
         raise SettingsError(template, rate_hz=rate_hz)
-    parsed = parse_settings(CsvSettings, settings, DRIVER.name)
+    parsed, preset = read_csv_settings(settings)
     if parsed.format == "openscale":
         return OpenScaleSource(None, rate_hz, parsed.overload_count)
-    return CsvLinesSource(parsed.layout(), rate_hz, parsed.overload_count)
+    commands = parsed.commands()
+    kind = PolledLinesSource if commands.poll else CsvLinesSource
+    return kind(parsed.layout(), rate_hz, parsed.overload_count, commands, preset)
+
+
+def read_csv_settings(settings: dict[str, str]) -> tuple[CsvSettings, Preset | None]:
+    """Settings, completed by the preset that they name. Raises SettingsError."""
+    complete, preset = with_preset(settings)
+    return parse_settings(CsvSettings, complete, DRIVER.name), preset
 
 
 def single_gauge_settings(gauge: str, settings: dict[str, str]) -> tuple[dict[str, str], int]:  # noqa: ARG001
     """Settings of a device with one gauge, and the column of its readings. Raises SettingsError."""
-    if settings.get("format", "columns") != "columns":
-        return settings, 0  # the device shows its columns itself
+    if settings.get("format", "columns") != "columns" and "columns" not in settings:
+        return settings, 0  # the device shows its columns itself, or its preset says them
     columns = settings.get("columns", "time_us,value")
     if "value" not in (name.strip() for name in columns.split(",")):
         template = N_("columns {columns} have no value: a device with one gauge sends one, as time_us,value")
@@ -191,8 +415,20 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     openscale, inferred = find_openscale_format(data), infer_columns(data, duration_s)
     candidates = [InferredColumns(openscale, {"format": "openscale"})] if openscale else []
     candidates += [inferred] if inferred else []
+    candidates += _presets_with_status()
     found = [_recognise_lines(candidate, data, duration_s) for candidate in candidates]
     return max(filter(None, found), key=lambda one: one.share, default=None)
+
+
+@cache
+def _presets_with_status() -> tuple[InferredColumns, ...]:
+    """Presets of lines that are like no other: with a status, as a device sends them that was told to."""
+    settings = {name: read_csv_settings({"format": name})[0] for name in shipped_presets()}
+    return tuple(
+        InferredColumns(one.layout(), {"format": name})
+        for name, one in settings.items()
+        if one.overload_status or one.fault_status
+    )
 
 
 def _recognise_lines(inferred: InferredColumns, data: bytes, duration_s: float | None) -> Recognition | None:

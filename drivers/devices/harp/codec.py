@@ -135,7 +135,7 @@ EVENT_BYTES = 28
 VALUES_OFFSET = 11  # place of its first value
 
 
-LINE = record_type("start end good discarded", "time sequence table relative")
+LINE = record_type("start end good overload discarded", "time sequence table relative")
 """An event, or as many bytes of garbage; with the bytes of this call that were discarded before it."""
 _LENGTH_BYTE = EVENT_BYTES - 2
 _ADDRESS = int(Register.LOAD_CELLS)
@@ -165,7 +165,7 @@ def find_events(buffer: UInt8s, channels: Ints, garbage: int, lines: Records) ->
         if size == 0:
             if garbage % EVENT_BYTES == 0:
                 lines[found].start = lines[found].end = at
-                lines[found].good = 0
+                lines[found].good = lines[found].overload = 0
                 found += 1
             garbage += 1
             discarded += 1
@@ -203,6 +203,7 @@ def _fill_line(line: Record, buffer: UInt8s, at: int, channels: Ints, discarded:
     line.start = at
     line.end = at + EVENT_BYTES
     line.good = 1
+    line.overload = 0
     seconds = 0
     for place in range(3, -1, -1):
         seconds = seconds << 8 | int(buffer[at + 5 + place])

@@ -8,17 +8,13 @@ from drivers.clock import Skew, SkewStatistics
 from drivers.devices.modbus.registers import ChannelValue, Poll
 from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.packets import MAX_GAP_S, PACKET, sample_blocks
+from drivers.polling import sample_period_ns
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.source import Decoder
 
 LATE = 0x80  # bit of an envelope's port: the time of the measurement is not known
 _NS = 1_000_000_000
 _OVERLOADS = (int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE))
-
-
-def sample_period_ns(rate_hz: float) -> int:
-    """Time between two samples (ns); their grid begins at 0 of the host's clock."""
-    return round(_NS / rate_hz)
 
 
 def wrap_response(request: int, measured_ns: int, data: bytes, *, is_late: bool = False) -> bytes:

@@ -13,7 +13,6 @@ from messages.message import EMPTY, Message, message
 
 MAX_REGISTERS = 125  # registers that one request may read
 MAX_UNIT = 247
-LONGEST = 256
 EXCEPTION_BYTES = 5
 _REFUSED = 0x80
 _HEAD = 3

@@ -11,10 +11,20 @@ from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import Function, Request, Response
 from drivers.devices.modbus.maps import MAP_KEYS, RegisterMap, is_map_key, read_map
-from drivers.devices.modbus.polling import PollSchedule, ResponseTiming, Transaction, drain, transact
 from drivers.devices.modbus.registers import plan_poll
 from drivers.driver import GAUGES
 from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.polling import (
+    TOO_BUSY,
+    TRIALS,
+    PollSchedule,
+    ResponseTiming,
+    Transaction,
+    drain,
+    poll_rate_error,
+    quasi_static_note,
+    transact,
+)
 from drivers.recognition import IdentityQuery, describe_unreadable
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
@@ -23,13 +33,6 @@ from messages.i18n import N_
 from messages.message import Message, joined, message, option
 
 MAX_RATE_HZ = 1000.0
-QUASI_STATIC_HZ = 500.0
-"""Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
-_TRIALS = 24  # trial polls before the stream; the slowest two in ten of them set the rate
-_TOO_BUSY = N_(
-    "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
-    " out: close other programs, or ask for a lower rate"
-)
 _QUERY = Request(1, Function.READ_HOLDING, 0)
 
 
@@ -88,10 +91,7 @@ class ModbusSource(SampleSource):
 
     @property
     def run_note(self) -> Message:
-        parts: list[Message] = []
-        if self.rate_hz < QUASI_STATIC_HZ:
-            template = N_("polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely")
-            parts.append(message(template, rate_hz=self.rate_hz))
+        parts = [note] if (note := quasi_static_note(self.rate_hz)) else []
         if self._map.caution:
             parts.append(message("{caution}", caution=self._map.caution))
         if self.skew_s:
@@ -130,7 +130,7 @@ class ModbusSource(SampleSource):
             raise ProtocolError("the device was not started: start it before it is read")
         is_due = schedule.wait()
         if schedule.is_computer_busy and not self._was_busy:
-            self._warnings.append(message(_TOO_BUSY, rate_hz=self.rate_hz))
+            self._warnings.append(message(TOO_BUSY, rate_hz=self.rate_hz))
         self._was_busy = schedule.is_computer_busy
         if not is_due:
             return b""
@@ -209,17 +209,11 @@ class ModbusSource(SampleSource):
                 raise ProtocolError(template, gauge=gauge, reason=response.fault)
 
     def _measure_timing(self, link: Link) -> None:
-        timing = ResponseTiming([self._trial_poll(link) for _ in range(_TRIALS)])
+        timing = ResponseTiming([self._trial_poll(link) for _ in range(TRIALS)])
         if self._rate_hz is None:
             self._rate_hz = min(MAX_RATE_HZ, timing.max_rate_hz)
         elif timing.poll_s * self._rate_hz > 1:
-            raise ProtocolError(
-                "rate {rate_hz:g} Hz cannot be: a poll takes {poll_ms:.2g} ms, ask for"
-                " --rate {possible_hz:g} or leave it out",
-                rate_hz=self._rate_hz,
-                poll_ms=1e3 * timing.poll_s,
-                possible_hz=timing.max_rate_hz,
-            )
+            raise poll_rate_error(self._rate_hz, timing)
         self._timing, self._schedule = timing, PollSchedule(self._rate_hz)
 
     def _trial_poll(self, link: Link) -> list[Transaction]:

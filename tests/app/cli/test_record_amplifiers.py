@@ -43,8 +43,13 @@ range_m = 0.0325
         ("gsv", {"format": "device", "table": "3", "relative": "1"}),
         ("harp", {"table": "5"}),
         ("csv", {"columns": "time_ms,sequence,relative,table,crc", "separator": "semicolon"}),
+        ("csv", {"format": "dataq-ascii"}),
+        (
+            "csv",
+            {"columns": "status,table,relative", "overload_status": "OL", "start": r"\x11", "line_end": "cr"},
+        ),
     ],
-    ids=["gsv", "gsv-int24", "harp", "csv"],
+    ids=["gsv", "gsv-int24", "harp", "csv", "dataq-ascii", "csv-status"],
 )
 def test_a_recorded_pullback_has_the_true_friction(
     slipstand: Any, tmp_path: Path, protocol: str, settings: dict[str, str]

@@ -9,6 +9,12 @@ from tests.drivers.examples import RATE_HZ, Counts, RecordingExample, WireExampl
 
 CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 PLAIN = LineFormat()
+STATUS = LineFormat(
+    (Column.TIME_US, Column.STATUS, Column.VALUE, Column.UNIT),
+    overload_status=("OL",),
+    fault_status=("ERR",),
+    line_end="\r",
+)
 
 
 def lines(layout: LineFormat) -> Callable[[int, Counts], list[bytes]]:
@@ -20,6 +26,13 @@ WIRE = (
         "csv with checksum", lambda: LineDecoder(CHECKED, RATE_HZ), lines(CHECKED), has_checksum=True
     ),
     WireExample("csv", lambda: LineDecoder(PLAIN, RATE_HZ), lines(PLAIN), has_checksum=False),
+    WireExample(
+        "csv with status",
+        lambda: LineDecoder(STATUS, RATE_HZ),
+        lines(STATUS),
+        has_checksum=False,
+        gauges=1,
+    ),
     WireExample(
         "openscale",
         lambda: LineDecoder(OPENSCALE_FORMAT, RATE_HZ),

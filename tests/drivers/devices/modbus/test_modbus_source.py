@@ -17,8 +17,8 @@ READ = Request(1, Function.READ_HOLDING, 0, 4)
 @pytest.fixture(autouse=True)
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("drivers.devices.modbus.polling.host_ns", clock.host_ns)
-    monkeypatch.setattr("drivers.devices.modbus.polling.time", clock)
+    monkeypatch.setattr("drivers.polling.host_ns", clock.host_ns)
+    monkeypatch.setattr("drivers.polling.time", clock)
     monkeypatch.setattr("drivers.devices.modbus.source.time", clock)
     return clock
 

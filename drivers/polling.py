@@ -5,12 +5,21 @@ import statistics
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from drivers.devices.modbus.decoder import sample_period_ns
-from drivers.devices.modbus.frames import LONGEST, Request
+from drivers.errors import ProtocolError
 from drivers.host_time import host_ns
 from drivers.source import Link
+from messages.i18n import N_
+from messages.message import EMPTY, Message, message
 
+QUASI_STATIC_HZ = 500.0
+"""Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
+TRIALS = 24  # trial polls before the stream; the slowest two in ten of them set the rate
+TOO_BUSY = N_(
+    "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
+    " out: close other programs, or ask for a lower rate"
+)
 _NS = 1_000_000_000
 _MAX_WAIT_NS = 50_000_000
 """Threads that poll are stopped within this time."""
@@ -29,6 +38,38 @@ _WINDOW_NS = 2_000_000_000
 _BUSY_SHARE = 0.1
 """Share of late wake-ups within 2 s at which this computer counts as busy."""
 _MAX_DRAIN_READS = 8
+_MAX_DRAINED_BYTES = 256  # that are kept: a frame of Modbus is no longer, and nor is a line
+
+
+class PollRequest(Protocol):
+    """What is sent to ask for a reading."""
+
+    def encode(self) -> bytes: ...
+
+    def is_complete(self, received: bytes) -> bool:
+        """Whether as much came as the response has; it may still be wrong."""
+
+
+def sample_period_ns(rate_hz: float) -> int:
+    """Time between two samples (ns); their grid begins at 0 of the host's clock."""
+    return round(_NS / rate_hz)
+
+
+def poll_rate_error(rate_hz: float, timing: "ResponseTiming") -> ProtocolError:
+    """Error to raise for a rate at which the device does not answer."""
+    return ProtocolError(
+        "rate {rate_hz:g} Hz cannot be: a poll takes {poll_ms:.2g} ms, ask for"
+        " --rate {possible_hz:g} or leave it out",
+        rate_hz=rate_hz,
+        poll_ms=1e3 * timing.poll_s,
+        possible_hz=timing.max_rate_hz,
+    )
+
+
+def quasi_static_note(rate_hz: float) -> Message:
+    """Note for every run that is polled so seldom that a quick motion is seen coarsely; else EMPTY."""
+    template = N_("polled at {rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely")
+    return message(template, rate_hz=rate_hz) if rate_hz < QUASI_STATIC_HZ else EMPTY
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +94,7 @@ class Transaction:
         return (self.received_ns - self.sent_ns) / _NS
 
 
-def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
+def transact(link: Link, request: PollRequest, timeout_s: float) -> Transaction:
     """Send a request and read its response; may raise DeviceLostError.
 
     Reading ends when the response is complete, after `timeout_s`, or in an incomplete response after one read
@@ -78,7 +119,7 @@ def drain(link: Link) -> bytes:
         data = link.read()
         if not data:
             break
-        received = (received + data)[-LONGEST:]
+        received = (received + data)[-_MAX_DRAINED_BYTES:]
     return received
 
 

@@ -1,0 +1,71 @@
+"""Presets: settings of known devices, read from TOML."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from drivers.errors import SettingsError
+from messages.i18n import N_
+
+COLUMNS, OPENSCALE = "columns", "openscale"
+"""Formats that are no preset."""
+_SHIPPED = files("drivers.devices.csv_lines").joinpath("presets")
+_ABOUT = ("title", "source", "caution", "baud")
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A device that sends lines."""
+
+    title: str
+    caution: str  # note for every run that is read by it; "" for none
+    baud: int
+    settings: dict[str, str]
+
+
+def shipped_presets() -> list[str]:
+    """Names of the presets in the driver's folder."""
+    names = [entry.name for entry in _SHIPPED.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+
+
+def read_preset(name: str) -> Preset:
+    """Read a shipped preset, or a file that ends in `.toml`. Raises SettingsError."""
+    path: Any = Path(name).expanduser()
+    if path.suffix != ".toml":
+        if name not in shipped_presets():
+            known = [COLUMNS, OPENSCALE, *shipped_presets()]
+            template = N_(
+                "format {name!r} is not known: give one of {known}, or a file of your own that ends in .toml"
+            )
+            raise SettingsError(template, name=name, known=known)
+        path = _SHIPPED.joinpath(f"{name}.toml")
+    try:
+        content = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        template = N_("format {name} cannot be read ({fault}): check its path")
+        raise SettingsError(template, name=name, fault=error.strerror) from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        template = N_("format {name} is no TOML ({fault}): see docs/how-to/read-lines.md")
+        raise SettingsError(template, name=name, fault=error) from None
+    settings = {key: _text(value) for key, value in content.items() if key not in _ABOUT}
+    baud = content.get("baud", 0)
+    if not isinstance(baud, int):
+        raise SettingsError("format {name}: baud = {baud!r} is no whole number", name=name, baud=baud)
+    return Preset(str(content.get("title", name)), str(content.get("caution", "")), baud, settings)
+
+
+def with_preset(given: Mapping[str, str]) -> tuple[dict[str, str], Preset | None]:
+    """Settings, with those of the preset that their `format` names below them. Raises SettingsError."""
+    name = given.get("format", COLUMNS)
+    if name in (COLUMNS, OPENSCALE):
+        return dict(given), None
+    preset = read_preset(name)
+    return preset.settings | {key: value for key, value in given.items() if key != "format"}, preset
+
+
+def _text(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, list) else str(value)
