@@ -108,7 +108,7 @@ def test_old_runs_are_listed_with_the_same_facts(folder, expected, capsys, monke
 def test_old_runs_that_end_with_the_plate_put_back_give_the_friction_before(
     folder, capsys, monkeypatch, name, friction
 ):
-    """The stand was simulated with this f_d; its operator puts the plate back after 6 s, which was fitted too."""
+    """Stands simulated with this f_d; an operator puts the plate back after 6 s, which was fitted too."""
     (now,) = printed(capsys, monkeypatch, "analyze", folder / f"recorded-{name}.h5")
     found = now["results"]["friction_dynamic"]
     assert now["model"]["adequate"]
