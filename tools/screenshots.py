@@ -1,9 +1,11 @@
 """Pictures of every screen with real content: `python -m tools.screenshots FOLDER`.
 
-A pullback is recorded from the simulated stand meanwhile, and a campaign simulated, so it takes some
-minutes. Each moment is drawn in both themes and two sizes, without a window system.
+A pullback is recorded from the simulated stand meanwhile, one of a stand that is not ideal and a campaign are
+simulated, so it takes some minutes. Each moment is drawn in both themes and two sizes, without a window
+system.
 """
 
+import datetime
 import os
 import shutil
 import sys
@@ -12,11 +14,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
 from analysis.gauge_health import HealthGrade
+from analysis.laws.stand_parts import stand_displacements
+from analysis.synthetic import Truth, simulate_readings
 from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
@@ -27,8 +32,10 @@ from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
+from app.runs.metadata import create_metadata
+from app.runs.simulated import store_motion
 from app.simulated_stand.options import SimulatedStandOptions
-from config.files import settings_file
+from config.files import load_gauges, load_stand, settings_file
 from messages.i18n import gettext
 
 SIZES = ((1280, 800), (1920, 1080))
@@ -37,6 +44,7 @@ _PATIENCE_S = 600.0
 _BY_HAND = 0.4
 """How far towards the end of the scan the handle is drawn."""
 _LAID_OVER = 3
+_EFFECTS = {"release_ramp_s": 0.011, "film_s_per_m": 1.0}
 Wait = Callable[[Callable[[], bool], str], None]
 _PLAN = "* x3"
 _FORM = RunForm(operator="N. Schwarz", temperature_c="21.5", humidity_percent="45", plate_id="P1")
@@ -116,6 +124,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     wait(lambda: record.state.plan.done == 1, "the run is kept and counted")
     camera.shoot("record-kept")
     _shoot_identify(presenter, camera, wait)
+    _shoot_stand(presenter, camera, wait)
     _shoot_campaign(presenter, camera, wait)
     _shoot_runs(presenter, camera, wait)
     presenter.show_screen(Screen.GAUGES)
@@ -177,6 +186,26 @@ def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     identify.toggle_cursors()
     identify.set_tab(IdentifySide.RELATIVE)
     camera.shoot("identify-relative")
+    identify.set_tab(IdentifySide.DISPLACEMENT)
+
+
+def _shoot_stand(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
+    """A run of a stand that releases slowly and has a viscous film: its verdict, and friction by slip."""
+    truth = Truth(friction_static=0.12, tilt_rad=1e-3)
+    motion = stand_displacements(truth.parameters(), _EFFECTS, truth.duration_s + 1e-3)
+    _, table, relative = simulate_readings(truth, motion)
+    now = datetime.datetime.now().astimezone()
+    metadata = create_metadata(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=truth.rate_hz)
+    path = Path(presenter.runs.state.folder) / "slow-release.h5"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    readings = np.column_stack([table, relative])
+    store_motion(path, metadata, readings, release_s=truth.hold_s, rate_hz=truth.rate_hz)
+    identify = presenter.identify
+    presenter.open_run(str(path))
+    wait(lambda: bool(identify.state.classical), "the stand is identified")
+    camera.shoot("identify-stand")
+    identify.set_tab(IdentifySide.FRICTION)
+    camera.shoot("identify-slips")
     identify.set_tab(IdentifySide.DISPLACEMENT)
 
 

@@ -326,6 +326,19 @@ def test_no_word_of_a_stand_that_is_not_ideal_is_cut_off(
     assert clipped_words(stage.screen) == []
 
 
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_every_tab_is_in_sight_in_the_usual_window(
+    theme: Theme, qtbot: QtBot, language: str, use_language: Callable[[str], None]
+) -> None:
+    use_language(language)
+    stage = Stage(theme, qtbot)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    QApplication.processEvents()
+    tabs = stage.screen._tabs
+    assert 0 < tabs.tabRect(tabs.count() - 1).right() <= tabs.width()
+
+
 def test_a_stand_is_told_in_words_beside_its_law(stage: Stage, qtbot: QtBot) -> None:
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(of_stand())
