@@ -321,7 +321,7 @@ def _oriented_stretch(
     begin_s = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     end_s = release.end_s + 1e-9
     table = channels.table.between(begin_s, end_s)
-    period_s = oscillation.estimate_period(table, release)
+    period_s = oscillation.estimate_period(table, release, channels.relative)
     first = table.between(release.time_s, release.time_s + 0.5 * period_s).value_m
     stretch = _Stretch(channels, table, None, measures_plate, 1, 1, release)
     sign = -1 if stretch.plateau is not None and first[0] < first[-1] else 1

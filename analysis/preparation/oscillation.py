@@ -1,5 +1,6 @@
 """Oscillation of a channel: releases, last slip, plausible period, and the damped cosine of its tail."""
 
+import contextlib
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -298,6 +299,8 @@ _LENGTH_MIN_S = 1e-3
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
 _SLOW_S = 0.01  # readings closer together than this are enough for any stand with a period of 0.1 s or more
+_SWINGS_CLEARLY = 0.2  # largest residual of a swing over its amplitude
+_SWINGS_NEEDED = 1.25  # with fewer an oscillation cannot be told from a drift
 _READINGS_A_SWING = 10  # fewer hide when the table is let go, and how fast it swings
 _PULLBACK_FACTOR = 3.0
 """Between pullback and that of the series: beyond it is not the operator who pulled otherwise."""
@@ -357,20 +360,19 @@ def check_rate(table: Channel) -> None:
         )
 
 
-def estimate_period(table: Channel, release: Release) -> float:
+def estimate_period(table: Channel, release: Release, relative: Channel | None = None) -> float:
     """Period of the swing after `release` (s), to some per cent.
 
-    Raises RecordError if the record ends within one and a quarter swings, or no stand has this period.
+    Raises RecordError if the record ends within one and a quarter swings, or no stand has this period; or if
+    gauge 2, of the readings `relative`, swings in place of gauge 1.
     """
     swing = table.between(release.time_s, np.inf)
+    if not len(swing):
+        raise _no_swing_error(swing, relative)
     try:
         period_s = dominant_period(swing)
     except RecordError:
-        raise RecordError(
-            "the record ends {length_s} s after the release, before the table has swung once and"
-            " a quarter. Record for 20 s after the release, or until rest.",
-            length_s=format_number(swing.time_s[-1] - release.time_s),
-        ) from None
+        raise _no_swing_error(swing, relative) from None
     if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
         raise RecordError(
             "gauge 1 swings with a period of {period_s} s, no stand does ({shortest_s:g} to"
@@ -380,6 +382,29 @@ def estimate_period(table: Channel, release: Release) -> float:
             longest_s=PERIOD_MAX_S,
         )
     return period_s
+
+
+def _no_swing_error(swing: Channel, relative: Channel | None) -> RecordError:
+    """Error for readings `swing` of gauge 1 after a release in which nothing oscillates."""
+    length_s = float(swing.time_s[-1] - swing.time_s[0]) if len(swing) else 0.0
+    late = None if relative is None else relative.between(float(relative.time_s[-1]) - 0.5 * length_s, np.inf)
+    if late is not None and len(late):
+        with contextlib.suppress(RecordError):
+            decay = fit_damped_cosine(late, dominant_period(late))
+            if decay.rms_m < _SWINGS_CLEARLY * decay.amplitude_m:
+                return RecordError(
+                    "gauge 1 does not swing after the release, but gauge 2 does, with a period of {period_s}"
+                    " s: their channels look swapped. Exchange them where the gauges are stated, or in the"
+                    " import.",
+                    period_s=format_number(decay.period_s),
+                )
+    if length_s > _SWINGS_NEEDED * PERIOD_MAX_S:
+        return no_decay_error(length_s)
+    return RecordError(
+        "the record ends {length_s} s after the release, before the table has swung once and"
+        " a quarter. Record for 20 s after the release, or until rest.",
+        length_s=format_number(length_s),
+    )
 
 
 def pullback_warnings(pullback_m: float, nominal_m: float | None) -> list[ResultWarning]:

@@ -356,6 +356,14 @@ def test_a_record_too_short_to_swing_says_so(start_s, end_s, words):
         identify(stretch(Truth(), start_s, end_s))
 
 
+def test_swapped_channels_are_named():
+    sound = simulate_record(Truth(duration_s=12.0, rate_hz=250.0))
+    table, relative = sound.table_displacement_m, sound.relative_displacement_m
+    swapped = sound.replace(table_displacement_m=relative, relative_displacement_m=table)
+    with pytest.raises(RecordError, match=r"period of 0\.32 s: their channels look swapped"):
+        identify(swapped)
+
+
 def test_a_record_that_begins_with_the_release_needs_no_caution():
     time, table, relative = simulate_readings(Truth(noise_m=0.0, release_phase=0.0, hold_s=0.0))
 
