@@ -43,9 +43,9 @@ from analysis.results.joint_fit import (
     add_systematic_uncertainty,
     law_places,
 )
-from analysis.uncertainty import UncertaintyBudget, propagate_expected
+from analysis.uncertainty import UncertaintyBudget, propagate_expected, unstated_gain_warnings
 from messages.i18n import N_
-from messages.message import joined, message
+from messages.message import message
 
 CLOCK_UNCERTAINTY = 5e-5  # relative, of a device's rate after ten seconds beside a quiet host (decision 6)
 _NOTHING_STATED = GaugeUncertainty()
@@ -365,10 +365,4 @@ def _warnings(
             "friction-undetermined",
             "the record will not tell f_d. Sample faster and longer, within the gauges' ranges.",
         )
-    gauges = {1: test.table_gauge, 2: test.relative_gauge}
-    if unstated := [number for number, gauge in gauges.items() if gauge.gain_relative is None]:
-        yield result_warning(
-            "gain-not-stated",
-            "the gain of {gauges} has no stated uncertainty, so that its part is missing.",
-            gauges=joined([message("gauge {gauge}", gauge=number) for number in unstated], " and "),
-        )
+    yield from unstated_gain_warnings(test.table_gauge, test.relative_gauge)

@@ -11,8 +11,18 @@ from analysis.catalogue import CATALOGUE
 from analysis.fitting.problem import FitProblem, covariance
 from analysis.fitting.search import Fit
 from analysis.laws.parameters import Parameter
-from analysis.quantities import BudgetLine, BudgetSource, OtherLaw, Quantity, Source
-from analysis.record import Record
+from analysis.quantities import (
+    BudgetLine,
+    BudgetSource,
+    OtherLaw,
+    Quantity,
+    ResultWarning,
+    Source,
+    result_warning,
+)
+from analysis.record import GaugeUncertainty, Record
+from messages.i18n import N_
+from messages.message import joined, message
 
 Values = TypeVar("Values", float, Floats)
 
@@ -24,7 +34,8 @@ _SOURCES = {
     Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
 _UNITS = {row.name: row.unit for row in CATALOGUE}
-LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5  # plane within 2 mrad, rectangular (JCGM 100, 4.3.7)
+LEVEL_RAD = 2e-3  # tilt within which a hydraulic level sets a plane
+LEVELLING_UNCERTAINTY_RAD = LEVEL_RAD / 3.0**0.5  # rectangular (JCGM 100, 4.3.7)
 _SHARE_MIN = 1e-3  # a law less likely than this adds less than its last digit to a standard uncertainty
 _CORRELATED = 3.5  # excess scatter of block means, in sigmas of white noise, of correlated noise
 
@@ -108,6 +119,17 @@ def unstated_gains(record: Record, results: Iterable[str]) -> list[BudgetLine]:
         for source, gauge in gauges.items()
         if gauge.gain_relative is None
     ]
+
+
+def unstated_gain_warnings(table: GaugeUncertainty, relative: GaugeUncertainty | None) -> list[ResultWarning]:
+    """Warn of gauges whose gain has no stated uncertainty; `relative` is None without gauge 2."""
+    gauges = {1: table} if relative is None else {1: table, 2: relative}
+    unstated = [number for number, gauge in gauges.items() if gauge.gain_relative is None]
+    if not unstated:
+        return []
+    names = joined([message("gauge {gauge}", gauge=number) for number in unstated], " and ")
+    template = N_("the gain of {gauges} has no stated uncertainty, so that its part is missing.")
+    return [result_warning("gain-not-stated", template, gauges=names)]
 
 
 def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:

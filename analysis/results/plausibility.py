@@ -6,7 +6,7 @@ from analysis.catalogue import Place, definition
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TILT_MAX_RAD
 from analysis.quantities import Quantity, ResultWarning, result_warning
 from analysis.record import RecordError
-from analysis.uncertainty import UncertaintyBudget
+from analysis.uncertainty import LEVEL_RAD, UncertaintyBudget
 from messages.i18n import N_
 from messages.message import Message, joined, message
 
@@ -52,6 +52,21 @@ def remove_friction_of_tilted_plane(budget: UncertaintyBudget) -> Iterator[Resul
     )
     shown = _shown("tilt_rad", tilt)
     yield result_warning("implausible-result", template, tilt=shown, largest_mrad=1e3 * TILT_MAX_RAD)
+
+
+def tilt_warnings(results: dict[str, Quantity]) -> Iterator[ResultWarning]:
+    """Warn of a tilt that a level would have shown."""
+    tilt = results.get("tilt_rad")
+    if tilt is None:
+        return
+    low, high = tilt.interval_95
+    if max(low, -high) <= LEVEL_RAD:
+        return
+    template = N_(
+        "the fitted tilt is {tilt}, more than a level leaves: the plane leans, or friction differs by"
+        " direction, which looks like tilt (5 % like 5 mrad where f_d is 0.1). Check the level of the plane."
+    )
+    yield result_warning("tilt-beyond-level", template, tilt=_shown("tilt_rad", tilt))
 
 
 def remove_undetermined(budget: UncertaintyBudget) -> Iterator[ResultWarning]:

@@ -14,7 +14,11 @@ from analysis.laws.parameters import Parameter
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, result_warning
 from analysis.results.joint_fit import JointFit
-from analysis.results.plausibility import remove_friction_of_tilted_plane, remove_undetermined
+from analysis.results.plausibility import (
+    remove_friction_of_tilted_plane,
+    remove_undetermined,
+    tilt_warnings,
+)
 from analysis.uncertainty import UncertaintyBudget
 from messages.i18n import N_
 
@@ -45,7 +49,7 @@ def judge(
     """
     warnings = list(remove_friction_of_tilted_plane(budget))
     joint, found = _compare_estimates(joint, plate, budget, ideal, law_is_given=law_is_given)
-    warnings += [*found, *remove_undetermined(budget)]
+    warnings += [*found, *remove_undetermined(budget), *tilt_warnings(budget.results)]
     return joint if _NAME in budget.results else _with_degree(joint, Degree.NONE), warnings
 
 

@@ -13,6 +13,7 @@ from analysis.identification import Identification, ModelSelection, MonteCarlo
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
 from analysis.record import Record, StandMasses
+from analysis.uncertainty import unstated_gain_warnings
 from messages.i18n import N_
 from messages.message import Message, joined, message
 
@@ -178,6 +179,21 @@ def mass_warnings(metadata: "RunMetadata", used: StandMasses) -> Iterator[Result
     if masses:
         text = message("analysed with {masses}.", masses=joined(masses, " and "))
         yield ResultWarning("masses-given", text)
+
+
+def unstated_warnings(
+    metadata: "RunMetadata", record: Record, result: Identification
+) -> Iterator[ResultWarning]:
+    """Say which uncertainties are missing: of gains, and of the clock of a run that was not simulated."""
+    if "friction_dynamic" in result.results:
+        has_gauge_2 = record.relative_displacement_m is not None
+        yield from unstated_gain_warnings(record.table_gauge, record.relative_gauge if has_gauge_2 else None)
+    if "period_s" in result.results and record.clock_scale_uncertainty == 0.0 and not metadata.truth:
+        text = message(
+            "the clock was not timed: an error of it is an error of T, whose uncertainty lacks that part, and"
+            " twice as large in f_d. Record with Slipstand, which times the clock."
+        )
+        yield ResultWarning("clock-not-timed", text)
 
 
 def calibration_warnings(gauges: "Gauges", day: datetime.date) -> Iterator[ResultWarning]:

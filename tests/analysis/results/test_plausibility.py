@@ -4,7 +4,12 @@ import pytest
 
 from analysis.quantities import BudgetSource, Quantity
 from analysis.record import RecordError
-from analysis.results.plausibility import check_period, remove_friction_of_tilted_plane, remove_undetermined
+from analysis.results.plausibility import (
+    check_period,
+    remove_friction_of_tilted_plane,
+    remove_undetermined,
+    tilt_warnings,
+)
 from analysis.uncertainty import UncertaintyBudget
 
 
@@ -47,3 +52,12 @@ def test_a_sound_budget_is_kept():
 def test_a_period_that_no_stand_has_is_refused(period_s, uncertainty_s):
     with pytest.raises(RecordError, match="no stand does so"):
         check_period(Quantity.normal(period_s, uncertainty_s, "s"))
+
+
+@pytest.mark.parametrize(
+    ("tilt_rad", "uncertainty_rad", "warned"),
+    [(-3e-3, 1e-4, True), (3e-3, 1e-3, False), (1e-3, 1e-5, False), (-1e-3, 3e-3, False)],
+)
+def test_a_tilt_that_a_level_would_show_is_told(tilt_rad, uncertainty_rad, warned):
+    found = list(tilt_warnings(budget_of(tilt_rad=(tilt_rad, uncertainty_rad)).results))
+    assert [warning.code for warning in found] == ["tilt-beyond-level"] * warned

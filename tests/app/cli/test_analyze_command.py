@@ -67,6 +67,11 @@ def test_json_holds_friction_slip_by_slip(slipstand: Any, simulated_run: Path) -
     assert set(document["plate"]["variation"]) == {"sliding velocity", "position", "slid path"}
 
 
+def test_a_simulated_clock_is_exact(slipstand: Any, simulated_run: Path) -> None:
+    (document,) = slipstand("analyze", simulated_run, "--json").json
+    assert "clock-not-timed" not in [warning["code"] for warning in document["warnings"]]
+
+
 def test_many_values_of_friction_are_counted(
     slipstand: Any, simulated_run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

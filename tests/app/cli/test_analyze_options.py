@@ -46,6 +46,12 @@ def bare(slipstand: Any, path: Path, mass_kg: float, coulomb_m: float = 0.0, **c
     return stored(slipstand, path, time_s, simulate(decay, time_s).displacement_m + noise_m)
 
 
+def test_what_an_imported_record_does_not_state_is_told(slipstand: Any, folder: Path) -> None:
+    (document,) = slipstand("analyze", pullback_run(slipstand, folder), "--json").json
+    codes = {warning["code"] for warning in document["warnings"]}
+    assert {"gain-not-stated", "clock-not-timed"} <= codes
+
+
 def test_both_methods_stand_side_by_side(slipstand: Any, folder: Path) -> None:
     run = pullback_run(slipstand, folder)
     (document,) = slipstand("analyze", run, "--monte-carlo", 100, "--json").json

@@ -21,6 +21,9 @@ OLD_RUNS = Path(__file__).resolve().parents[2] / "golden" / "old_runs"
 RELATIVE_DIFFERENCE = 1e-9
 """Between processors and builds of LAPACK; the same machine gives the same bits."""
 
+_LATER_WARNINGS = ("gain-not-stated", "clock-not-timed", "tilt-beyond-level")
+"""Codes that the earlier version did not give; the runs show what they name."""
+
 
 @pytest.fixture(scope="module")
 def expected() -> Any:
@@ -85,6 +88,7 @@ def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypat
     one_gauge["warnings"] = [one for one in one_gauge["warnings"] if one["code"] != "second-mode"]
     for one, other in zip(now, [*two_gauges, one_gauge], strict=True):
         one["budget"] = _of_old_results(one, other)
+        one["warnings"] = [warning for warning in one["warnings"] if warning["code"] not in _LATER_WARNINGS]
     assert_same(now, [*two_gauges, one_gauge], "analyze")
 
 
