@@ -33,7 +33,7 @@ def read_personal() -> PersonalSettings:
     recordings = recordings_directory(settings)
     shown = (
         SettingsFile(N_("These settings"), str(files.settings_path())),
-        SettingsFile(N_("Stand"), str(files.settings_file("stand.toml"))),
+        SettingsFile(N_("Stand and masses"), str(files.settings_file("stand.toml"))),
         SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""

@@ -100,6 +100,7 @@ class StandScreen(QWidget):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
         effects = self._fields["effects"]
         effects.setToolTip("\n".join((effects.toolTip(), *LISTED)))
+        effects.setPlaceholderText(gettext("none"))
         hint = gettext("An empty field means the value in grey.")
         return _card(gettext("Set up the stand"), hint, grid, self._start, self._message)
 

@@ -89,7 +89,7 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         on_kept: Callable[[], None],
         now: Callable[[], datetime.datetime],
     ) -> None:
-        super().__init__(CalibrationState(), recent, worker, on_kept)
+        super().__init__(CalibrationState(live_note=gettext(NO_DEVICE)), recent, worker, on_kept)
         self._recent = recent
         self._now = now
         self._is_connected = False

@@ -139,7 +139,7 @@ class CalibrationState:
 
     form: CalibrationForm = CalibrationForm()
     live_value: str = ""
-    live_note: str = NO_DEVICE  # noise of the counts, or why there are none
+    live_note: str = ""  # noise of the counts, or why there are none
     points: tuple[CalibrationPoint, ...] = ()
     reading_status: str = ""  # progress of the reading being averaged; empty while none is
     fit: CalibrationFit | None = None

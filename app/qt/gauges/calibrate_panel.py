@@ -206,7 +206,7 @@ class ResidualPlot(PlotStack):
     """Marks pointing up on the way up, down on the way down, about a line at zero."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, ((_TITLE, "text"),), interactive=False)
+        super().__init__(theme, ((gettext(_TITLE), "text"),), interactive=False)
         (plot,) = self.plots
         self._zero = plot.add(pg.InfiniteLine(pos=0.0, angle=0, movable=False))
         self._marks = [plot.add(pg.ScatterPlotItem(symbol=mark, size=10)) for mark in ("t1", "t")]

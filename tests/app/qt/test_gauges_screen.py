@@ -1,6 +1,7 @@
 """The Gauges screen: cards and tabs follow the state; keys and clicks reach the presenter."""
 
 import datetime
+from collections.abc import Callable
 from dataclasses import replace
 from operator import attrgetter
 from typing import Any
@@ -29,6 +30,7 @@ from app.presenters.gauges.state import (
 from app.presenters.navigator import ConnectForm
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme
+from app.qt.widgets.plots import PlotStack
 from config.files import load_gauges
 from config.schema import GaugeChecks, Gauges
 
@@ -207,6 +209,20 @@ def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:
     assert stage.screen._calibrate._readings._table.rowCount() == 5
     up, down = stage.screen._calibrate._plot._marks
     assert (len(up.points()), len(down.points())) == (3, 2)
+
+
+def test_calibration_without_a_device_speaks_the_language_of_the_window(
+    theme: Theme, qtbot: QtBot, use_language: Callable[[str], None]
+) -> None:
+    """Note and plot title once stayed English."""
+    use_language("ru")
+    stage = Stage(theme, qtbot)
+    stage.presenter.set_tab(GaugesTab.CALIBRATE)
+    assert "Нет отсчётов: сначала подключите прибор" in stage.words()
+    titles = [
+        stack.plots[0].title.text for stack in stage.screen.findChildren(PlotStack) if stack.isVisible()
+    ]
+    assert any("индикатор − калибровка" in title for title in titles)
 
 
 def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
