@@ -72,6 +72,32 @@ def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) 
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
+@pytest.mark.parametrize(("preset", "rate_hz"), [("mantracourt-dscusb", 300), ("loadstar-iload", 500)])
+def test_two_streams_without_time_find_the_true_friction(
+    slipstand: Any, tmp_path: Path, preset: str, rate_hz: int
+) -> None:
+    with two_stands(protocol="csv", device={"format": preset}, rate_hz=rate_hz, **QUICK) as (first, second):
+        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "csv", "--rate", rate_hz]
+        wanted = [
+            "--series",
+            "1FFM0",
+            "--pretrigger",
+            0.5,
+            "--duration",
+            4.5,
+            "--trigger-timeout",
+            60,
+            "--json",
+        ]
+        given = ["--set", f"format={preset}", "--directory", tmp_path]
+        recorded = slipstand("record", *ports, *given, *wanted).json
+        true = first.truth().stand.friction_dynamic
+    if (uncertainty_s := recorded["skew_standard_uncertainty_s"]) > 2e-3:
+        pytest.skip(f"this computer is too busy to time two streams: to {1e3 * uncertainty_s:.1f} ms")
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
 def test_one_of_two_devices_is_unplugged_and_comes_back() -> None:
     with two_stands(protocol="csv", rate_hz=100.0) as (first, second):
         settings = PortSettings(first.port, "csv", relative_url=second.port)
