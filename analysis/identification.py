@@ -32,8 +32,8 @@ class Degree(Enum):
 
     IDEAL = "ideal"  # a friction law on an ideal stand leaves nothing but noise
     STAND = "stand"  # a friction law on a stand with the effects in `ModelSelection.parts` does
-    FRICTION = "friction"  # no model does, but independent estimates of f_d agree
-    NONE = "none"  # f_d cannot be told
+    FRICTION = "friction"  # no model does, but independent estimates of f_d agree; of T and n for one mass
+    NONE = "none"  # f_d cannot be told; for one mass, T and n
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,12 +59,15 @@ def describe_verdict(model: ModelSelection, kind: str = "two-mass") -> Message:
     left = message("the residual exceeds the noise")
     if model.residual_share is not None:
         left = message("{percent:.2g} % of the swing is left", percent=100.0 * model.residual_share)
-    if model.degree is Degree.FRICTION:
+    holds = model.degree is Degree.FRICTION
+    if holds and kind == "one-mass":
+        template = N_("no model explains the record ({left}), but T and n hold: halves of the record agree")
+    elif holds:
         template = N_(
             "no model explains the record ({left}), but f_d holds: joint fit and friction of the plate agree"
         )
     elif kind == "two-mass":
         template = N_("no model explains the record ({left}): f_d cannot be told")
     else:
-        template = N_("no model explains the record ({left})")
+        template = N_("no model explains the record ({left}): T and n cannot be told")
     return message(template, left=left)

@@ -178,6 +178,14 @@ def fit(
     return found
 
 
+def fit_places(channel: Channel, found: OneMassFit, places: Sequence[int]) -> OneMassFit:
+    """Least squares over the parameters at `places` to other readings, all else as in `found`."""
+    start = found.parameters
+    if start.is_linear:
+        start = start.from_turning_point_before(float(channel.time_s[0]))
+    return _fit(channel, start, found.order, sorted(places))
+
+
 def within_bounds(found: OneMassFit) -> OneMassFit:
     """Fit again with x_k and n held at 0 where they are negative: neither friction nor damping drives.
 

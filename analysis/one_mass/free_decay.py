@@ -23,6 +23,7 @@ from analysis.one_mass.fit import (
     used_places,
     within_bounds,
 )
+from analysis.one_mass.halves import halves_agree, spread_of_halves
 from analysis.one_mass.parts import add_parts, parts_of
 from analysis.one_mass.residuals import (
     COMPUTED,
@@ -66,6 +67,9 @@ class FreeDecayFit:
     viscous: OneMassFit  # the same readings without Coulomb damping
     verdict: ResidualAssessment
     adequate: bool  # the residuals are noise, and nothing moves after the motion should have ended
+    spread: Floats | None
+    """Of the parameters (10,) between halves of the record, where no model leaves noise; None elsewhere."""
+    holds: bool  # the halves agree, so period and damping hold though the model does not
     unit: str  # of the readings, and of what is left of them
     warnings: list[ResultWarning]
 
@@ -108,7 +112,10 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     quiet = _quiet_after(readings, bounded, step, unit, warnings)
     if not verdict.adequate:
         warnings += _second_mode(bounded, step, unit)
-    return FreeDecayFit(bounded, viscous, verdict, verdict.adequate and quiet, unit, warnings)
+    spread = None if verdict.adequate else spread_of_halves(bounded)
+    holds = quiet and spread is not None and halves_agree(bounded, spread)
+    adequate = verdict.adequate and quiet
+    return FreeDecayFit(bounded, viscous, verdict, adequate, spread, holds, unit, warnings)
 
 
 def _second_mode(found: OneMassFit, step: float, unit: str) -> list[ResultWarning]:

@@ -20,6 +20,7 @@ from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.uncertainty import UncertaintyBudget, numerical_gradient
+from messages.i18n import N_
 from messages.message import message
 
 MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
@@ -135,10 +136,9 @@ def _identification(
     verdict = solution.verdict
     share = residual_share(verdict.rms, solution.fit.channel.value_m)
     if not solution.adequate:
+        template = _HOLDS if solution.holds else _FAILS
         text = message(
-            "one decay with viscous and dry friction leaves {rms} of residual"
-            " ({share_percent} % of the swing) for {noise} of noise, or a pattern in it:"
-            " period and damping may be biased.",
+            template,
             rms=format_with_unit(verdict.rms, solution.unit),
             noise=format_with_unit(verdict.noise, solution.unit),
             share_percent=format_number(100.0 * share, 2),
@@ -149,7 +149,9 @@ def _identification(
     for part in parts:
         size = definition(part.result).format(budget.results[part.result], Place.WINDOW)
         warnings.append(result_warning(part.name, part.text, size=str(size)))
-    degree = (Degree.STAND if parts else Degree.IDEAL) if solution.adequate else Degree.NONE
+    degree = Degree.FRICTION if solution.holds else Degree.NONE
+    if solution.adequate:
+        degree = Degree.STAND if parts else Degree.IDEAL
     return Identification(
         "one-mass",
         budget.results,
@@ -190,6 +192,8 @@ def _uncertainty_budget(
     noise[:-1, :-1] = found.noise_factor * found.covariance
     columns = _sources(found, record)
     columns[BudgetSource.MASS] = np.append(np.zeros(len(point) - 1), deviation)
+    if solution.spread is not None:
+        columns[BudgetSource.MODEL] = np.append(solution.spread, 0.0)
     budget = UncertaintyBudget()
     for name, function in _functions(found, with_mass=mass is not None).items():
         weights = numerical_gradient(function, point)
@@ -296,6 +300,15 @@ def _k(p: Floats) -> float:
     return float(np.hypot(p[2], p[3]))
 
 
+_FAILS: Final = N_(
+    "one decay with viscous and dry friction leaves {rms} of residual ({share_percent} % of the swing) for"
+    " {noise} of noise, or a pattern in it: period and damping may be biased."
+)
+_HOLDS: Final = N_(
+    "one decay with viscous and dry friction leaves {rms} of residual ({share_percent} % of the swing) for"
+    " {noise} of noise, or a pattern in it. Halves of the record agree on period and damping: what they"
+    " differ by is part of the uncertainty."
+)
 _COULOMB: Final = "coulomb_displacement_m"
 _QUANTITIES: Final[dict[str, Callable[[Floats], float]]] = {
     "period_s": _period,

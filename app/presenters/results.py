@@ -98,7 +98,7 @@ def make_result(run: AnalysedRun, true_friction: float | None = None) -> Result:
     """Put an analysed run into words. `true_friction` is f_d of the simulated stand, if it is one."""
     return Result(
         headline=_headline(run),
-        model_status=model_status(run.model),
+        model_status=model_status(run.model, run.kind),
         rows=_rows(run, MAIN),
         fit=_fit(run),
         comparison=_comparison(run, true_friction),
@@ -133,17 +133,28 @@ def make_row(row: QuantityDefinition, quantity: Quantity) -> ResultRow:
     )
 
 
-def model_status(model: ModelSelection | None) -> Chip:
+def model_status(model: ModelSelection | None, kind: str) -> Chip:
     if model is None:
         return Chip(gettext("No motion to fit"), Tone.WARN)
     if model.adequate:
         hint = gettext("What the model leaves over is no more than the gauges' noise.")
         shown = gettext("Model fits, with effects of the stand") if model.parts else gettext("Model fits")
         return Chip(shown, Tone.OK, hint)
+    if kind == "one-mass":
+        return _one_mass_status(model)
     if model.degree is Degree.FRICTION:
         hint = gettext("The record holds more than the model explains, but two estimates of f_d agree.")
         return Chip(gettext("Model does not fit, but f_d holds"), Tone.WARN, hint)
     hint = gettext("The record holds more than the model explains: do not rely on the uncertainty of f_d.")
+    return Chip(gettext("Model does not fit"), Tone.BAD, hint)
+
+
+def _one_mass_status(model: ModelSelection) -> Chip:
+    """Of a decay that the model does not explain."""
+    if model.degree is Degree.FRICTION:
+        hint = gettext("The record holds more than the model explains, but its halves agree on T and n.")
+        return Chip(gettext("Model does not fit, but T and n hold"), Tone.WARN, hint)
+    hint = gettext("The record holds more than the model explains: do not rely on T and n.")
     return Chip(gettext("Model does not fit"), Tone.BAD, hint)
 
 

@@ -116,7 +116,8 @@ def figure_title(title: str, identification: Identification) -> str:
     found, model = identification.results.get("friction_dynamic"), identification.model
     verdict = "model fits" if model and model.adequate else "model does not fit"
     if model and model.degree is Degree.FRICTION:
-        verdict = "model does not fit, $f_d$ holds"
+        what = "$T$ and $n$ hold" if identification.kind == "one-mass" else "$f_d$ holds"
+        verdict = f"model does not fit, {what}"
     if identification.kind == "one-mass":
         shown = [(definition(name), identification.results[name]) for name in _ONE_MASS]
         values = [f"{row.symbol.latex} = {row.format(one, Place.REPORT).in_print}" for row, one in shown]

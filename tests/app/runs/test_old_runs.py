@@ -85,6 +85,12 @@ def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypat
     now = printed(capsys, monkeypatch, "analyze", *runs)
     now += printed(capsys, monkeypatch, "analyze", folder / one_gauge["run"], "--kind", "one-mass")
     # What dry friction of a plate leaves of the decay itself was called a second mode.
+    # What its halves differ by is in the uncertainty since: no model explains that record.
+    for one in (now[-1], one_gauge):
+        one["budget"] = []
+        one["results"] = {
+            name: found["value"] for name, found in one["results"].items() if isinstance(found, dict)
+        }
     one_gauge["warnings"] = [one for one in one_gauge["warnings"] if one["code"] != "second-mode"]
     for one, other in zip(now, [*two_gauges, one_gauge], strict=True):
         one["budget"] = _of_old_results(one, other)
