@@ -54,6 +54,11 @@ def _sinc_corner(order: int) -> float:
     return float(x / np.pi)
 
 
+GAIN_NOT_STATED = 0.003
+"""Relative standard uncertainty of a gain for which none is stated: of a calibration by a dial gauge, as in
+config/gauges.toml."""
+
+
 @dataclass(frozen=True, slots=True)
 class GaugeUncertainty:
     """What is known of one gauge beyond its readings; None means "not stated"."""

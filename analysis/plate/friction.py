@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.laws.parameters import TILT_MAX_RAD
-from analysis.plate.slips import Sliding, Slip, find_slips
+from analysis.plate.slips import Sliding, Slip, find_slips, part_slips
 from analysis.plate.spline import (
     GAIN,
     LAG,
@@ -19,6 +19,7 @@ from analysis.plate.spline import (
     Covariate,
     NormalEquations,
     Readings,
+    inverse,
     normal_equations,
 )
 from analysis.preparation.free_decay import FreeDecay, relative_to_table
@@ -30,6 +31,7 @@ _EDGES_S = (0.005, 0.012, 0.03)
 _EDGE_READINGS = 3
 _FILTER_LAGS = 3.0  # edges behind a filter, over its lag: what is left of a step is less than 5 %
 _MISFIT_SIGMAS = 5.0  # by which chi-square may be too large before edges grow
+_STICKS_MAX = 1 / 3  # share of reversals with a stick: where more contradict, it is something else
 _READINGS_MIN = 50
 _SLIPS_MIN = 3  # scatter between fewer slips is not known
 _FRICTION_UNCERTAINTY_MAX = 0.5  # of a slip, as a share of the median: others tell nothing
@@ -43,11 +45,13 @@ _VARIATION_TYPICAL = 0.2  # of friction over the range of a covariate, where it 
 _LAG_SETTLED_S = 3e-5  # what is left of second order moves u1 by nanometres
 _SLOPE_SIGMAS = 3.0
 _VARYING_MAX = 2  # covariates at once: slips are few
-_EVIDENCE_MIN = 12.0
+_EVIDENCE_MIN = 10.0
 """Fall of -2 ln L for which friction is taken to vary: BIC of 1,000 readings, and three looks."""
 _SCATTERS = (0.0, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2, 6.4e-2, 0.13, 0.26)  # shares of friction
 
 COVARIATES = "sliding velocity", "position", "slid path"
+_TIME = len(COVARIATES)
+"""Place after those of the covariates: friction that changes from slip to slip, and not within."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,7 @@ class PlateFriction:
     scatter: float  # standard deviation of friction between slips beyond noise
     variation: dict[str, Variation]
     """By covariate: per m/s of sliding velocity, per m of position, per m of slid path."""
+    change_per_s: Variation  # from slip to slip
     misfit: float  # chi-square of the readings over its expectation
 
     @property
@@ -115,6 +120,9 @@ def estimate_plate_friction(record: Record, decay: FreeDecay) -> PlateFriction |
         best = fitted
         if best.misfit < 1.0 + _MISFIT_SIGMAS * np.sqrt(2.0 / best.freedom):
             break
+    if best is not None and best.equations.sticks:
+        parted = _fit(sliding, readings, best.edge_s, with_sticks=True)
+        best = best if parted is None or parted.equations.sticks else parted
     found = (
         None
         if best is None
@@ -130,10 +138,17 @@ class _Fitted:
     equations_without_lag: NormalEquations
     lag_s: float
     extents: tuple[float, ...]  # ranges of the covariates
+    edge_s: float
 
     @property
     def sign(self) -> Floats:
         return np.array([slip.sign for slip in self.slips], dtype=np.float64)
+
+    @property
+    def middle_s(self) -> Floats:
+        """Middle of each slip, about their mean."""
+        middle_s = np.array([0.5 * (slip.begin_s + slip.end_s) for slip in self.slips])
+        return np.asarray(middle_s - middle_s.mean())
 
     @property
     def freedom(self) -> int:
@@ -143,7 +158,7 @@ class _Fitted:
     @property
     def misfit(self) -> float:
         """Chi-square over its expectation, with all friction free."""
-        found = _inverse(self.equations.matrix) @ self.equations.right
+        found = inverse(self.equations.matrix) @ self.equations.right
         return (self.equations.squares - float(found @ self.equations.right)) / self.freedom
 
 
@@ -151,17 +166,11 @@ def _slip_friction(equations: NormalEquations, shared: Floats) -> tuple[Floats, 
     """Friction of slips, times sign, less tilt, and its covariance, given the `shared` parameters."""
     k = len(equations.right) - SHARED_COUNT - len(COVARIATES)
     own, common = slice(0, k), slice(k, k + SHARED_COUNT)
-    covariance = _inverse(equations.matrix[own, own])
+    covariance = inverse(equations.matrix[own, own])
     return covariance @ (equations.right[own] - equations.matrix[own, common] @ shared), covariance
 
 
-def _inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive matrix whose rows differ in unit."""
-    size = 1.0 / np.sqrt(np.diag(matrix))
-    return np.asarray(np.linalg.inv(matrix * np.outer(size, size)) * np.outer(size, size))
-
-
-def _fit(sliding: Sliding, readings: Readings, edge_s: float) -> _Fitted | None:
+def _fit(sliding: Sliding, readings: Readings, edge_s: float, *, with_sticks: bool = False) -> _Fitted | None:
     slips = find_slips(sliding, edge_s)
     if len(slips) < _SLIPS_MIN or len({slip.sign for slip in slips}) < 2:
         return None
@@ -174,9 +183,18 @@ def _fit(sliding: Sliding, readings: Readings, edge_s: float) -> _Fitted | None:
     made = [Covariate.of(time_s, value, weight) for value in (speed, sliding.relative.value_m, path)]
     covariates = [covariate for covariate, _ in made]
     lag_s = 0.0
-    equations = without_lag = normal_equations(readings, slips, covariates, lag_s, edge_s)
+    equations = normal_equations(readings, slips, covariates, lag_s, edge_s)
+    allowed = max(1.0, _STICKS_MAX * sum(slip.joins for slip in slips)) if with_sticks else 0.0
+    parted = 0
+    while equations.sticks:
+        parted += 1
+        if parted > allowed:
+            break
+        slips = part_slips(slips, equations.sticks[0], sliding)
+        equations = normal_equations(readings, slips, covariates, lag_s, edge_s)
+    without_lag = equations
     for _ in range(_LAG_STEPS):
-        fitted = _Fitted(slips, equations, without_lag, lag_s, tuple(extent for _, extent in made))
+        fitted = _Fitted(slips, equations, without_lag, lag_s, tuple(extent for _, extent in made), edge_s)
         left_s = float(_pool(fitted, None, ()).shared[LAG])
         if abs(left_s) < _LAG_SETTLED_S:
             break
@@ -206,8 +224,8 @@ def _pool(
 ) -> _Pooled:
     """Mean friction over `weights` and tilt, with friction that varies at random between slips.
 
-    Friction of a slip is the mean, its own deviation, and a slope in each of the `varying` covariates. The
-    variance of the deviations is the likeliest.
+    Friction of a slip is the mean, its own deviation, and a slope in each of the `varying` covariates, of
+    which `_TIME` is one. The variance of the deviations is the likeliest.
     """
     equations = fitted.equations_without_lag if without_lag else fitted.equations
     k, sign, misfit = len(fitted.slips), fitted.sign, max(1.0, fitted.misfit)
@@ -215,9 +233,12 @@ def _pool(
     columns[:k, 0], columns[:k, 1], columns[range(k), range(2, 2 + k)] = sign, -1.0, sign
     columns[range(k, k + SHARED_COUNT), range(2 + k, 2 + k + SHARED_COUNT)] = 1.0
     for place, covariate in enumerate(varying, start=2 + k + SHARED_COUNT):
-        columns[k + SHARED_COUNT + covariate, place] = 1.0
+        if covariate == _TIME:
+            columns[:k, place] = sign * fitted.middle_s
+        else:
+            columns[k + SHARED_COUNT + covariate, place] = 1.0
     normal, right = columns.T @ equations.matrix @ columns / misfit, columns.T @ equations.right / misfit
-    typical = abs(float(_inverse(normal[:1, :1])[0, 0] * right[0]))
+    typical = abs(float(inverse(normal[:1, :1])[0, 0] * right[0]))
     best: tuple[float, float, Floats, Floats] | None = None
     for share in _SCATTERS:
         scatter = max(share, 1e-5) * typical
@@ -225,7 +246,7 @@ def _pool(
         prior[1], prior[2 : 2 + k] = TILT_MAX_RAD**-2, scatter**-2
         prior[2 + k + LAG] = _NO_LAG_S**-2 if without_lag else 0.0
         precision = normal + np.diag(prior)
-        covariance = _inverse(precision)
+        covariance = inverse(precision)
         found = covariance @ right
         determinant = np.linalg.slogdet(precision)[1]
         cost = equations.squares / misfit - float(found @ right) + determinant + 2.0 * k * np.log(scatter)
@@ -291,6 +312,7 @@ def _summarise(
             float(pooled.slopes_deviation[place]) / extent,
             number in varying,
         )
+    rising = _pool(best, path_m, (*varying, _TIME), without_lag=lag_s != best.lag_s)
     equations = best.equations if lag_s == best.lag_s else best.equations_without_lag
     friction, covariance = _slip_friction(equations, chosen.shared)
     return PlateFriction(
@@ -309,6 +331,7 @@ def _summarise(
         path_m=path_m,
         scatter=chosen.scatter,
         variation=variation,
+        change_per_s=Variation(float(rising.slopes[-1]), float(rising.slopes_deviation[-1]), False),
         misfit=best.misfit,
     )
 

@@ -1,6 +1,6 @@
 """Slips of the plate: when it slides, and the reversals that join two slips without a stick."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -83,6 +83,20 @@ def find_slips(sliding: Sliding, edge_s: float) -> list[Slip]:
         slips.append(Slip(readings, begin_s, end_s, int(direction[part[0]]), joins))
         last = number
     return slips
+
+
+def part_slips(slips: list[Slip], number: int, sliding: Sliding) -> list[Slip]:
+    """Slips of which the one of that number does not join the one before, without the readings beside.
+
+    The stick between them is shorter than the window of velocities, and the reversal lies within it.
+    """
+    time_s, parted = sliding.relative.time_s, list(slips)
+    before, after = slips[number - 1], slips[number]
+    is_before = time_s[before.readings] < before.end_s - sliding.half_window_s
+    is_after = time_s[after.readings] >= after.begin_s + sliding.half_window_s
+    parted[number - 1] = replace(before, readings=before.readings[is_before])
+    parted[number] = replace(after, readings=after.readings[is_after], joins=False)
+    return parted
 
 
 def _find_reversal(sliding: Sliding, before: Indices, after: Indices) -> float | None:

@@ -15,14 +15,16 @@ from analysis.arrays import Floats, Indices
 from analysis.plate.slips import Sliding, Slip, slope_half_window_s
 from analysis.preparation.free_decay import FreeDecay
 from analysis.preparation.oscillation import local_slopes
-from analysis.record import Record
+from analysis.record import GAIN_NOT_STATED, Record
 
 _LAG_PRIOR_S = 0.02  # standard uncertainty of the gauges' difference in lag where none is stated
 _LAG_STATED_MIN_S = 1e-5
-_GAIN_PRIOR = 0.003  # standard uncertainty of the gauges' relative gain where none is stated
 _GAIN_STATED_MIN = 1e-6
 _MODEL_ERROR_M = 3e-7  # of times of reversals and smoothed readings: what computed records without noise show
 _TRANSITION_SHARE = 0.4  # of the edges: standard uncertainty of the time that friction takes at a reversal
+_JUMP_SIGMAS = 3.0
+"""From which on the plate must have stuck at a reversal, for milliseconds that its velocity does not show."""
+_ROUNDING = 1e-12  # share of a diagonal element below which rounding decides
 _VARIATION_PRIOR = 1.0  # of friction over the range of a covariate: nothing is known
 
 LAG, GAIN, MOMENT = range(3)
@@ -57,6 +59,9 @@ class Readings:
 
     time_s: Floats
     relative_m: Floats
+    relative_travel_m: Floats
+    """Smoothed, from the first reading on: as a column of the fit, readings would correlate with their own
+    noise in u2."""
     nearest_m: Floats  # gauge 1 at its nearest reading, so that noise stays white, ...
     nearest_s: Floats  # ... and when that was
     table_s: Floats
@@ -77,6 +82,7 @@ class Readings:
         return cls(
             relative.time_s,
             relative.value_m,
+            _integral(relative.time_s, sliding.speed_m_per_s),
             table.value_m[nearest],
             table.time_s[nearest],
             table.time_s,
@@ -107,7 +113,7 @@ def _lag_prior_s(record: Record) -> float:
 
 def _gain_prior(record: Record) -> float:
     stated = [gauge.gain_relative for gauge in (record.table_gauge, record.relative_gauge)]
-    return math.hypot(*(_GAIN_PRIOR if gain is None else max(gain, _GAIN_STATED_MIN) for gain in stated))
+    return math.hypot(*(GAIN_NOT_STATED if gain is None else max(gain, _GAIN_STATED_MIN) for gain in stated))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,6 +125,8 @@ class NormalEquations:
     squares: float  # chi-square where all of them are zero
     reading_count: int
     eliminated: int  # number of lines and reversals
+    sticks: tuple[int, ...]
+    """Numbers of slips that join the one before them against the readings, the clearest first."""
 
 
 def normal_equations(
@@ -131,7 +139,9 @@ def normal_equations(
     k, c = len(slips), len(covariates)
     shared_at, covariates_at, lines_at = k, k + SHARED_COUNT, k + SHARED_COUNT + c
     reversals_at = lines_at + 2 * sum(not slip.joins for slip in slips)
-    size = reversals_at + sum(slip.joins for slip in slips)
+    reversal_count = sum(slip.joins for slip in slips)
+    jumps_at = reversals_at + reversal_count
+    size = jumps_at + reversal_count
     normal, right = np.zeros((size, size)), np.zeros(size)
     parts = [_columns(readings, slip, covariates, lag_s) for slip in slips]
     g = readings.gravity
@@ -142,6 +152,7 @@ def normal_equations(
     for number, (slip, (columns, values)) in enumerate(zip(slips, parts, strict=True)):
         if slip.joins:
             velocity[reversal] = 1.0
+            position[reversal + reversal_count] = 1.0
             position[shared_at + MOMENT] += slip.sign * change
             reversal += 1
         else:
@@ -172,17 +183,40 @@ def normal_equations(
     )
     prior[covariates_at:] = _VARIATION_PRIOR
     normal[range(lines_at), range(lines_at)] += prior**-2
-    kept, lines = slice(0, lines_at), slice(lines_at, size)
-    scale = 1.0 / np.sqrt(np.diag(normal)[lines])
-    inverse = np.linalg.inv(normal[lines, lines] * np.outer(scale, scale)) * np.outer(scale, scale)
-    taken = normal[kept, lines] @ inverse
+    kept, lines = slice(0, lines_at), slice(lines_at, jumps_at)
+    own = inverse(normal[lines, lines])
+    taken = normal[kept, lines] @ own
+    joined = [number for number, slip in enumerate(slips) if slip.joins]
     return NormalEquations(
         normal[kept, kept] - taken @ normal[lines, kept],
         right[kept] - taken @ right[lines],
-        squares - float(right[lines] @ inverse @ right[lines]),
+        squares - float(right[lines] @ own @ right[lines]),
         sum(len(values) for _, values in parts),
-        size - lines_at,
+        jumps_at - lines_at,
+        tuple(joined[jump] for jump in _significant_jumps(normal, right, jumps_at)),
     )
+
+
+def inverse(matrix: Floats) -> Floats:
+    """Inverse of a positive matrix whose rows differ in unit."""
+    size = 1.0 / np.sqrt(np.diag(matrix))
+    return np.asarray(np.linalg.inv(matrix * np.outer(size, size)) * np.outer(size, size))
+
+
+def _significant_jumps(normal: Floats, right: Floats, jumps_at: int) -> list[int]:
+    """Jumps of position, the parameters from `jumps_at` on, without which the readings contradict."""
+    used, others = np.arange(jumps_at), np.arange(jumps_at, len(right))
+    while len(others):
+        cross = normal[np.ix_(others, used)]
+        taken = cross @ inverse(normal[np.ix_(used, used)])
+        diagonal = np.diag(normal)[others]
+        left = np.maximum(diagonal - np.einsum("ij,ij->i", taken, cross), _ROUNDING * diagonal)
+        score = np.abs(right[others] - taken @ right[used]) / np.sqrt(left)
+        worst = int(np.argmax(score))
+        if score[worst] < _JUMP_SIGMAS:
+            break
+        used, others = np.append(used, others[worst]), np.delete(others, worst)
+    return [int(place) - jumps_at for place in used[jumps_at:]]
 
 
 def _columns(
@@ -198,7 +232,8 @@ def _columns(
     ]
     lag = v1 if readings.follows_lag else np.zeros(len(tau))
     u1 = u1 if readings.follows_lag else readings.table_at(slip.readings, 0.0)[0]
-    columns = (np.ones(len(tau)), tau, -0.5 * g * tau**2, lag, relative, *varying)
+    gain = readings.relative_travel_m[slip.readings]
+    columns = (np.ones(len(tau)), tau, -0.5 * g * tau**2, lag, gain, *varying)
     return np.column_stack(columns), u1 + relative
 
 

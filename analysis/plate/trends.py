@@ -13,7 +13,7 @@ from messages.i18n import N_
 from messages.message import Message, message
 
 if TYPE_CHECKING:
-    from analysis.plate.friction import PlateFriction
+    from analysis.plate.friction import PlateFriction, Variation
 
 _PER_M_PER_S = 0.1  # slopes are told per 100 mm/s, about the velocities of the paper's stand
 _POINTS, _MARGIN = 50, 0.05  # of a drawn line, and how far it goes on at both sides
@@ -84,34 +84,26 @@ def friction_by_slip(plate: "PlateFriction", release_s: float) -> FrictionBySlip
 
 def trend_with_velocity(plate: "PlateFriction") -> FrictionTrend:
     """The slope counts changes within slips too (`PlateFriction.variation`)."""
-    return _trend(plate, plate.speed_m_per_s, "sliding velocity")
+    return _trend(plate, plate.speed_m_per_s, plate.variation["sliding velocity"])
 
 
 def trend_with_position(plate: "PlateFriction") -> FrictionTrend:
     """The slope counts changes within slips too (`PlateFriction.variation`)."""
-    return _trend(plate, plate.position_m, "position")
+    return _trend(plate, plate.position_m, plate.variation["position"])
 
 
 def trend_with_time(plate: "PlateFriction", origin_s: float) -> FrictionTrend:
     """Times count from `origin_s`. The slope is that between slips."""
-    return _trend(plate, plate.time_s - origin_s, "")
+    return _trend(plate, plate.time_s - origin_s, plate.change_per_s)
 
 
-def _trend(plate: "PlateFriction", at: Floats, covariate: str) -> FrictionTrend:
+def _trend(plate: "PlateFriction", at: Floats, variation: "Variation") -> FrictionTrend:
     deviation = np.hypot(plate.friction_standard_uncertainty, plate.scatter)
     weight = deviation**-2.0
     centre, level = (float(weight @ value / weight.sum()) for value in (at, plate.friction))
-    if covariate:
-        variation = plate.variation[covariate]
-        slope, uncertainty = variation.per_unit, variation.standard_uncertainty
-    else:
-        away = at - centre
-        square = float(weight @ away**2)
-        slope = float(weight @ (away * (plate.friction - level))) / square
-        left_over = float(weight @ (plate.friction - level - slope * away) ** 2) / max(len(at) - 2, 1)
-        uncertainty = math.sqrt(max(left_over, 1.0) / square)
     level_uncertainty = math.hypot(*(plate.contributions.get(source, 0.0) for source in _OF_SLIPS))
     reach = COVERAGE_FACTOR_95 * deviation
+    slope, uncertainty = variation.per_unit, variation.standard_uncertainty
     return FrictionTrend(at, plate.friction, reach, slope, uncertainty, centre, level, level_uncertainty)
 
 

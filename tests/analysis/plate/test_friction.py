@@ -6,7 +6,7 @@ import pytest
 from analysis.laws.stand_parts import stand_displacements
 from analysis.plate.friction import PlateFriction, estimate_plate_friction
 from analysis.preparation.free_decay import prepare
-from analysis.record import GaugeUncertainty, Record
+from analysis.record import GAIN_NOT_STATED, GaugeUncertainty, Record
 from analysis.synthetic import Truth, simulate_record
 
 _TRUTH = Truth(friction_static=0.12, tilt_rad=1e-3)
@@ -34,17 +34,46 @@ def test_the_lag_of_gauge_2_is_found_and_does_not_bias_friction() -> None:
 
 
 def test_uncertainty_covers() -> None:
-    """Rms of error over uncertainty lies within 0.8 and 1.2, at any noise and rate."""
+    """Rms of error over uncertainty lies within 0.75 and 1.25, at any noise and rate.
+
+    Lag and relative gain of gauge 2 are not stated: they are drawn as the estimate assumes them. Readings as
+    a column of their own fit once biased the gain by their noise, and the error of f_d was 4 uncertainties.
+    """
     random = np.random.default_rng(1)
     scores = []
     for seed in range(36):
         noise_m, rate_hz = [(2e-5, 1000.0), (5e-6, 500.0), (5e-5, 2000.0)][seed % 3]
         truth = _TRUTH.replace(
-            seed=seed, noise_m=noise_m, rate_hz=rate_hz, friction_static=random.uniform(0.1, 0.15)
+            seed=seed,
+            noise_m=noise_m,
+            rate_hz=rate_hz,
+            friction_static=random.uniform(0.1, 0.15),
+            gain_errors=(0.0, GAIN_NOT_STATED * random.normal(scale=2.0**0.5)),
+            lag_s=1e-3 * random.normal(),
         )
         found = _estimate(simulate_record(truth))
         scores.append((found.friction_dynamic - 0.1) / found.standard_uncertainty)
     assert 0.75 < np.sqrt(np.mean(np.square(scores))) < 1.25
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        Truth(friction_static=0.1656),
+        Truth(
+            period_s=0.38,
+            damping_n1_per_s=0.07,
+            plate_mass_kg=32.4,
+            friction_dynamic=0.07,
+            friction_static=0.117,
+        ),
+    ],
+    ids=["1 and 16 ms", "8 ms"],
+)
+def test_short_sticks_at_reversals_do_not_bias_friction(truth: Truth) -> None:
+    """They once passed for reversals without a stick: f_d was 0.5 % low."""
+    found = _estimate(simulate_record(truth.replace(noise_m=1e-6, rate_hz=4000.0)))
+    assert found.friction_dynamic == pytest.approx(truth.friction_dynamic, rel=5e-4)
 
 
 def test_a_record_without_its_start_serves() -> None:
