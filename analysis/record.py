@@ -85,6 +85,21 @@ class GaugeUncertainty:
         share_s = known.corner_relative_uncertainty * known.delay_s if known else 0.0
         return float(np.hypot(self.delay_s_uncertainty, share_s))
 
+    def nonlinearity_at(
+        self, reading_m: NDArray[np.float64], centre_m: float, reach_m: float
+    ) -> NDArray[np.float64]:
+        """Deviation from the calibration line at readings (n,), by one standard uncertainty of it (m).
+
+        The largest deviation is stated, its shape is not. It is taken as the cubic whose best line is zero
+        (T3 of Chebyshev) over the range of the gauge, for which a calibration holds; over `reach_m` on both
+        sides of `centre_m` where no range is stated.
+        """
+        if self.range_m is None:
+            share = (reading_m - centre_m) / max(reach_m, 1e-300)
+        else:
+            share = reading_m / self.range_m
+        return np.asarray(self.nonlinearity_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share))
+
 
 @dataclass(frozen=True, slots=True)
 class StandMasses:

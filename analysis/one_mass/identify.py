@@ -223,10 +223,9 @@ def _sources(found: OneMassFit, record: Record) -> dict[Source, Floats]:
     values = np.array([*parameters, 0.0])
     length_powers = np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -2.0, -2.0, -1.0, -2.0, 0.0])
     time_powers = order * length_powers + np.array([1.0, 0.0, -1.0, -1.0, *[0.0] * 7])
-    away = found.channel.value_m - parameters.offset
-    share = away / max(float(np.abs(away).max()), 1e-300)
-    # A deviation from the calibration line that is odd and vanishes at both ends of the range in use.
-    bend = gauge.nonlinearity_m / math.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+    readings = found.channel.value_m
+    reach = float(np.abs(readings - parameters.offset).max())
+    bend = gauge.nonlinearity_at(readings, parameters.offset, reach)
     return {
         BudgetSource.TIME_BASE: record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
         BudgetSource.GAUGE_1_GAIN: (gauge.gain_relative or 0.0) * length_powers * values,

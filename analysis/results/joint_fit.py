@@ -380,15 +380,10 @@ def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
 
 
 def _shift_by_bend(record: Record, decay: FreeDecay, tail: DampedCosine) -> Floats:
-    """Shift (2,) of n1 and w by one standard uncertainty of the non-linearity of a gauge.
-
-    As for one mass, the deviation from the calibration line is odd and vanishes at both ends of the range in
-    use (T3 of Chebyshev).
-    """
+    """Shift (2,) of n1 and w by one standard uncertainty of the non-linearity of a gauge."""
     tau_s = np.linspace(0.0, tail.end_s - tail.start_s, len(tail.residual_m))
     curve, slopes = damped_cosine(tail.parameters, tau_s)
-    share = (curve - tail.offset_m) / max(0.5 * float(np.ptp(decay.table.value_m)), 1e-300)
-    bend = record.table_gauge.nonlinearity_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+    bend = record.table_gauge.nonlinearity_at(curve, tail.offset_m, 0.5 * range_m(decay.table.value_m))
     return np.asarray(np.linalg.solve(slopes @ slopes.T, slopes @ bend)[:2])
 
 
