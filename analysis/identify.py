@@ -1,5 +1,6 @@
 """Identification of friction from a record, with its uncertainty and verdict."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ from analysis.fitting.search import (
     initial_points,
     may_be_friction,
 )
-from analysis.fitting.stand_search import StandFit, StandSearch
+from analysis.fitting.stand_search import PROMISE_MIN, MissingEffect, StandFit, StandSearch
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import (
@@ -49,7 +50,7 @@ from messages.message import message
 
 _EVIDENCE_MIN = 10.0
 """Fall of the BIC below which a friction law on an ideal stand is preferred to effects of the stand."""
-_CERTAIN_MIN = 30.0
+_CERTAIN_MIN = 20.0
 """Rise of the BIC without an effect from which on it is named: others that may take its place explain as much
 but for some ten."""
 _DOMINANT_SHARE = 0.2
@@ -123,21 +124,33 @@ def _identify(
 
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
+    likeliest = min(fits, key=lambda fit: fit.bic)
+    stand_search: StandSearch | None = None
     stand: StandFit | None = None
-    if model == "auto" and may_be_friction(problem, fits) and _may_be_stand(search, decay, fits):
+    missing: list[MissingEffect] = []
+    if model == "auto" and may_be_friction(problem, fits):
+        stand_search = _stand_search(search, decay, fits)
+        missing = _missing_effects(stand_search, decay, likeliest, fits)
         report(0.7, "looking for effects of the stand")
-        stand = _fit_stand(_stand_search(search, decay, fits), decay, fits, start)
-        if _may_be_other_law(stand, decay):
+        if not _is_adequate(problem, decay, fits):
+            stand = _fit_stand(stand_search, decay, fits, start)
+        elif any(each.promise > PROMISE_MIN for each in missing):
+            stand = stand_search.extend(likeliest)
+        if stand is not None and _may_be_other_law(stand, decay):
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
                 report(0.75, f"fitting {law.name}")
-                fits.append(search.fit_fallback(law, widest))
+                fallback = search.fit_fallback(law, widest)
+                fits += [fallback] if _is_adequate(problem, decay, [fallback]) else []
 
     report(0.8, "uncertainty")
-    if stand is not None and _explains_more(stand, decay, fits):
+    if stand_search is not None and stand is not None and _explains_more(stand, decay, fits):
         joint = joint_fit.choose_stand(record, decay, stand.fit, stand.problem, fits)
+        missing = _missing_effects(stand_search, decay, stand.fit, [stand.fit])
     else:
         joint = joint_fit.choose_law(record, decay, problem, fits)
+        if stand_search is not None and joint.chosen is not likeliest:
+            missing = _missing_effects(stand_search, decay, joint.chosen, [joint.chosen])
     adequate = joint.selection.adequate
     slip_end = fitted_quantities.find_slip_end(joint)
     slip_ended = slip_end is not None or (decay.slip_end_s is not None and not adequate)
@@ -161,7 +174,12 @@ def _identify(
     fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
     joint = replace(joint, selection=joint.selection.with_friction(fitted_friction))
     joint, verdict_warnings = judge(
-        joint, plate, budget, min(fits, key=lambda fit: fit.bic), law_is_given=model != "auto"
+        joint,
+        plate,
+        budget,
+        min(fits, key=lambda fit: fit.bic),
+        _spread_of_missing(missing, stand, joint),
+        law_is_given=model != "auto",
     )
     warnings = [
         *verdict_warnings,
@@ -171,7 +189,8 @@ def _identify(
         *diagnose(_certain_effects(stand, joint, fits), budget.results),
         *joint_fit.identifiability_warnings(joint.chosen, joint.uncertainty, slip_ended=slip_ended),
         *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
-        *([] if adequate else [joint_fit.inadequate_warning(joint.selection), *mass_warnings(joint)]),
+        *([] if adequate else [joint_fit.inadequate_warning(joint.selection)]),
+        *([] if adequate or joint.selection.parts else mass_warnings(joint)),
         *([] if model == "auto" else _needless_static(search, joint.chosen, minima)),
     ]
     drawn = None
@@ -234,12 +253,13 @@ def _is_adequate(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool
     return joint_fit.assess_model(problem, best, fits, counts, decay.period_s).adequate
 
 
-def _may_be_stand(search: Search, decay: FreeDecay, fits: list[Fit]) -> bool:
-    """Whether friction laws leave more than noise, or something that an effect of the stand explains."""
-    if not _is_adequate(search.problem, decay, fits):
-        return True
-    best = min(fits, key=lambda fit: fit.bic)
-    return min(decay.noise_m) > INTEGRATION_ERROR_M and _stand_search(search, decay, fits).shows_effects(best)
+def _missing_effects(
+    search: StandSearch, decay: FreeDecay, chosen: Fit, fits: list[Fit]
+) -> list[MissingEffect]:
+    """Effects of the stand that a fit does without which leaves nothing but noise."""
+    if min(decay.noise_m) <= INTEGRATION_ERROR_M or not _is_adequate(search.problem, decay, fits):
+        return []
+    return search.missing_effects(chosen)
 
 
 def _stand_search(search: Search, decay: FreeDecay, fits: list[Fit]) -> StandSearch:
@@ -284,6 +304,16 @@ def _explains_more(stand: StandFit, decay: FreeDecay, fits: list[Fit]) -> bool:
 def _excess(fit: Fit, problem: FitProblem) -> float:
     """Chi-square beyond that of the noise."""
     return fit.chi_square - problem.sample_count
+
+
+def _spread_of_missing(missing: list[MissingEffect], stand: StandFit | None, joint: JointFit) -> float:
+    """Standard deviation of f_d between the chosen model and others that the record leaves possible."""
+    weights, shifts = [each.weight for each in missing], [each.friction_shift for each in missing]
+    if stand is not None and joint.chosen is stand.fit:
+        weights += [math.exp(-0.5 * max(rise, 0.0)) for rise, _ in stand.rivals]
+        shifts += [friction - stand.friction for _, friction in stand.rivals]
+    total = 1.0 + sum(weights)
+    return math.sqrt(sum(weight * shift**2 for weight, shift in zip(weights, shifts, strict=True)) / total)
 
 
 def _certain_effects(stand: StandFit | None, joint: JointFit, fits: list[Fit]) -> tuple[StandEffect, ...]:

@@ -10,6 +10,7 @@ EFFECT_TITLES = {
     "release-shape": N_("an uneven release"),
     "release-step": N_("a release in two steps"),
     "release-velocity": N_("a table that moved at the release"),
+    "hold-creep": N_("a pull that went on until the release"),
     "gauge-lag": N_("a lag of gauge 2"),
     "gauge-ratio": N_("gauges of different gain"),
     "stand-friction": N_("dry friction of its own"),

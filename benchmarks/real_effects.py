@@ -127,7 +127,7 @@ def none(scene: Scene, _: float, __: Rng) -> Scene:
 
 
 RAMP = frozenset({"release-ramp", "release-shape", "release-step"})
-KICK = frozenset({"release-velocity"})
+KICK = RAMP | {"release-velocity", "hold-creep"}  # to first order a push back is a slow release
 FILTER = frozenset({"filter", "filter-damping"})
 LAG = FILTER | {"gauge-lag", "gauge-2-filter"}
 MODE = frozenset({"second-mode", "base"})

@@ -12,7 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.problem import FitProblem, GaussNewton, Minimum, QuadraticModel, covariance
+from analysis.fitting.problem import (
+    FitProblem,
+    GaussNewton,
+    Minimum,
+    QuadraticModel,
+    covariance,
+    project_to_bounds,
+)
 from analysis.fitting.search import Fit, Search, fit_at_minimum
 from analysis.laws.catalogue import PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
@@ -24,6 +31,7 @@ from analysis.laws.stand_parts import (
     StandModel,
     compose,
     extended_point,
+    motion_count,
 )
 from analysis.motion.stand_motion import INTEGRATION_ERROR_M, STAND_PARAMETER_COUNT, StandParameter
 from analysis.preparation.channels import Channel
@@ -39,11 +47,20 @@ _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
 _BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
 _MODE_DAMPING = 0.01  # damping ratio of a bolted joint
 _STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
-_MASSES = [Parameter.TABLE_MASS, Parameter.PLATE_MASS]
-_SECOND_ORDER = (StandParameter.MODE_DAMPING,)  # without effect to first order
-_EFFORT_MAX = 40_000.0
-"""Periods of motion that are simulated before a search ends with what it has: 1 s of a core."""
-_PROMISE_MIN = 10.0
+_MASSES = (Parameter.TABLE_MASS, Parameter.PLATE_MASS)
+_BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
+_SECOND_ORDER = (StandParameter.MODE_DAMPING, StandParameter.BASE_DAMPING)  # without effect to first order
+_EFFORT_MAX = 1.5e6
+"""Steps of integration after which a search adds no effect and follows only the best: 1 s of a core."""
+_STEPS_A_PERIOD = 75.0  # of motions with two slips a period ...
+_STEPS_A_CYCLE = 20.0  # ... and of a second oscillator
+_READINGS_MISSING = 12_000  # a channel in which effects are looked for that a fit may miss
+_PRIOR_ODDS = 0.01
+"""Of each effect. With it intervals of clean records widen by 3 % (median of 25), with 0.05 by 8 %."""
+_LOG_WEIGHT_MAX = 50.0  # more is certain
+_BASE_HARMONIC = 3.5  # frequency over the first of a base that may be missing; its shift hardly depends on it
+_RIVAL_BIC = 20.0  # rise above which another model does not bear on f_d: odds of 1 to 20,000
+PROMISE_MIN = 10.0
 """Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
 _STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
@@ -52,7 +69,7 @@ _EXPLAINED_SHARE_MIN = 0.2
 """Share of what is not explained by which an effect lowers the BIC at the least: one of four does, and an
 effect that does less is not what is wrong with the record."""
 _TAIL_PERIODS = 8.0  # of the stick tail in which effects are looked for
-_FOLLOWED_BIC = 2000.0  # above twice the best: sets farther off are given up
+_FOLLOWED_BIC = 100.0  # above one and a half times the best: sets farther off are given up
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
@@ -72,6 +89,35 @@ class StandFit:
     problem: FitProblem
     evidence: dict[str, float]
     """Rise of the BIC without each of the effects that stands on its own, by name."""
+    friction: float
+    """f_d, or its mean over the slid path where it varies."""
+    rivals: list[tuple[float, float]]
+    """Rise of the BIC and the same friction of other sets of effects."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MissingEffect:
+    """An effect that a fit does without, as far as a motion that is linear about the fit tells."""
+
+    effect: StandEffect
+    fall: float  # of chi-square with it
+    promise: float  # fall of the BIC
+    friction_shift: float  # of f_d, or of its mean over the slid path
+
+    @property
+    def weight(self) -> float:
+        """Odds of the effect: Akaike's weight (Burnham and Anderson, 2002) times `_PRIOR_ODDS`."""
+        count = len(self.effect.own) + len(self.effect.shared)
+        return _PRIOR_ODDS * float(np.exp(min(0.5 * self.fall - count, _LOG_WEIGHT_MAX)))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _LinearStep:
+    """Minimum of a motion that is linear about a trial, with one effect more."""
+
+    minimum: Floats
+    fall: float  # of chi-square
+    starts: list[Floats]  # to begin its fit from
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,25 +148,47 @@ class StandSearch:
         self._law, self._period_s, self._slip_end_s = law, search.period_s, search.slip_end_s
         self._release_s = ideal.value(Parameter.RELEASE)
         self.problem = extended_problem(search.problem)
-        self._informed = _with_wide_priors(extended_problem(search.informed_problem))
+        self._searched = _with_known_masses(self.problem)
+        self._informed = _with_wide_priors(_with_known_masses(extended_problem(search.informed_problem)))
         self._left_by_ideal = [Channel(search.problem.table.time_s, ideal.table_residual_m)]
         if tail is not None:
             time_s = np.linspace(tail.start_s, tail.end_s, len(tail.residual_m))
             self._left_by_ideal.append(Channel(time_s, tail.residual_m))
-        self._effort = 0.0  # simulated periods of all motions so far
+        self._effort = 0.0  # steps of integration so far
+        self._finished: tuple[_Trial, Fit] | None = None
 
-    def shows_effects(self, ideal: Fit) -> bool:
-        """Whether an effect would lower the BIC of a fit on an ideal stand that leaves nothing but noise.
+    def missing_effects(self, fit: Fit) -> list[MissingEffect]:
+        """Effects that would lower the chi-square of a fit that leaves nothing but noise, each by itself.
 
-        Tests of size and colour of the residual let smooth deviations through that a score test sees.
+        Tests of size and colour of the residual let smooth deviations through that this score test sees.
         """
-        window = self._whole().decimated(_READINGS, self._slip_end_s)
-        model = compose(ideal.law, ())
-        minimum = Minimum(extended_point(ideal.parameters), _NOTHING, 0, converged=True)
+        window = self._whole().decimated(_READINGS_MISSING, self._slip_end_s)
+        model = fit.law if isinstance(fit.law, StandModel) else compose(fit.law, ())
+        point = fit.parameters if model is fit.law else extended_point(fit.parameters)
+        minimum = Minimum(point, _NOTHING, 0, converged=True)
         trial = _Trial(model, minimum, 0.0)
-        candidates = [effect for effect in EFFECTS if not effect.needs and effect is not STATIC_FRICTION]
-        linear = [effect for effect in candidates if not set(effect.own) & set(_FREQUENCIES)]
-        return any(self._linear_points(window, trial, linear)[0].values())
+        candidates = [
+            effect for effect in self._candidates(trial) if not effect.needs and effect is not STATIC_FRICTION
+        ]
+        frequencies_hz = {
+            StandParameter.BASE_FREQUENCY: _BASE_HARMONIC / self._period_s,
+            StandParameter.MODE_FREQUENCY: next(iter(self._lines(window, trial)), 0.0),
+        }
+        friction = self._friction(window, model, point)
+        missing = []
+        for name, step in self._linear_steps(window, trial, candidates, frequencies_hz).items():
+            effect = next(effect for effect in candidates if effect.name == name)
+            extended = compose(model.law, (*model.effects, effect))
+            shift = self._friction(window, extended, step.minimum) - friction
+            missing.append(MissingEffect(effect, step.fall, step.fall - self._price(window, effect), shift))
+        return missing
+
+    def _friction(self, window: FitProblem, model: StandModel, point: Floats) -> float:
+        """f_d, or its mean over the slid path where it varies."""
+        if not (model.law.own or any(effect.varies_friction for effect in model.effects)):
+            return float(point[Parameter.FRICTION_DYNAMIC])
+        duration_s = float(window.table.time_s[-1] - point[Parameter.RELEASE])
+        return model.mean_friction(project_to_bounds(point, model), duration_s)
 
     def fit(self, starts: list[Floats], is_adequate: Callable[[Fit], bool]) -> StandFit:
         """Fit the law with the effects that the record shows, from points (p,) of an ideal stand."""
@@ -132,17 +200,41 @@ class StandSearch:
             trials = self._continue(window, trials)
             trials = self._extend_while(window, trials, _explains)
         window = self._whole().decimated(_READINGS_WHOLE, self._slip_end_s)
-        trials = self._continue(window, trials)[:1]
-        trials = self._extend_while(window, trials, lambda _window, best: is_adequate(self._finish(best)))
-        trial, evidence = self._without_needless(window, trials[0])
+        followed = self._continue(window, trials)
+        trials = self._extend_while(
+            window, followed[:1], lambda _window, best: is_adequate(self._finish(best))
+        )
+        return self._stand_fit(window, trials[0], [*trials, *followed])
+
+    def extend(self, fit: Fit) -> StandFit:
+        """Add effects to a fit on an ideal stand that leaves hardly more than noise."""
+        window = self._whole().decimated(_READINGS_MISSING, self._slip_end_s)
+        effects = (STATIC_FRICTION,) if fit.law.has_static_friction else ()
+        first = self._trial(window, effects, extended_point(fit.parameters))
+        trials = self._extend_while(window, [first], lambda _window, _best: False)
+        return self._stand_fit(window, trials[0], trials)
+
+    def _stand_fit(self, window: FitProblem, best: _Trial, others: list[_Trial]) -> StandFit:
+        """The best trial without needless effects, fitted to all readings, and what the others say of f_d."""
+        trial, evidence = self._without_needless(window, best)
+        rivals = [
+            (other.bic - trial.bic, self._friction(window, other.model, other.point))
+            for other in others
+            if other.names != trial.names and other.bic < trial.bic + _RIVAL_BIC
+        ]
         fit = self._finish(trial)
-        return StandFit(fit, _open_shared(self.problem, fit.law), evidence)
+        friction = self._friction(window, trial.model, trial.point)
+        return StandFit(fit, _open_shared(self.problem, fit.law), evidence, friction, rivals)
 
     def _continue(self, window: FitProblem, trials: list[_Trial]) -> list[_Trial]:
         """Refit trials of a shorter window, also with an f_s, which matters only once a stick has ended."""
-        found = []
+        found: list[_Trial] = []
         for trial in trials:
+            if found and self._is_spent:
+                break
             found.append(self._trial(window, trial.model.effects, trial.point))
+            if self._is_spent:
+                break
             if STATIC_FRICTION not in trial.model.effects and not _explains(window, found[-1]):
                 effects = (*trial.model.effects, STATIC_FRICTION)
                 starts = self._starts(window, STATIC_FRICTION, trial)
@@ -157,7 +249,7 @@ class StandSearch:
         while not is_enough(window, trials[0]):
             best = trials[0]
             for trial in trials[:]:
-                if self._effort > _EFFORT_MAX:
+                if self._is_spent:
                     return trials
                 if trial.names not in extended and len(trial.model.effects) < _EFFECTS_MOST:
                     extended.add(trial.names)
@@ -174,27 +266,33 @@ class StandSearch:
         model = compose(self._law, effects)
         opened = _open_shared(window, model)
         minimum = opened.minimise(point, model, steps)
-        self._effort += minimum.steps * len(opened.free_parameters(model)) * self._periods(window)
+        motions = minimum.steps * (1 + motion_count(opened.free_parameters(model)))
+        self._effort += motions * self._steps(window, minimum.parameters)
         parameter_count = len(opened.model_parameters(model))
         bic = minimum.cost + parameter_count * float(np.log(opened.sample_count))
         return _Trial(model, minimum, bic + sum(effect.rarity for effect in effects))
 
     def _extensions(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
         """The trial with one effect more, of those that promise most."""
-        present = trial.names
-        candidates = [
-            effect
-            for effect in EFFECTS
-            if effect.name not in present
-            and (not effect.needs or effect.needs in present)
-            and not set(effect.shared) & set(self._law.extra)
-        ]
         found = []
-        for effect, start in self._promising(window, trial, candidates):
+        for effect, start in self._promising(window, trial, self._candidates(trial)):
+            if self._is_spent:
+                break
             better = self._trial(window, (*trial.model.effects, effect), start, _STEPS_TRIAL)
             if better.bic < trial.bic - _EVIDENCE_MIN:
                 found.append(better)
         return found
+
+    def _candidates(self, trial: _Trial) -> list[StandEffect]:
+        """Effects that a model may take beside its own."""
+        present = trial.names
+        return [
+            effect
+            for effect in EFFECTS
+            if effect.name not in present
+            and (not effect.needs or effect.needs in present)
+            and not set(effect.shared) & set(trial.model.law.extra)
+        ]
 
     def _promising(
         self, window: FitProblem, trial: _Trial, candidates: list[StandEffect]
@@ -202,45 +300,58 @@ class StandSearch:
         """Effects that lower the BIC, the best first, with the point of each from which to fit."""
         ranked: list[tuple[float, StandEffect, Floats]] = []
         linear = [effect for effect in candidates if not set(effect.own) & set(_FREQUENCIES)]
-        moved, promises = self._linear_points(window, trial, linear)
+        steps = self._linear_steps(window, trial, linear)
         for effect in candidates:
             if effect in linear:
-                starts = moved[effect.name] + self._starts(window, effect, trial)
+                starts = steps[effect.name].starts + self._starts(window, effect, trial)
             else:
+                place = next(place for place in effect.own if place in _FREQUENCIES)
                 starts = [
-                    point
+                    start
                     for frequency_hz in self._frequencies(window, trial, effect)
-                    for point in self._linear_points(window, trial, [effect], frequency_hz)[0][effect.name]
+                    for step in self._linear_steps(window, trial, [effect], {place: frequency_hz}).values()
+                    for start in step.starts
                 ]
             if starts:
                 model = compose(self._law, (*trial.model.effects, effect))
                 costs = [_open_shared(window, model).cost(start, model) for start in starts]
-                self._effort += len(starts) * self._periods(window)
+                self._effort += sum(self._steps(window, start) for start in starts)
                 least = int(np.argmin(costs))
                 ranked.append((costs[least] + self._price(window, effect), effect, starts[least]))
         ranked.sort(key=lambda one: one[0])
         best = [effect for _, effect, _ in ranked[:_TRIED]]
-        best += sorted(linear, key=lambda effect: -promises[effect.name])[:_TRIED_BY_PROMISE]
+        promising = sorted(linear, key=lambda effect: self._price(window, effect) - steps[effect.name].fall)
+        best += promising[:_TRIED_BY_PROMISE]
         return [(effect, start) for _, effect, start in ranked if effect in best]
 
     def _frequencies(self, window: FitProblem, trial: _Trial, effect: StandEffect) -> list[float]:
         """Frequencies (Hz) that the second oscillator of an effect may have."""
         if StandParameter.MODE_FREQUENCY not in effect.own:
             return [harmonic / self._period_s for harmonic in _BASE_HARMONICS]
-        residual, _ = window.residuals(trial.point, trial.model)
-        found = _strongest_frequencies(
-            Channel(window.table.time_s, residual), self._release_s, self._period_s, _LINES
-        )
+        found = self._lines(window, trial)
         for channel in self._left_by_ideal:
             found += _strongest_frequencies(channel, self._release_s, self._period_s, 1)
         return list(dict.fromkeys(round(frequency_hz, 1) for frequency_hz in found))
+
+    def _lines(self, window: FitProblem, trial: _Trial) -> list[float]:
+        """Frequencies (Hz) of the strongest lines in what a trial leaves of gauge 1."""
+        residual, _ = window.residuals(trial.point, trial.model)
+        channel = Channel(window.table.time_s, residual)
+        return _strongest_frequencies(channel, self._release_s, self._period_s, _LINES)
 
     def _price(self, window: FitProblem, effect: StandEffect) -> float:
         count = len(effect.own) + len(effect.shared)
         return count * float(np.log(window.sample_count)) + effect.rarity
 
-    def _periods(self, window: FitProblem) -> float:
-        return float(window.table.time_s[-1] - self._release_s) / self._period_s
+    @property
+    def _is_spent(self) -> bool:
+        return self._effort > _EFFORT_MAX
+
+    def _steps(self, window: FitProblem, point: Floats) -> float:
+        """Steps of the integration of one motion in a window."""
+        fastest_hz = max(float(point[_PLACES[place]]) for place in _FREQUENCIES)
+        steps_per_s = max(_STEPS_A_PERIOD / self._period_s, _STEPS_A_CYCLE * fastest_hz)
+        return float(window.table.time_s[-1] - self._release_s) * steps_per_s
 
     def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
         """Points to begin the fit of one effect more from, where a linear step may lead elsewhere."""
@@ -250,7 +361,7 @@ class StandSearch:
             points = np.tile(point, (len(_STATIC_RATIOS), 1))
             points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * point[Parameter.FRICTION_DYNAMIC]
             costs = [window.chi_square(one, model) for one in points]
-            self._effort += len(points) * self._periods(window)
+            self._effort += len(points) * self._steps(window, point)
             return [points[int(np.argmin(costs))]]
         starts = []
         for probe in effect.probes:
@@ -275,28 +386,36 @@ class StandSearch:
                 evidence[effect.name] = without.bic - trial.bic
         return trial, evidence
 
-    def _linear_points(
-        self, window: FitProblem, trial: _Trial, candidates: list[StandEffect], frequency_hz: float = 0.0
-    ) -> tuple[dict[str, list[Floats]], dict[str, float]]:
-        """Minimum of a linear motion with each of the effects that lower the BIC, and fall of the BIC.
+    def _linear_steps(
+        self,
+        window: FitProblem,
+        trial: _Trial,
+        candidates: list[StandEffect],
+        frequencies_hz: dict[StandParameter, float] | None = None,
+    ) -> dict[str, _LinearStep]:
+        """Step of a linear motion with each of the effects, by its name; within its bounds.
 
         What is stated of lag and gain of gauge 2 holds for all effects but those that free them.
         """
         point = trial.point.copy()
-        fixed = [_PLACES[place] for effect in candidates for place in effect.own if place in _FREQUENCIES]
-        point[fixed] = frequency_hz
-        if _PLACES[StandParameter.MODE_FREQUENCY] in fixed:
+        own_places = {place for effect in candidates for place in effect.own}
+        for place in own_places.intersection(_FREQUENCIES):
+            point[_PLACES[place]] = (frequencies_hz or {})[place]
+        if StandParameter.MODE_FREQUENCY in own_places:
             point[_PLACES[StandParameter.MODE_DAMPING]] = _MODE_DAMPING
-        model = compose(self._law, (*trial.model.effects, *candidates))
+        if StandParameter.BASE_FREQUENCY in own_places:
+            point[_PLACES[StandParameter.BASE_DAMPING]] = _BASE_DAMPING
+        law, effects = trial.model.law, trial.model.effects
+        model = compose(law, (*effects, *candidates))
         free = window.free_parameters(model)
-        free = free[~np.isin(free, [*fixed, *(_PLACES[place] for place in _SECOND_ORDER)])]
         base = set(window.free_parameters(trial.model).tolist())
+        fixed = [_PLACES[place] for place in (*_FREQUENCIES, *_SECOND_ORDER) if place in own_places]
+        free = free[~np.isin(free, fixed)]
         quadratic = GaussNewton(window, model, free).evaluate(point)
-        self._effort += len(free) * self._periods(window)
+        self._effort += (1 + motion_count(free)) * self._steps(window, point)
         present = np.array([place in base for place in free.tolist()])
         away, stated = window.prior_mean[free] - point[free], window.prior_weights(free)
-        points: dict[str, list[Floats]] = {}
-        promises: dict[str, float] = {}
+        steps: dict[str, _LinearStep] = {}
         for effect in candidates:
             mine = np.isin(free, [*(_PLACES[place] for place in effect.own), *effect.shared])
             own, freed = present & ~mine, stated[mine]
@@ -305,32 +424,38 @@ class StandSearch:
             left = quadratic.normal[np.ix_(mine, mine)] - np.diag(freed) - cross @ inverse @ cross.T
             pull = quadratic.descent[mine] - freed * away[mine] - cross @ inverse @ quadratic.descent[own]
             amount = np.linalg.pinv(left, rcond=1e-9, hermitian=True) @ pull
-            points[effect.name] = []
-            fall = float(pull @ amount) + float(freed @ away[mine] ** 2)
-            promises[effect.name] = fall - self._price(window, effect)
-            if promises[effect.name] < _PROMISE_MIN:
-                continue
-            extended = compose(self._law, (*trial.model.effects, effect))
+            extended = compose(law, (*effects, effect))
             opened = _open_shared(window, extended)
+            reached = []
             for share in _STEP_SHARES:
                 moved = point.copy()
                 moved[free[mine]] += share * amount
                 extended.apply_bounds(moved)
                 taken = moved[free[mine]] - point[free[mine]]
                 moved[free[own]] += inverse @ (quadratic.descent[own] - cross.T @ taken)
-                moved = opened.project(moved, extended, free)
-                if moved[_MASSES].min() > 0.0:
-                    points[effect.name].append(moved)
-        return points, promises
+                gain = 2.0 * pull @ taken - taken @ left @ taken + freed @ away[mine] ** 2
+                reached.append((moved, float(gain)))
+            minimum, fall = reached[0]
+            starts = []
+            if fall - self._price(window, effect) > PROMISE_MIN:
+                starts = [opened.project(moved, extended, free) for moved, _ in reached]
+            starts = [start for start in starts if start[list(_MASSES)].min() > 0.0]
+            steps[effect.name] = _LinearStep(minimum, fall, starts)
+        return steps
 
     def _finish(self, trial: _Trial) -> Fit:
+        """The trial fitted to all readings."""
+        if self._finished is not None and self._finished[0] is trial:
+            return self._finished[1]
         problem = _open_shared(self.problem, trial.model)
         last = problem.minimise(trial.point, trial.model, _STEPS_LAST)
-        return fit_at_minimum(problem, trial.model, last)
+        fit = fit_at_minimum(problem, trial.model, last)
+        self._finished = trial, fit
+        return fit
 
     def _whole(self) -> FitProblem:
         """The record without most of its tail."""
-        return self.problem.before(self._slip_end_s + _TAIL_PERIODS * self._period_s)
+        return self._searched.before(self._slip_end_s + _TAIL_PERIODS * self._period_s)
 
     def _window(self, periods: float) -> FitProblem:
         end_s = self._release_s + periods * self._period_s
@@ -360,6 +485,13 @@ def _open_shared(problem: FitProblem, model: FrictionLaw) -> FitProblem:
     for place in (Parameter.LAG, Parameter.RELATIVE_GAIN):
         if place in model.extra:
             problem = problem.with_prior(place, 0.0, np.inf)
+    return problem
+
+
+def _with_known_masses(problem: FitProblem) -> FitProblem:
+    """The problem with masses as stated: their uncertainties move no effect, and cost a motion each."""
+    for place in _MASSES:
+        problem = problem.with_prior(place, float(problem.prior_mean[place]), 0.0)
     return problem
 
 

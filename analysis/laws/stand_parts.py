@@ -14,7 +14,7 @@ from analysis.laws.catalogue import PARAMETER_COUNT, law_by_name
 from analysis.laws.closed_form import GAUGE_1, GAUGE_2_BASE
 from analysis.laws.coulomb import COULOMB
 from analysis.laws.law import FrictionLaw, Gauge, IntegratedSolver, MotionSolver
-from analysis.laws.parameters import MOTION_PARAMETER_COUNT, OwnParameter, Parameter
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT, SHARED_PARAMETER_COUNT, OwnParameter, Parameter
 from analysis.motion.events import (
     DURATION_MIN_S,
     FRICTION_DYNAMIC,
@@ -68,6 +68,8 @@ STAND_PARAMETERS = {
     StandParameter.CROSS_TALK_1: OwnParameter("cross_talk_1", "1", 0.0, -0.2, 0.2),
     StandParameter.BASE_COMPLIANCE: OwnParameter("base_compliance", "1", 0.0, 0.0, 0.3),
     StandParameter.BASE_FREQUENCY: OwnParameter("base_frequency_hz", "Hz", 0.0, 2.0, 100.0),
+    StandParameter.BASE_DAMPING: OwnParameter("base_damping", "1", 0.0, 0.0, 0.3),
+    StandParameter.HOLD_CREEP: OwnParameter("hold_creep_m_per_s", "m/s", 0.0, -0.01, 0.01),
     StandParameter.FILTER_DAMPING: OwnParameter("filter_damping", "1", 0.0, -0.4, 1.0),
 }
 """Names, units and bounds; at zero the stand is ideal. The bounds are beyond what a stand that still serves
@@ -88,6 +90,9 @@ class StandEffect:
     probes: tuple[tuple[float, ...], ...] = ()
     needs: str = ""  # name of the effect that this one refines
     bends_tail: bool = False  # whether the stick tail is no damped cosine with it
+    misleads_plate: bool = (
+        False  # whether gauges do not show the table's own motion, which the plate alone needs
+    )
     varies_friction: bool = False  # whether f_d is a mean over the slid path with it
     rarity: float = 0.0
     """Added to the BIC: what stands rarely show must explain more than what they often show."""
@@ -101,6 +106,7 @@ EFFECTS = (
     StandEffect("release-shape", (StandParameter.RELEASE_SHAPE,), needs="release-ramp", rarity=_RARE),
     StandEffect("release-step", (StandParameter.RELEASE_STEP,), needs="release-ramp", rarity=_RARE),
     StandEffect("release-velocity", (StandParameter.RELEASE_VELOCITY,), rarity=_RARE),
+    StandEffect("hold-creep", (StandParameter.HOLD_CREEP,), rarity=_RARE),
     StandEffect("gauge-lag", shared=(Parameter.LAG,)),
     StandEffect("gauge-ratio", shared=(Parameter.RELATIVE_GAIN,), rarity=_RARE),
     StandEffect("stand-friction", (StandParameter.STAND_FRICTION,), probes=((3e-5,),), bends_tail=True),
@@ -117,18 +123,30 @@ EFFECTS = (
     ),
     StandEffect(
         "base",
-        (StandParameter.BASE_COMPLIANCE, StandParameter.BASE_FREQUENCY),
+        (StandParameter.BASE_COMPLIANCE, StandParameter.BASE_FREQUENCY, StandParameter.BASE_DAMPING),
         bends_tail=True,
+        misleads_plate=True,
     ),
     StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE, varies_friction=True),
     StandEffect("gradient", (StandParameter.GRADIENT,), varies_friction=True),
     StandEffect("wear", (StandParameter.WEAR,), varies_friction=True),
-    StandEffect("filter", (StandParameter.FILTER,)),
-    StandEffect("filter-damping", (StandParameter.FILTER_DAMPING,), needs="filter", rarity=_RARE),
-    StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE),
-    StandEffect("gauge-1-bend", (StandParameter.SQUARE_1, StandParameter.BEND_1), rarity=_RARE),
-    StandEffect("gauge-2-bend", (StandParameter.SQUARE_2, StandParameter.BEND_2), rarity=_RARE),
-    StandEffect("cross-talk", (StandParameter.CROSS_TALK, StandParameter.CROSS_TALK_1), rarity=_RARE),
+    StandEffect("filter", (StandParameter.FILTER,), misleads_plate=True),
+    StandEffect(
+        "filter-damping", (StandParameter.FILTER_DAMPING,), needs="filter", rarity=_RARE, misleads_plate=True
+    ),
+    StandEffect("gauge-2-filter", (StandParameter.FILTER_2,), rarity=_RARE, misleads_plate=True),
+    StandEffect(
+        "gauge-1-bend", (StandParameter.SQUARE_1, StandParameter.BEND_1), rarity=_RARE, misleads_plate=True
+    ),
+    StandEffect(
+        "gauge-2-bend", (StandParameter.SQUARE_2, StandParameter.BEND_2), rarity=_RARE, misleads_plate=True
+    ),
+    StandEffect(
+        "cross-talk",
+        (StandParameter.CROSS_TALK, StandParameter.CROSS_TALK_1),
+        rarity=_RARE,
+        misleads_plate=True,
+    ),
 )
 
 
@@ -174,16 +192,21 @@ class StandSolver(MotionSolver):
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
     ) -> list[Floats]:
         lag_s, moving = float(point[Parameter.LAG]), len(directions)
-        ideal = self._readings(vector, lag_s, gauges)
+        end_s = max(float(times[-1]) for times, *_ in gauges) + abs(lag_s)
+        duration_s = max(DURATION_MIN_S, end_s - float(vector[RELEASE]))
+        state = self.kernels.integrate(vector, duration_s)
+        ideal = self._readings(vector, state, lag_s, gauges)
         rows = [np.zeros((len(free) + 1, len(gauge[0]))) for gauge in gauges]
         for k, direction in enumerate(directions):
             step = _step(vector, direction)
-            moved = self._readings(vector + step * direction, lag_s, gauges)
-            for row, above, below in zip(rows, moved, ideal, strict=True):
+            moved = vector + step * direction
+            moved_state = state if _is_read_only(direction) else self.kernels.integrate(moved, duration_s)
+            others = self._readings(moved, moved_state, lag_s, gauges)
+            for row, above, below in zip(rows, others, ideal, strict=True):
                 row[k] = (above - below) / step
         later = ideal
         if Parameter.LAG in free:
-            later = self._readings(vector, lag_s + _LAG_STEP_S, gauges)
+            later = self._readings(vector, state, lag_s + _LAG_STEP_S, gauges)
         for number, (_, readings, which, noise) in enumerate(gauges):
             row, slopes, read = rows[number], rows[number][:-1], ideal[number]
             second = which != GAUGE_1
@@ -209,10 +232,10 @@ class StandSolver(MotionSolver):
         path = float(steps_s @ (np.abs(nodes[1:, SLIP]) + np.abs(nodes[:-1, SLIP])))
         return float(steps_s @ (force[1:] + force[:-1])) / path if path > 0.0 else float("nan")
 
-    def _readings(self, vector: Floats, lag_s: float, gauges: list[Gauge]) -> list[Floats]:
-        """What ideal gauges of these kinds read at their times, gauge 2 later by `lag_s`."""
-        end_s = max(float(times[-1]) for times, *_ in gauges) + abs(lag_s)
-        state = self.kernels.integrate(vector, max(DURATION_MIN_S, end_s - float(vector[RELEASE])))
+    def _readings(
+        self, vector: Floats, state: tuple[Floats, ...], lag_s: float, gauges: list[Gauge]
+    ) -> list[Floats]:
+        """What ideal gauges of these kinds read of a motion at their times, gauge 2 later by `lag_s`."""
         found = []
         for times, _, which, _ in gauges:
             late_s = 0.0 if which == GAUGE_1 else lag_s
@@ -228,6 +251,18 @@ def _constant_friction(_speed: float, parameters: Floats) -> float:
 
 
 _SQUARED_CONSTANT_MIN_S2 = 1e-12  # a corner of 100 kHz: no stand shows a higher one
+_READ_ONLY = (
+    StandParameter.FILTER,
+    StandParameter.FILTER_2,
+    StandParameter.FILTER_DAMPING,
+    StandParameter.BEND_1,
+    StandParameter.BEND_2,
+    StandParameter.SQUARE_1,
+    StandParameter.SQUARE_2,
+    StandParameter.CROSS_TALK,
+    StandParameter.CROSS_TALK_1,
+)
+"""Parameters of gauges, which leave the motion as it is."""
 _LAG_STEP_S = 1e-6
 _STEP_SHARE = 1e-5
 """Step of differences over the range of a parameter of the stand, or over the value of one of the motion."""
@@ -239,6 +274,21 @@ _OWN_STEPS = {
 }
 _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
+
+
+def motion_count(free: Indices) -> int:
+    """Number of parameters at the places `free` of a `StandModel` that change the motion from its release."""
+    read_only = {Parameter.RELEASE, *(PARAMETER_COUNT + place for place in _READ_ONLY)}
+    places: list[int] = free.tolist()
+    moving = [place for place in places if place < MOTION_PARAMETER_COUNT or place >= SHARED_PARAMETER_COUNT]
+    return len(moving) - len(read_only.intersection(places))
+
+
+def _is_read_only(direction: Floats) -> bool:
+    """Whether a move along `direction` changes what is read of a motion since its release only."""
+    first = len(direction) - STAND_PARAMETER_COUNT
+    places = np.flatnonzero(direction).tolist()
+    return all(place == RELEASE or place - first in _READ_ONLY for place in places)
 
 
 def _step(vector: Floats, direction: Floats) -> float:

@@ -63,6 +63,8 @@ class StandParameter(IntEnum):
     CROSS_TALK_1 = 27  # share of u2 - u1 in the readings of gauge 1
     BASE_COMPLIANCE = 28  # stiffness of the springs over that under the base
     BASE_FREQUENCY = 29  # own frequency of the base (Hz)
+    HOLD_CREEP = 30  # velocity of the table before the release and at it (m/s)
+    BASE_DAMPING = 31  # damping ratio of the base
 
 
 STAND_PARAMETER_COUNT = len(StandParameter)
@@ -97,13 +99,14 @@ STAND_PARAMETER_COUNT = len(StandParameter)
     CROSS_TALK_1,
     BASE_COMPLIANCE,
     BASE_FREQUENCY,
+    HOLD_CREEP,
+    BASE_DAMPING,
 ) = range(STAND_PARAMETER_COUNT)
 """The same places for compiled functions, which take no enumerations."""
 
 _LOGARITHMIC_VELOCITY_M_PER_S = 1e-3  # unit of the logarithm: slips of the stands reach some 100 mm/s
 _HELD_S = 60.0  # before the release: the time in which an operator pulls and waits
 _DWELL_S = 0.1  # unit of the logarithm: sticks last some tenths of a second
-_BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
 _STEP_RAD = 0.14  # of the slipping table's motion: local errors of 1e-7 of the swing
 _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
 _TURN_STEPS = 4  # of the search for the time at which the table turns; its velocity is nearly a line there
@@ -215,7 +218,7 @@ def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: F
     if parts[BASE_COMPLIANCE] != 0.0:
         w = 2.0 * math.pi * parts[BASE_FREQUENCY]
         mass = parameters[STIFFNESS] / (parts[BASE_COMPLIANCE] * w * w)
-        base = -force / mass - w * w * state[6] - 2.0 * _BASE_DAMPING * w * state[7]
+        base = -force / mass - w * w * state[6] - 2.0 * parts[BASE_DAMPING] * w * state[7]
         out[6] = state[7]
     else:
         out[6] = 0.0
@@ -296,7 +299,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
     phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 7))
     state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
-    state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY]
+    state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY] + parts[HOLD_CREEP]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
     heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
     excess, direction = demand(parameters, parts, (0.0, 0.0, heading), 0.0, _HELD_S, state, slopes[4])
@@ -441,10 +444,11 @@ def _between(nodes: Floats, k: int, time: float, out: Floats) -> None:
 def sample(parameters: Floats, _phases: Floats, nodes: Floats, times: Floats, channels: int) -> Floats:
     """Channels at sorted `times`, as `sampling.sample` gives them."""
     out, row, k = np.zeros((channels, len(times))), np.empty(channels), 0
+    creep = parameters[len(parameters) - STAND_PARAMETER_COUNT + HOLD_CREEP]
     for j in range(len(times)):
         since = times[j] - parameters[RELEASE]
         if since < 0.0:
-            out[0, j] = parameters[PULLBACK]
+            out[0, j] = parameters[PULLBACK] + creep * since
             continue
         while k + 2 < len(nodes) and nodes[k + 1, TIME] <= since:
             k += 1
@@ -497,21 +501,23 @@ def gauge_readings(
 ) -> Floats:
     """u1 and u2 - u1 (2, n) as gauges with these filters, bends and cross-talk show them; times rise."""
     parts, pull = vector[-STAND_PARAMETER_COUNT:], max(abs(float(vector[PULLBACK])), 1e-9)
-    constants = math.sqrt(parts[FILTER]), math.sqrt(parts[FILTER_2])
+    constants = np.sqrt(parts[FILTER : FILTER_2 + 1])
+    constants[constants < _NEGLIGIBLE_S] = 0.0
     damping = 1.0 + parts[FILTER_DAMPING]
-    if max(constants) < _NEGLIGIBLE_S:
+    if not constants.any():
         read = kernels.sample(vector, *state, times_s, 2)
     else:
-        shortest_s = min(constant for constant in constants if constant >= _NEGLIGIBLE_S)
+        shortest_s = float(constants[constants > 0.0].min())
         step_s = min(max(shortest_s / _FILTER_STEPS, _FILTER_STEP_MIN_S), _FILTER_STEP_MAX_S)
         begin_s = min(float(times_s[0]), float(vector[RELEASE]))
-        end_s = float(times_s[-1]) + 2.0 * damping * sum(constants)
+        delays_s = 2.0 * damping * np.cumsum(constants)
+        end_s = float(times_s[-1] + delays_s[-1])
         grid = begin_s + step_s * np.arange(int((end_s - begin_s) / step_s) + 3)
         duration_s = float(state[1][-1, TIME])
         moved = kernels.sample(vector, *state, np.minimum(grid, vector[RELEASE] + duration_s), 2)
-        table, relative = (_low_pass(row, constants[0], damping, step_s) for row in moved)
-        relative = _low_pass(relative, constants[1], damping, step_s)
-        read = np.stack([np.interp(times_s, grid, row) for row in (table, relative)])
+        read = np.stack([_low_pass(row, constants[0], damping, step_s) for row in moved])
+        read[1] = _low_pass(read[1], constants[1], damping, step_s)
+        read = _at_times(read, times_s - begin_s, delays_s, step_s)
     if parts[CROSS_TALK] != 0.0 or parts[CROSS_TALK_1] != 0.0:
         mixing = np.array([[1.0, parts[CROSS_TALK_1]], [parts[CROSS_TALK], 1.0]])
         read = mixing @ read
@@ -525,11 +531,11 @@ def gauge_readings(
 
 @compiled
 def _low_pass(row: Floats, constant_s: float, damping: float, step_s: float) -> Floats:
-    """The row (n,) behind T^2 y'' + 2 damping T y' + y = x, shifted back by its delay at low frequency.
+    """The row (n,) behind T^2 y'' + 2 damping T y' + y = x, late by 2 damping T at low frequency.
 
     With a damping ratio of 1 it describes RC and Bessel filters of the same second moment.
     """
-    if constant_s < _NEGLIGIBLE_S:
+    if constant_s == 0.0:
         return row
     k = 0.5 * step_s / constant_s  # bilinear transform, whose delay at low frequency is exact
     norm = 1.0 / (1.0 + 2.0 * damping * k + k * k)
@@ -539,5 +545,17 @@ def _low_pass(row: Floats, constant_s: float, damping: float, step_s: float) -> 
         y = gain * (row[j] + 2.0 * x1 + x2) - a1 * y1 - a2 * y2
         x2, x1, y2, y1 = x1, row[j], y1, y
         filtered[j] = y
-    places = np.arange(len(row)).astype(np.float64)
-    return np.interp(places + 2.0 * damping * constant_s / step_s, places, filtered)
+    return filtered
+
+
+@compiled
+def _at_times(rows: Floats, times_s: Floats, delays_s: Floats, step_s: float) -> Floats:
+    """Rows (c, n) on a grid of `step_s` from 0, each taken back by its delay, at rising `times_s` (m,)."""
+    out = np.empty((len(rows), len(times_s)))
+    for i in range(len(rows)):
+        for j in range(len(times_s)):
+            place = min(max((times_s[j] + delays_s[i]) / step_s, 0.0), rows.shape[1] - 1.000001)
+            k = int(place)
+            share = place - k
+            out[i, j] = (1.0 - share) * rows[i, k] + share * rows[i, k + 1]
+    return out

@@ -14,6 +14,7 @@ SENTENCES = {
     "release-shape": N_("the hook let go unevenly (shape {size}): use a sharper hook."),
     "release-step": N_("the hook lost {size} of its force at once and the rest later: use a sharper hook."),
     "release-velocity": N_("the table moved at {size} when it was released: wait until it hangs still."),
+    "hold-creep": N_("the pull went on at {size} until the release: hold the table still, then let go."),
     "gauge-lag": N_(
         "gauge 2 lags gauge 1 by {size}: give both amplifiers the same filter, or state the filters in"
         " gauges.toml."

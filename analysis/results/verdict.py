@@ -11,6 +11,7 @@ from dataclasses import replace
 from analysis.fitting.search import Fit
 from analysis.identification import Degree
 from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import StandModel
 from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, result_warning
 from analysis.results.joint_fit import JointFit
@@ -23,14 +24,17 @@ from analysis.uncertainty import UncertaintyBudget
 from messages.i18n import N_
 
 _NAME = "friction_dynamic"
+_NAMES = frozenset((_NAME, "friction_path_mean"))
 _SIGMAS = 3.0  # estimates that differ by more standard uncertainties of the plate's own contradict each other
 _SPREAD_MAX = 0.02  # of f_d: estimates of a failed model that differ by more leave f_d open
 _LEFT_MAX = 0.05  # share of what the ideal stand leaves: with more, other effects are as large as those found
-_SPREAD_OF_MODEL_MAX = 0.005  # of f_d, see `_spread_of_model`
+_SPREAD_OF_MODEL_MAX = 0.02  # of f_d, see `_spread_of_model`
+_UNTRUE = 0.15  # of the shift of f_d: so far each effect of a failed model may be off, by the same study
 _SPREAD_OF_MODEL_MIN = 0.003  # of f_d; benchmarks/study_real_stand.py: what is left moves f_d by as much
 _DESCRIPTION = 0.02  # of the shift of f_d by effects: so far their description is off, by the same study
 _FLOOR = 3e-4  # of f_d: what effects below detection move it by beside those found, by the same study
 _MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
+_NEGLIGIBLE = 0.3  # of the uncertainty of f_d: less widens it by 5 % at most, less than its two digits tell
 _CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however small the uncertainties are
 
 
@@ -39,22 +43,30 @@ def judge(
     plate: PlateFriction | None,
     budget: UncertaintyBudget,
     ideal: Fit,
+    spread: float,
     *,
     law_is_given: bool = False,
 ) -> tuple[JointFit, list[ResultWarning]]:
     """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for.
 
-    `ideal` is the likeliest fit on an ideal stand. A law that was asked for keeps its f_d. Results that
-    cannot be leave the budget.
+    `ideal` is the likeliest fit on an ideal stand, `spread` the standard deviation of f_d between models that
+    the record leaves possible. A law that was asked for keeps its f_d. Results that cannot be leave the
+    budget.
     """
     warnings = list(remove_friction_of_tilted_plane(budget))
-    joint, found = _compare_estimates(joint, plate, budget, ideal, law_is_given=law_is_given)
+    joint, found = _compare_estimates(joint, plate, budget, ideal, spread, law_is_given=law_is_given)
     warnings += [*found, *remove_undetermined(budget), *tilt_warnings(budget.results)]
     return joint if _NAME in budget.results else _with_degree(joint, Degree.NONE), warnings
 
 
 def _compare_estimates(
-    joint: JointFit, plate: PlateFriction | None, budget: UncertaintyBudget, ideal: Fit, *, law_is_given: bool
+    joint: JointFit,
+    plate: PlateFriction | None,
+    budget: UncertaintyBudget,
+    ideal: Fit,
+    spread: float,
+    *,
+    law_is_given: bool,
 ) -> tuple[JointFit, list[ResultWarning]]:
     selection, results = joint.selection, budget.results
     own = results.get(_NAME)
@@ -63,28 +75,42 @@ def _compare_estimates(
     difference = math.inf if plate is None else abs(plate.friction_dynamic - own.value)
     if selection.adequate:
         if selection.degree is Degree.IDEAL:
+            if spread > _NEGLIGIBLE * own.standard_uncertainty:
+                for name in _NAMES.intersection(results):
+                    _add_model_spread(budget, name, spread)
             return joint, []
-        spread = math.hypot(_DESCRIPTION * _shift(joint, ideal), _FLOOR * own.value)
-        if plate is None or _agree(own, plate):
-            _add_model_spread(budget, own, spread)
+        spread = math.hypot(spread, _DESCRIPTION * _shift(joint, ideal), _FLOOR * own.value)
+        if plate is None or _agree(own, plate) or _misleads_plate(joint):
+            _add_model_spread(budget, _NAME, spread)
             return joint, []
-        _add_model_spread(budget, own, math.hypot(spread, difference))
+        _add_model_spread(budget, _NAME, math.hypot(spread, difference))
         return joint, [_disagreement(own, plate)]
     holds = plate is not None and plate.misfit < _MISFIT_MAX and difference < _SPREAD_MAX * own.value
     if law_is_given:
         return _with_degree(joint, Degree.FRICTION if holds else Degree.NONE), []
     if plate is not None and holds:
-        budget.remove(_NAME)
-        shares = {BudgetSource.NOISE: plate.standard_uncertainty, BudgetSource.MODEL: difference}
-        budget.add(_NAME, plate.friction_dynamic, shares)
+        _combine(budget, own, plate)
         return _with_degree(joint, Degree.FRICTION), []
     spread = _spread_of_model(joint, ideal)
     if spread < _SPREAD_OF_MODEL_MAX * own.value:
-        _add_model_spread(budget, own, max(spread, _SPREAD_OF_MODEL_MIN * own.value))
+        _add_model_spread(budget, _NAME, max(spread, _SPREAD_OF_MODEL_MIN * own.value))
         return _with_degree(joint, Degree.FRICTION), []
     if plate is not None:
-        _add_model_spread(budget, own, max(difference, _SPREAD_MAX * own.value))
+        _add_model_spread(budget, _NAME, max(difference, _SPREAD_MAX * own.value))
     return _with_degree(joint, Degree.NONE), []
+
+
+def _combine(budget: UncertaintyBudget, own: Quantity, plate: PlateFriction) -> None:
+    """Set f_d to the mean of both estimates; a failed joint fit is no surer than the plate that checks it."""
+    difference = abs(plate.friction_dynamic - own.value)
+    plate_variance = plate.standard_uncertainty**2
+    own_variance = own.standard_uncertainty**2 + difference**2 + plate_variance
+    share = own_variance / (own_variance + plate_variance)
+    value = own.value + share * (plate.friction_dynamic - own.value)
+    noise = math.sqrt(share) * plate.standard_uncertainty
+    budget.remove(_NAME)
+    spread = max(share, 1.0 - share) * difference
+    budget.add(_NAME, value, {BudgetSource.NOISE: noise, BudgetSource.MODEL: spread})
 
 
 def _shift(joint: JointFit, ideal: Fit) -> float:
@@ -94,14 +120,22 @@ def _shift(joint: JointFit, ideal: Fit) -> float:
 
 
 def _spread_of_model(joint: JointFit, ideal: Fit) -> float:
-    """By how much f_d may still move: as the effects found moved it, in proportion to what is left."""
+    """By how much f_d may still move: as the effects found moved it, in proportion to what is left.
+
+    Each effect of a model that fails is not quite what it seems.
+    """
     if joint.chosen is ideal or joint.chosen.law is ideal.law:
         return math.inf
     count = joint.problem.sample_count
     left = (joint.chosen.chi_square - count) / max(ideal.chi_square - count, 1.0)
     if not 0.0 < left < _LEFT_MAX:
         return math.inf
-    return _shift(joint, ideal) * math.sqrt(left)
+    return _shift(joint, ideal) * (math.sqrt(left) + _UNTRUE * len(joint.selection.parts))
+
+
+def _misleads_plate(joint: JointFit) -> bool:
+    law = joint.chosen.law
+    return isinstance(law, StandModel) and any(effect.misleads_plate for effect in law.effects)
 
 
 def _agree(own: Quantity, plate: PlateFriction) -> bool:
@@ -113,12 +147,11 @@ def _with_degree(joint: JointFit, degree: Degree) -> JointFit:
     return replace(joint, selection=replace(joint.selection, degree=degree))
 
 
-def _add_model_spread(budget: UncertaintyBudget, own: Quantity, spread: float) -> None:
-    shares = {
-        line.source: line.standard_uncertainty for line in budget.lines if line.contribution_to == _NAME
-    }
-    budget.remove(_NAME)
-    budget.add(_NAME, own.value, {**shares, BudgetSource.MODEL: spread})
+def _add_model_spread(budget: UncertaintyBudget, name: str, spread: float) -> None:
+    value = budget.results[name].value
+    shares = {line.source: line.standard_uncertainty for line in budget.lines if line.contribution_to == name}
+    budget.remove(name)
+    budget.add(name, value, {**shares, BudgetSource.MODEL: spread})
 
 
 def _disagreement(own: Quantity, plate: PlateFriction) -> ResultWarning:

@@ -31,6 +31,7 @@ MOTION_EFFECTS = {
     "release-step": Effect("release_step", "1", 0.0, 0.95),
     "release-shape": Effect("release_shape", "1", -1.5, 3.0),
     "release-velocity": Effect("release_velocity_m_per_s", "m/s", -0.3, 0.3),
+    "hold-creep": Effect("hold_creep_m_per_s", "m/s", -0.01, 0.01),
     "spring-hardening": Effect("spring_hardening", "1", -0.3, 0.5),
     "spring-asymmetry": Effect("spring_asymmetry", "1", -0.3, 0.3),
     "stand-friction": Effect("stand_friction_m", "m", 0.0, 2e-3),
