@@ -5,6 +5,7 @@ from synthetic import Truth, simulate_record
 
 from analysis.identification import Degree
 from analysis.identify import identify
+from analysis.quantities import BudgetSource
 from analysis.record import GaugeUncertainty
 from benchmarks.real_stand import REL, RealStand, U
 
@@ -20,14 +21,16 @@ KINDS = {
 }  # fmt: skip
 
 
-def record_of(stand: RealStand):
+def record_of(stand: RealStand, truth: Truth | None = None, creep_m_per_s: float = 0.0, bend: float = 0.0):
+    """A record with a table that moves before its release and a gauge 1 that is bent, and its friction."""
     motion = stand.simulate(10.5)
 
     def displacements(since_s):
         state = motion.sample(since_s.clip(0.0))
-        return state[U], state[REL]
+        table_m = state[U] + creep_m_per_s * since_s.clip(max=0.0)
+        return table_m * (1.0 + bend * (table_m / stand.pullback_m) ** 2), state[REL]
 
-    return simulate_record(Truth(), displacements), motion.friction_dynamic
+    return simulate_record(truth or Truth(), displacements), motion.friction_dynamic
 
 
 @pytest.mark.parametrize(("changes", "effect", "name", "size"), KINDS.values(), ids=KINDS)
@@ -71,3 +74,40 @@ def test_an_ideal_stand_shows_no_effect():
 
     assert (found.model.degree, found.model.parts) == (Degree.IDEAL, ())
     assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=1e-3)
+
+
+def test_a_pull_that_goes_on_until_the_release_is_found():
+    record, friction = record_of(RealStand(release_velocity_m_per_s=2e-4), creep_m_per_s=2e-4)
+    found = identify(record)
+
+    assert (found.model.degree, found.model.parts) == (Degree.STAND, ("hold-creep",))
+    assert "hold-creep" in [warning.code for warning in found.warnings]
+    assert found.results["hold_creep_m_per_s"].value == pytest.approx(2e-4, rel=0.05)
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+def test_a_soft_base_is_found_with_its_damping():
+    record, friction = record_of(RealStand(base_compliance=0.02, base_mass_kg=500.0, base_damping_ratio=0.08))
+    found = identify(record)
+
+    assert (found.model.degree, found.model.parts) == (Degree.STAND, ("base",))
+    assert found.results["base_compliance"].value == pytest.approx(0.02, rel=0.05)
+    assert found.results["base_damping"].value == pytest.approx(0.08, rel=0.25)
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_f_d_is_as_uncertain_as_effects_make_it_that_are_too_small_to_be_told(seed):
+    truth = Truth(rate_hz=500.0, duration_s=8.0, noise_m=5e-5, seed=seed)
+    record, friction = record_of(RealStand(), truth, bend=0.0015)
+    found = identify(record)
+    shares = {
+        line.source: line.standard_uncertainty
+        for line in found.budget
+        if line.contribution_to == "friction_dynamic"
+    }
+
+    assert (found.model.degree, found.model.parts) == (Degree.IDEAL, ())
+    assert shares[BudgetSource.MODEL] > 2.0 * shares[BudgetSource.NOISE]
+    friction_dynamic = found.results["friction_dynamic"]
+    assert abs(friction_dynamic.value - friction) < 2.0 * friction_dynamic.standard_uncertainty

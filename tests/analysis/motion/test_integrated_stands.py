@@ -1,5 +1,7 @@
 """Motion on stands that are not ideal, against the closed form and against an independent integrator."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,27 @@ def test_dry_friction_of_the_stand_is_that_of_an_independent_integrator():
     table, relative = stand_displacements(parameters(), {"stand_friction_m": 3e-5}, 5.1)(TIMES_S)
     np.testing.assert_allclose(table[moving], state[U], atol=INTEGRATION_ERROR_M)
     np.testing.assert_allclose(relative[moving], state[REL], atol=INTEGRATION_ERROR_M)
+
+
+def test_a_soft_base_moves_as_that_of_an_independent_integrator():
+    stand = RealStand(
+        friction_static_ratio=1.3, base_compliance=0.02, base_mass_kg=500.0, base_damping_ratio=0.05
+    )
+    stiffness_n_per_m = parameters().stiffness_n_per_m
+    frequency_hz = math.sqrt(stiffness_n_per_m / 0.02 / 500.0) / (2.0 * math.pi)
+    effects = {"base_compliance": 0.02, "base_frequency_hz": frequency_hz, "base_damping": 0.05}
+    moving = TIMES_S >= 0.0
+    state = stand.simulate(5.1).sample(TIMES_S[moving])
+    table, relative = stand_displacements(parameters(), effects, 5.1)(TIMES_S)
+    np.testing.assert_allclose(table[moving], state[U], atol=2.0 * INTEGRATION_ERROR_M)
+    np.testing.assert_allclose(relative[moving], state[REL], atol=2.0 * INTEGRATION_ERROR_M)
+
+
+def test_a_table_that_creeps_in_its_hold_leaves_it_with_that_velocity():
+    state = (
+        RealStand(friction_static_ratio=1.3, release_velocity_m_per_s=1e-3).simulate(5.1).sample(TIMES_S[41:])
+    )
+    table, _ = stand_displacements(parameters(), {"hold_creep_m_per_s": 1e-3}, 5.1)(TIMES_S)
+    held = TIMES_S < 0.0
+    np.testing.assert_allclose(table[held], 0.012 + 1e-3 * TIMES_S[held], atol=1e-12)
+    np.testing.assert_allclose(table[41:], state[U], atol=INTEGRATION_ERROR_M)
