@@ -33,7 +33,12 @@ from analysis.laws.stand_parts import (
     extended_point,
     motion_count,
 )
-from analysis.motion.stand_motion import INTEGRATION_ERROR_M, STAND_PARAMETER_COUNT, StandParameter
+from analysis.motion.stand_motion import (
+    INTEGRATION_ERROR_M,
+    STAND_PARAMETER_COUNT,
+    StandParameter,
+    filter_step_s,
+)
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import DampedCosine
 
@@ -44,16 +49,19 @@ _EFFECTS_MOST = 4  # that explain one record: more would explain anything
 _TRIED = 2  # effects that are fitted of those whose start points are best
 _TRIED_BY_PROMISE = 2  # the same of those that a linear motion promises most of
 _FREQUENCIES = (StandParameter.MODE_FREQUENCY, StandParameter.BASE_FREQUENCY)
+_FILTERS = (StandParameter.FILTER, StandParameter.FILTER_2)
 _BASE_HARMONICS = (2.0, 3.5, 6.0, 10.0)  # frequencies of a base over the first: it is heavier and stiffer
 _MODE_DAMPING = 0.01  # damping ratio of a bolted joint
 _STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
 _MASSES = (Parameter.TABLE_MASS, Parameter.PLATE_MASS)
 _BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
 _SECOND_ORDER = (StandParameter.MODE_DAMPING, StandParameter.BASE_DAMPING)  # without effect to first order
-_EFFORT_MAX = 1.5e6
+_EFFORT_MAX = 1.2e6
 """Steps of integration after which a search adds no effect and follows only the best: 1 s of a core."""
 _STEPS_A_PERIOD = 75.0  # of motions with two slips a period ...
 _STEPS_A_CYCLE = 20.0  # ... and of a second oscillator
+_STEPS_A_GRID_POINT = 0.4  # of a filtered motion: what it costs, by profile
+_STEPS_A_READING = 0.1  # the same
 _READINGS_MISSING = 12_000  # a channel in which effects are looked for that a fit may miss
 _PRIOR_ODDS = 0.01
 """Of each effect. With it intervals of clean records widen by 3 % (median of 25), with 0.05 by 8 %."""
@@ -348,10 +356,14 @@ class StandSearch:
         return self._effort > _EFFORT_MAX
 
     def _steps(self, window: FitProblem, point: Floats) -> float:
-        """Steps of the integration of one motion in a window."""
+        """Effort of one motion in a window, in steps of its integration; reading it costs some too."""
         fastest_hz = max(float(point[_PLACES[place]]) for place in _FREQUENCIES)
         steps_per_s = max(_STEPS_A_PERIOD / self._period_s, _STEPS_A_CYCLE * fastest_hz)
-        return float(window.table.time_s[-1] - self._release_s) * steps_per_s
+        squares = [float(point[_PLACES[place]]) for place in _FILTERS if point[_PLACES[place]] > 0.0]
+        if squares:
+            steps_per_s += _STEPS_A_GRID_POINT / filter_step_s(min(squares) ** 0.5)
+        duration_s = float(window.table.time_s[-1] - self._release_s)
+        return duration_s * steps_per_s + _STEPS_A_READING * window.sample_count
 
     def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
         """Points to begin the fit of one effect more from, where a linear step may lead elsewhere."""

@@ -507,8 +507,7 @@ def gauge_readings(
     if not constants.any():
         read = kernels.sample(vector, *state, times_s, 2)
     else:
-        shortest_s = float(constants[constants > 0.0].min())
-        step_s = min(max(shortest_s / _FILTER_STEPS, _FILTER_STEP_MIN_S), _FILTER_STEP_MAX_S)
+        step_s = filter_step_s(float(constants[constants > 0.0].min()))
         begin_s = min(float(times_s[0]), float(vector[RELEASE]))
         delays_s = 2.0 * damping * np.cumsum(constants)
         end_s = float(times_s[-1] + delays_s[-1])
@@ -527,6 +526,11 @@ def gauge_readings(
         share = read / pull
         read = read * (1.0 + (squares + bends * share) * share)
     return read
+
+
+def filter_step_s(constant_s: float) -> float:
+    """Step of the grid (s) on which a motion is filtered with that time constant."""
+    return min(max(constant_s / _FILTER_STEPS, _FILTER_STEP_MIN_S), _FILTER_STEP_MAX_S)
 
 
 @compiled

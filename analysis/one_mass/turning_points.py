@@ -11,6 +11,9 @@ from analysis.preparation.oscillation import median_of_three, white_noise
 from analysis.record import RecordError
 
 _DEAD_BAND = (0.03, 0.35)  # least and largest dead band about the middle, as shares of the largest swing
+_HOLD_PERIODS = 0.8  # a half swing takes half a period; one of large friction or a pendulum's less than this
+_HOLD_SHARE = 0.7  # of the widest swing: the mean of a half swing is 2 / pi of it
+_PASSAGES_MIN = 3  # without them nothing swings
 _EARLY = 9  # passages that the first estimate of the period is taken from: later ones may be those of hum
 _CLASSICAL_SHARE = 0.1  # the classical log decrement counts the swings above this share of the first
 
@@ -55,14 +58,25 @@ def find_crossings(channel: Channel) -> Crossings:
     seen = np.flatnonzero(np.abs(away) > dead)
     flips = np.flatnonzero(np.diff(np.sign(away[seen])))
     before, after = seen[flips], seen[flips + 1]
-    if len(flips) < 3:
+    if len(flips) < _PASSAGES_MIN:
         raise RecordError(
             "no free decay: the readings pass their middle {count} times. Record at least two free swings.",
             count=len(flips),
         )
     share = away[before] / (away[before] - away[after])
     t = smooth.time_s[before] + share * (smooth.time_s[after] - smooth.time_s[before])
+    t = _after_hold(t, Channel(smooth.time_s, np.abs(away)), _HOLD_SHARE * reach)
     return Crossings(float(t[0]), _period_of(t))
+
+
+def _after_hold(crossing_s: Floats, distance: Channel, far: float) -> Floats:
+    """The passages after the last hold, longer than a half swing and on average `far` from the middle."""
+    lengths_s = np.diff(crossing_s)
+    for number in np.flatnonzero(lengths_s > _HOLD_PERIODS * _period_of(crossing_s))[::-1].tolist():
+        held = distance.between(float(crossing_s[number]), float(crossing_s[number + 1])).value_m
+        if len(crossing_s) - number > _PASSAGES_MIN and len(held) and float(held.mean()) > far:
+            return crossing_s[number + 1 :]
+    return crossing_s
 
 
 def find_turning_points(channel: Channel, first_s: float, period_s: float) -> TurningPoints:

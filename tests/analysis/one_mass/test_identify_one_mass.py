@@ -443,3 +443,18 @@ def test_periods_that_give_no_mass_are_named(alone, loaded, added):
             Quantity.normal(loaded, 0.0, "s"),
             Quantity.normal(added, 0.0, "kg"),
         )
+
+
+@pytest.mark.parametrize(
+    "before", [-0.3, 0.0, 0.4], ids=["from the other side", "from rest", "from the same side"]
+)
+def test_a_decay_after_pull_and_hold_is_taken_uncut(before):
+    """A hand swings the mass, pulls it aside, and holds it for two seconds; then it is let go."""
+    truth = Truth(turning_s=0.0)
+    time_s = np.arange(-4.0, 8.0, 1.0 / truth.rate_hz)
+    _, free = readings(truth, time_s=time_s.clip(0.0))
+    hand = np.interp(time_s, [-4.0, -3.5, -2.8, -2.0], [0.0, before, -0.5 * before, 1.0])
+    hand += 0.3 + truth.noise * np.random.default_rng(1).standard_normal(len(time_s))
+    record = single_channel(time_s, np.where(time_s < 0.0, truth.swing * hand, free))
+
+    assert_close(identify_one_mass(record), truth)
