@@ -17,7 +17,7 @@ from analysis.fitting.search import (
     initial_points,
     may_be_friction,
 )
-from analysis.fitting.stand_search import PROMISE_MIN, MissingEffect, StandFit, StandSearch
+from analysis.fitting.stand_search import PROMISE_MIN, MissingEffect, StandFit, StandSearch, is_clear
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import (
@@ -323,7 +323,11 @@ def _certain_effects(stand: StandFit | None, joint: JointFit, fits: list[Fit]) -
     least = _CERTAIN_MIN
     if not joint.selection.adequate:
         least = max(least, _DOMINANT_SHARE * _excess(min(fits, key=lambda fit: fit.bic), stand.problem))
-    return tuple(effect for effect in stand.fit.law.effects if stand.evidence.get(effect.name, 0.0) >= least)
+    return tuple(
+        effect
+        for effect in stand.fit.law.effects
+        if stand.evidence.get(effect.name, 0.0) >= least and is_clear(stand.fit, effect)
+    )
 
 
 def _needless_static(search: Search, asked: Fit, minima: list[Floats]) -> list[ResultWarning]:

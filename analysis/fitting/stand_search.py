@@ -63,14 +63,15 @@ _STEPS_A_CYCLE = 20.0  # ... and of a second oscillator
 _STEPS_A_GRID_POINT = 0.4  # of a filtered motion: what it costs, by profile
 _STEPS_A_READING = 0.1  # the same
 _READINGS_MISSING = 12_000  # a channel in which effects are looked for that a fit may miss
-_PRIOR_ODDS = 0.01
-"""Of each effect. With it intervals of clean records widen by 3 % (median of 25), with 0.05 by 8 %."""
+_PRIOR_ODDS = 0.005
+"""Of each effect. With it intervals of clean records widen by 1 % (median of 25), with 0.05 by 8 %."""
 _LOG_WEIGHT_MAX = 50.0  # more is certain
 _BASE_HARMONIC = 3.5  # frequency over the first of a base that may be missing; its shift hardly depends on it
 _RIVAL_BIC = 20.0  # rise above which another model does not bear on f_d: odds of 1 to 20,000
 PROMISE_MIN = 10.0
 """Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
+_CLEAR_SIGMAS = 3.0  # of a size that is not zero
 _STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
 _EXPLAINED = 1.15  # chi-square a reading below which a window asks for no further effect
 _EXPLAINED_SHARE_MIN = 0.2
@@ -472,6 +473,16 @@ class StandSearch:
     def _window(self, periods: float) -> FitProblem:
         end_s = self._release_s + periods * self._period_s
         return self._informed.before(end_s).decimated(_READINGS, np.inf)
+
+
+def is_clear(fit: Fit, effect: StandEffect) -> bool:
+    """Whether a size of the effect is not zero: without it a search may only end at a jump of f_s."""
+    spread, _ = covariance(fit.normal_matrix)
+    sizes = [_PLACES[place] for place in effect.own if place not in (*_FREQUENCIES, *_SECOND_ORDER)]
+    mine = np.isin(fit.free, [*sizes, *effect.shared])
+    return bool(
+        (np.abs(fit.parameters[fit.free[mine]]) > _CLEAR_SIGMAS * np.sqrt(np.diag(spread)[mine])).any()
+    )
 
 
 def extended_problem(problem: FitProblem) -> FitProblem:

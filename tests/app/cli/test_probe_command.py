@@ -53,7 +53,7 @@ def test_what_speaks_is_said_with_the_command_that_records_from_it(probe: Callab
     first, speaks, record = outcome.out.splitlines()
     assert first == "/dev/ttyACM0 Arduino Uno, USB 2341:0043 75"
     assert speaks.startswith("  speaks csv at 57600 baud 8E1: CSV lines")
-    assert speaks.endswith("; 2 gauges, 80.4 Hz; not verified on hardware")
+    assert "; 2 gauges, 80.4 Hz; not verified on hardware" in speaks
     assert shlex.split(record.removeprefix("  record with: ")) == [
         "slipstand", "record", "--port", "/dev/ttyACM0", "--protocol", "csv",
         "--baud", "57600", "--parity", "E",
@@ -105,7 +105,7 @@ def test_as_json(probe: Callable[..., Any]) -> None:
         "E",
         80.4,
     )
-    assert speaks["verified"] == "not verified on hardware"
+    assert speaks["verified"].startswith("not verified on hardware")
     assert speaks["settings"] == COLUMNS
     assert speaks["command"].startswith("slipstand record --port /dev/ttyACM0")
     (held,) = probe(HELD, "--json")[0].json

@@ -132,7 +132,9 @@ def test_an_amplifier_is_connected_as_filled_in(desk: Desk) -> None:
     desk.qtbot.keyClicks(desk.field("Baud"), "9600")
     desk.click("Connect my amplifier")
     desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
-    assert desk.launcher.ports == [PortSettings("socket://127.0.0.1:7", "csv", baud=9600)]
+    assert desk.launcher.ports == [
+        PortSettings("socket://127.0.0.1:7", "csv", baud=9600, parity="N", stop_bits=1)
+    ]
 
 
 def test_ports_are_offered_and_the_usual_baud_is_shown(desk: Desk) -> None:
@@ -215,7 +217,7 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
 
 def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
     desk.presenter.show_screen(Screen.GAUGES)
-    form = ConnectForm("COM7", "csv", "57600", "80", "E", "columns=table,relative", "COM8")
+    form = ConnectForm("COM7", "csv", "57600", "80", "E", "1", "columns=table,relative", "COM8")
     desk.presenter.fill_connection(form)
     assert desk.presenter.state.screen is Screen.START
     assert desk.field("Settings").text() == "columns=table,relative"
