@@ -101,13 +101,16 @@ def _compare_estimates(
 
 
 def _combine(budget: UncertaintyBudget, own: Quantity, plate: PlateFriction) -> None:
-    """Set f_d to the mean of both estimates; a failed joint fit is no surer than the plate that checks it."""
+    """Set f_d to the mean of both estimates, the failed joint fit uncertain by all of their difference.
+
+    However well they agree, noise of the plate counts by a half at the least: only the plate checks the failed fit.
+    """
     difference = abs(plate.friction_dynamic - own.value)
     plate_variance = plate.standard_uncertainty**2
-    own_variance = own.standard_uncertainty**2 + difference**2 + plate_variance
+    own_variance = own.standard_uncertainty**2 + difference**2
     share = own_variance / (own_variance + plate_variance)
     value = own.value + share * (plate.friction_dynamic - own.value)
-    noise = math.sqrt(share) * plate.standard_uncertainty
+    noise = math.sqrt(max(share, 0.5)) * plate.standard_uncertainty
     budget.remove(_NAME)
     spread = max(share, 1.0 - share) * difference
     budget.add(_NAME, value, {BudgetSource.NOISE: noise, BudgetSource.MODEL: spread})

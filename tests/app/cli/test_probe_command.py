@@ -11,6 +11,7 @@ from drivers.host_checks import PortHint
 from drivers.port import PortInfo, PortUser
 from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
 from drivers.recognition import Recognition
+from drivers.registry import find_driver
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
@@ -53,7 +54,7 @@ def test_what_speaks_is_said_with_the_command_that_records_from_it(probe: Callab
     first, speaks, record = outcome.out.splitlines()
     assert first == "/dev/ttyACM0 Arduino Uno, USB 2341:0043 75"
     assert speaks.startswith("  speaks csv at 57600 baud 8E1: CSV lines")
-    assert "; 2 gauges, 80.4 Hz; not verified on hardware" in speaks
+    assert speaks.endswith(f"; 2 gauges, 80.4 Hz; {find_driver('csv').verified}")
     assert shlex.split(record.removeprefix("  record with: ")) == [
         "slipstand", "record", "--port", "/dev/ttyACM0", "--protocol", "csv",
         "--baud", "57600", "--parity", "E",
@@ -105,7 +106,7 @@ def test_as_json(probe: Callable[..., Any]) -> None:
         "E",
         80.4,
     )
-    assert speaks["verified"].startswith("not verified on hardware")
+    assert speaks["verified"] == find_driver("csv").verified
     assert speaks["settings"] == COLUMNS
     assert speaks["command"].startswith("slipstand record --port /dev/ttyACM0")
     (held,) = probe(HELD, "--json")[0].json

@@ -77,7 +77,7 @@ def test_a_recorded_pullback_has_the_true_friction(
     assert (recorded["samples"], recorded["missing"], recorded["damaged"]) == (5000, 0, 0)
     assert open_run(recorded["run"]).metadata.device.protocol == protocol
     (found,) = slipstand("analyze", recorded["run"], "--json").json
-    assert_true_friction(found, true)
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
 @pytest.mark.parametrize("protocol", [driver.name for driver in AVAILABLE])
@@ -101,14 +101,7 @@ def test_the_command_that_probe_prints_records_from_the_defaults_of_the_simulate
         assert np.mean(readings == readings.max()) < 0.01
         assert np.mean(np.diff(readings) == 0) < 0.05
     (analysis,) = slipstand("analyze", recorded["run"], "--json").json
-    assert_true_friction(analysis, true)
-
-
-def assert_true_friction(analysis: dict[str, Any], true: float) -> None:
-    """f_d is within 1 %, or within 2 u of up to 2 % where the times of polls on a busy computer scatter."""
-    found = analysis["results"]["friction_dynamic"]
-    uncertainty = found["standard_uncertainty"]
-    assert abs(found["value"] - true) < max(0.01 * true, 2.0 * min(uncertainty, 0.02 * true))
+    assert analysis["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
 def skip_if_polls_were_late(recorded: dict[str, Any], is_polled: bool) -> None:
@@ -134,7 +127,7 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
     assert_replays(recorded["run"], make_source(settings, 200.0))
     skip_if_polls_were_late(recorded, True)
     (found,) = slipstand("analyze", recorded["run"], "--json").json
-    assert_true_friction(found, true)
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
 def assert_replays(path: str, source: SampleSource) -> None:

@@ -14,6 +14,7 @@ from drivers.host_checks import PortHint
 from drivers.port import PortInfo, PortUser
 from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
 from drivers.recognition import Recognition
+from drivers.registry import find_driver
 from messages.message import message, option
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
@@ -38,8 +39,7 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
     card = probed_port(report)
     assert card.status.tone is Tone.OK
     assert card.status.text.endswith("at 57600 baud 8E1")
-    (description,) = card.description
-    assert description.startswith("2 gauges, 80.4\u202fHz; not verified on hardware")
+    assert card.description == (f"2 gauges, 80.4\u202fHz; {find_driver('csv').verified}",)
     assert card.suggested_form is not None
     settings = port_settings(card.suggested_form)
     assert (settings.url, settings.protocol, settings.baud, settings.parity) == (
