@@ -103,7 +103,7 @@ def _compare_estimates(
 def _combine(budget: UncertaintyBudget, own: Quantity, plate: PlateFriction) -> None:
     """Set f_d to the mean of both estimates, the failed joint fit uncertain by all of their difference.
 
-    However well they agree, noise of the plate counts by a half at the least: only the plate checks the failed fit.
+    However well they agree, half of the plate's variance stays: only the plate checks the failed fit.
     """
     difference = abs(plate.friction_dynamic - own.value)
     plate_variance = plate.standard_uncertainty**2
