@@ -44,7 +44,7 @@ from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
 from analysis.results.plausibility import check_period
 from analysis.results.verdict import judge
 from analysis.synthetic import Truth, simulate_record
-from analysis.uncertainty import UncertaintyBudget, unstated_gains
+from analysis.uncertainty import UncertaintyBudget, unstated_clock, unstated_gains
 from messages.i18n import N_
 from messages.message import message
 
@@ -203,7 +203,7 @@ def _identify(
         budget.results,
         labels,
         joint.selection,
-        budget.lines + unstated_gains(record, budget.results),
+        budget.lines + unstated_gains(record, budget.results) + unstated_clock(record, budget.results),
         fitted_quantities.build_events(joint, slip_end),
         warnings,
         joint_fit.named_parameters(joint.chosen, decay),
@@ -242,7 +242,11 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
         warnings.append(ResultWarning("nothing-to-draw", text))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
-        "two-mass", budget.results, budget=budget.lines, events=Events(release), warnings=warnings
+        "two-mass",
+        budget.results,
+        budget=budget.lines + unstated_clock(record, budget.results),
+        events=Events(release),
+        warnings=warnings,
     )
 
 

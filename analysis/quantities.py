@@ -57,6 +57,7 @@ class BudgetSource(Enum):
     MASS = N_("mass")
     GRAVITY = N_("gravity")
     TIME_BASE = N_("time base")
+    TIME_BASE_NOT_STATED = N_("time base (not stated)")
     LEVELLING = N_("levelling of the plane"), SharedBy.SERIES, True
     GAUGE_1_GAIN = N_("gauge 1 gain"), SharedBy.CALIBRATION
     GAUGE_2_GAIN = N_("gauge 2 gain"), SharedBy.CALIBRATION

@@ -132,6 +132,8 @@ class Record:
     relative_overload: NDArray[np.bool_] | None = None
     clock_scale: float = 1.0  # true seconds for one second of `time_s`
     clock_scale_uncertainty: float = 0.0
+    clock_is_timed: bool = True
+    """False where nothing is known of the clock's error, and `clock_scale_uncertainty` is 0 for that."""
     table_gauge: GaugeUncertainty = GaugeUncertainty()
     relative_gauge: GaugeUncertainty = GaugeUncertainty()
     gauge_2_measures_plate: bool = False

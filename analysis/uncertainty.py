@@ -34,6 +34,8 @@ _SOURCES = {
     Parameter.LAG: BudgetSource.GAUGE_2_LAG,
 }
 _UNITS = {row.name: row.unit for row in CATALOGUE}
+_FRICTION = ("friction_dynamic", "friction_dynamic_plate")
+_UNITS_WITH_TIME = frozenset(("s", "1/s", "rad/s", "Hz", "m/s", "m/s2", "s/m", "kg/s", "N/m"))
 LEVEL_RAD = 2e-3  # tilt within which a hydraulic level sets a plane
 LEVELLING_UNCERTAINTY_RAD = LEVEL_RAD / 3.0**0.5  # rectangular (JCGM 100, 4.3.7)
 _SHARE_MIN = 1e-3  # a law less likely than this adds less than its last digit to a standard uncertainty
@@ -109,7 +111,7 @@ def propagate_with_model_choice(
 
 def unstated_gains(record: Record, results: Iterable[str]) -> list[BudgetLine]:
     """Budget lines (NaN) for values of f_d in `results`, of gauges whose gain has no stated uncertainty."""
-    names = [name for name in ("friction_dynamic", "friction_dynamic_plate") if name in results]
+    names = [name for name in _FRICTION if name in results]
     gauges = {BudgetSource.GAUGE_1_GAIN_NOT_STATED: record.table_gauge}
     if record.relative_displacement_m is not None:
         gauges[BudgetSource.GAUGE_2_GAIN_NOT_STATED] = record.relative_gauge
@@ -118,6 +120,17 @@ def unstated_gains(record: Record, results: Iterable[str]) -> list[BudgetLine]:
         for name in names
         for source, gauge in gauges.items()
         if gauge.gain_relative is None
+    ]
+
+
+def unstated_clock(record: Record, results: Mapping[str, Quantity]) -> list[BudgetLine]:
+    """Budget lines (NaN) of a clock that was not timed, for `results` that scale with time: f_d is one."""
+    if record.clock_is_timed:
+        return []
+    return [
+        BudgetLine(BudgetSource.TIME_BASE_NOT_STATED, name, float("nan"))
+        for name, quantity in results.items()
+        if name in _FRICTION or quantity.unit in _UNITS_WITH_TIME
     ]
 
 

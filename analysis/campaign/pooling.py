@@ -15,6 +15,7 @@ from analysis.quantities import COVERAGE_FACTOR_95, BudgetLine, BudgetSource, Qu
 
 _SMALLEST = 1e-9  # relative uncertainty below which rounding errors decide
 _LARGEST = 1e100  # larger values have no square in double precision
+_UNSTATED_GAINS = (BudgetSource.GAUGE_1_GAIN_NOT_STATED, BudgetSource.GAUGE_2_GAIN_NOT_STATED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +80,9 @@ def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
     return RunValue(run.name, value, own, common, (reach, reach), "1")
 
 
-def is_fully_stated(run: RunResult, name: str) -> bool:
-    """Tell whether every source of a quantity has a stated uncertainty."""
-    return not any(
-        line.contribution_to == name and math.isnan(line.standard_uncertainty) for line in run.budget
-    )
+def has_stated_gains(run: RunResult, name: str) -> bool:
+    """Tell whether every gain that a quantity depends on has a stated uncertainty."""
+    return not any(line.contribution_to == name and line.source in _UNSTATED_GAINS for line in run.budget)
 
 
 def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedError, float], float]:

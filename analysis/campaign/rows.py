@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from scipy.special import chdtrc
 
-from analysis.campaign.pooling import PooledQuantity, is_fully_stated, pool, run_value
+from analysis.campaign.pooling import PooledQuantity, has_stated_gains, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
 from analysis.catalogue import TableColumn, optional_columns, table_columns
 from analysis.quantities import Quantity, ResultWarning, result_warning
@@ -111,7 +111,7 @@ def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> Iterator
     elif friction.runs == 1:
         template = N_("{label}: one run alone determined f_d. Repeat the test twice at least")
         yield result_warning("single-run", template, label=label)
-    if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
+    if not all(has_stated_gains(run, _FRICTION) for run in series.runs):
         yield result_warning(
             "gain-not-stated",
             "{label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate",

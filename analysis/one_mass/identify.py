@@ -19,7 +19,7 @@ from analysis.one_mass.turning_points import classical_log_decrement, find_turni
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
-from analysis.uncertainty import UncertaintyBudget, numerical_gradient
+from analysis.uncertainty import UncertaintyBudget, numerical_gradient, unstated_clock
 from messages.i18n import N_
 from messages.message import message
 
@@ -165,7 +165,7 @@ def _identification(
             parts=tuple(part.name for part in parts),
             residual_share=share,
         ),
-        budget.lines,
+        budget.lines + unstated_clock(record, budget.results),
         _events(channels, solution.fit, significant),
         warnings,
         {

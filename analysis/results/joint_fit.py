@@ -402,7 +402,7 @@ def period_and_damping(parameters: Floats) -> tuple[float, float]:
 
 def add_constants(constants: DecayConstants, budget: UncertaintyBudget) -> None:
     """Add period, damping and stiffness to the budget."""
-    for name, function in _DECAY_QUANTITIES.items():
+    for name, function in DECAY_QUANTITIES.items():
         weights = numerical_gradient(function, constants.point)
         budget.add(name, function(constants.point), constants.uncertainty.contributions(weights))
 
@@ -431,7 +431,7 @@ def _k1(p: Floats) -> float:
     return float(np.hypot(2.0 * np.pi / p[0], p[1]))
 
 
-_DECAY_QUANTITIES: dict[str, Callable[[Floats], float]] = {
+DECAY_QUANTITIES: dict[str, Callable[[Floats], float]] = {
     "period_s": lambda p: float(p[0]),
     "log_decrement": lambda p: float(p[0] * p[1]),
     "damping_n1_per_s": lambda p: float(p[1]),

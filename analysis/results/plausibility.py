@@ -6,6 +6,7 @@ from analysis.catalogue import Place, definition
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TILT_MAX_RAD
 from analysis.quantities import Quantity, ResultWarning, result_warning
 from analysis.record import RecordError
+from analysis.results.joint_fit import DECAY_QUANTITIES
 from analysis.uncertainty import LEVEL_RAD, UncertaintyBudget
 from messages.i18n import N_
 from messages.message import Message, joined, message
@@ -24,8 +25,8 @@ _POSITIVE = (*_FRICTION, "pullback_m")
 
 
 def check_period(period: Quantity) -> None:
-    """Raise RecordError for a fitted period that no stand has, or that is less certain than it is long."""
-    if PERIOD_MIN_S <= period.value <= PERIOD_MAX_S and period.standard_uncertainty < period.value:
+    """Raise RecordError for a fitted period that no stand has; one less certain than long is no finding."""
+    if PERIOD_MIN_S <= period.value <= PERIOD_MAX_S or _is_undetermined("period_s", period):
         return
     template = N_(
         "the fitted motion swings with a period of {period}, no stand does so ({shortest_s:g} to"
@@ -80,6 +81,21 @@ def remove_undetermined(budget: UncertaintyBudget) -> Iterator[ResultWarning]:
         budget.remove(name)
     template = N_("the record does not tell {quantities}: less certain than large, and left out.")
     yield result_warning("implausible-result", template, quantities=shown)
+
+
+def remove_undetermined_period(budget: UncertaintyBudget) -> Iterator[ResultWarning]:
+    """Remove period, damping and stiffness where the period is less certain than long."""
+    results = budget.results
+    if "period_s" not in results or not _is_undetermined("period_s", results["period_s"]):
+        return
+    for name in DECAY_QUANTITIES:
+        if name in results:
+            budget.remove(name)
+    template = N_(
+        "the fitted motion has no certain period: T, damping and stiffness are left out. Check whether gauge"
+        " 1 shows the free decay of a table."
+    )
+    yield result_warning("implausible-result", template)
 
 
 def _is_undetermined(name: str, quantity: Quantity) -> bool:

@@ -18,6 +18,7 @@ from analysis.results.joint_fit import JointFit
 from analysis.results.plausibility import (
     remove_friction_of_tilted_plane,
     remove_undetermined,
+    remove_undetermined_period,
     tilt_warnings,
 )
 from analysis.uncertainty import UncertaintyBudget
@@ -55,7 +56,8 @@ def judge(
     """
     warnings = list(remove_friction_of_tilted_plane(budget))
     joint, found = _compare_estimates(joint, plate, budget, ideal, spread, law_is_given=law_is_given)
-    warnings += [*found, *remove_undetermined(budget), *tilt_warnings(budget.results)]
+    warnings += [*found, *remove_undetermined(budget), *remove_undetermined_period(budget)]
+    warnings += tilt_warnings(budget.results)
     return joint if _NAME in budget.results else _with_degree(joint, Degree.NONE), warnings
 
 

@@ -76,6 +76,7 @@ def build_record(
         pullback_m=metadata.pullback_m,
         clock_scale=clock_scale,
         clock_scale_uncertainty=clock_scale_uncertainty,
+        clock_is_timed=clock_scale_uncertainty > 0.0 or bool(metadata.truth),
         table_gauge=gauge_uncertainty(metadata.gauges.table),
         relative_gauge=relative,
         gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",

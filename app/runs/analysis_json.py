@@ -181,14 +181,12 @@ def mass_warnings(metadata: "RunMetadata", used: StandMasses) -> Iterator[Result
         yield ResultWarning("masses-given", text)
 
 
-def unstated_warnings(
-    metadata: "RunMetadata", record: Record, result: Identification
-) -> Iterator[ResultWarning]:
-    """Say which uncertainties are missing: of gains, and of the clock of a run that was not simulated."""
+def unstated_warnings(record: Record, result: Identification) -> Iterator[ResultWarning]:
+    """Say which uncertainties are missing: of gains, and of a clock that was not timed."""
     if "friction_dynamic" in result.results:
         has_gauge_2 = record.relative_displacement_m is not None
         yield from unstated_gain_warnings(record.table_gauge, record.relative_gauge if has_gauge_2 else None)
-    if "period_s" in result.results and record.clock_scale_uncertainty == 0.0 and not metadata.truth:
+    if "period_s" in result.results and not record.clock_is_timed:
         text = message(
             "the clock was not timed: an error of it is an error of T, whose uncertainty lacks that part, and"
             " twice as large in f_d. Record with Slipstand, which times the clock."

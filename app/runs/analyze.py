@@ -85,7 +85,7 @@ def analyze_run(
     identification.warnings.extend(
         [
             *analysis_json.mass_warnings(metadata, record.masses),
-            *analysis_json.unstated_warnings(metadata, record, identification),
+            *analysis_json.unstated_warnings(record, identification),
             *analysis_json.calibration_warnings(metadata.gauges, metadata.start_time.date()),
             *analysis_json.gauge_check_warnings(metadata.gauge_checks),
             *(

@@ -209,13 +209,14 @@ def _budget(found: Identification) -> Iterator[blocks.Block]:
 
 
 def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
-    """Sources of the results shown, sorted by their contribution to the first result, then to the others."""
+    """Sources of the results shown, by share of the first result, then of the others; unstated last."""
     sources: dict[str, None] = {}
     for name in shown:
         lines = [line for line in budget if line.contribution_to == name]
-        lines.sort(key=lambda line: (math.isnan(line.standard_uncertainty), line.standard_uncertainty))
-        sources |= dict.fromkeys(str(line.source) for line in reversed(lines))
-    return list(sources)
+        lines.sort(key=lambda line: (math.isnan(line.standard_uncertainty), -line.standard_uncertainty))
+        sources |= dict.fromkeys(str(line.source) for line in lines)
+    unstated = {str(line.source) for line in budget if math.isnan(line.standard_uncertainty)}
+    return sorted(sources, key=lambda source: source in unstated)
 
 
 def _share(deviation: float | None, row: QuantityDefinition) -> str:

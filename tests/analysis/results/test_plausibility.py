@@ -8,6 +8,7 @@ from analysis.results.plausibility import (
     check_period,
     remove_friction_of_tilted_plane,
     remove_undetermined,
+    remove_undetermined_period,
     tilt_warnings,
 )
 from analysis.uncertainty import UncertaintyBudget
@@ -48,10 +49,23 @@ def test_a_sound_budget_is_kept():
     assert len(budget.results) == 3
 
 
-@pytest.mark.parametrize(("period_s", "uncertainty_s"), [(279.0, 1.0), (3.3, 4.2), (0.01, 1e-4)])
+@pytest.mark.parametrize(("period_s", "uncertainty_s"), [(279.0, 1.0), (0.01, 1e-4)])
 def test_a_period_that_no_stand_has_is_refused(period_s, uncertainty_s):
     with pytest.raises(RecordError, match="no stand does so"):
         check_period(Quantity.normal(period_s, uncertainty_s, "s"))
+
+
+@pytest.mark.parametrize(("period_s", "uncertainty_s"), [(3.3, 4.2), (1e-7, 1600.0)])
+def test_a_period_less_certain_than_long_is_left_out_with_what_follows_from_it(period_s, uncertainty_s):
+    """It was refused as "a period of 170 ± 590 ms, no stand does so (0.03 to 10 s)", or as one of 0 ms."""
+    budget = budget_of(
+        period_s=(period_s, uncertainty_s), stiffness_n_per_m=(2e5, 1e6), friction_dynamic=(0.1, 1e-3)
+    )
+    check_period(budget.results["period_s"])
+    (warning,) = remove_undetermined_period(budget)
+    assert list(budget.results) == ["friction_dynamic"]
+    assert warning.code == "implausible-result"
+    assert "no certain period" in str(warning.message)
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,11 @@ def test_what_an_imported_record_does_not_state_is_told(slipstand: Any, folder: 
     (document,) = slipstand("analyze", pullback_run(slipstand, folder), "--json").json
     codes = {warning["code"] for warning in document["warnings"]}
     assert {"gain-not-stated", "clock-not-timed"} <= codes
+    without_value = {"contribution_to", "source"}
+    lines = {tuple(line[key] for key in sorted(without_value)) for line in document["budget"]}
+    clock = {name for name, source in lines if source == "time base (not stated)"}
+    assert {"period_s", "stiffness_n_per_m", "table_velocity_max_m_per_s", "friction_dynamic"} <= clock
+    assert not {"log_decrement", "residual_displacement_m"} & clock
 
 
 def test_both_methods_stand_side_by_side(slipstand: Any, folder: Path) -> None:
