@@ -66,7 +66,7 @@ class BudgetSource(Enum):
     GAUGE_1_NONLINEARITY = N_("gauge 1 non-linearity"), SharedBy.CALIBRATION, True
     GAUGE_2_NONLINEARITY = N_("gauge 2 non-linearity"), SharedBy.CALIBRATION, True
     GAUGE_2_LAG = N_("lag of gauge 2"), SharedBy.CALIBRATION
-    MODEL = N_("model"), SharedBy.NONE  # difference between independent estimates
+    MODEL = N_("model"), SharedBy.SERIES  # what models leave unexplained, alike in repeats on one stand
     UNDIVIDED = N_("not broken down")  # the whole uncertainty of a quantity that has no budget
     READINGS = N_("readings"), SharedBy.NONE
     DIAL_GAUGE = N_("dial gauge")

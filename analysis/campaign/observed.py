@@ -24,9 +24,8 @@ class ObservedUncertainty:
     runs: int  # that have an f_d
     noise: float  # of the readings, and doubt about the law
     between_runs: float | None  # scatter of repeats beyond that; None without repeats
-    model: float  # what the models of the runs leave unexplained
+    model: float  # what the models of the runs leave unexplained, alike in all
     shared: float  # of gauges, masses, gravity and clock
-    model_is_shared: bool  # the stand has the same effects in every run, and repeats share what they leave
 
     @property
     def standard_uncertainty(self) -> float:
@@ -36,7 +35,7 @@ class ObservedUncertainty:
     @property
     def floor(self) -> float:
         """What no number of runs goes below."""
-        return math.hypot(self.shared, self.model if self.model_is_shared else 0.0)
+        return math.hypot(self.shared, self.model)
 
     @property
     def runs_to_halve(self) -> int | None:
@@ -69,20 +68,17 @@ class ObservedUncertainty:
 
     def of_mean(self, count: int) -> float:
         """Standard uncertainty of the mean of `count` runs, as a share of f_d."""
-        own = math.hypot(self.noise, self.between_runs or 0.0, 0.0 if self.model_is_shared else self.model)
+        own = math.hypot(self.noise, self.between_runs or 0.0)
         return math.hypot(own / math.sqrt(count), self.floor)
 
 
-def observe_uncertainty(
-    runs: Sequence[RunResult], effects: Sequence[EffectSummary]
-) -> ObservedUncertainty | None:
-    """Uncertainty of f_d in runs that show `effects`; None where none of them has an f_d."""
+def observe_uncertainty(runs: Sequence[RunResult]) -> ObservedUncertainty | None:
+    """Uncertainty of f_d in runs of one stand; None where none of them has an f_d."""
     parts = [found for run in runs if (found := _parts(run)) is not None]
     if not parts:
         return None
     noise, model, shared = np.median(np.array(parts), axis=0).tolist()
-    is_shared = any(effect.scope in (EffectScope.STAND, EffectScope.CONTACT) for effect in effects)
-    return ObservedUncertainty(len(parts), noise, _between_runs(runs), model, shared, is_shared)
+    return ObservedUncertainty(len(parts), noise, _between_runs(runs), model, shared)
 
 
 def planned_sizes(effects: Sequence[EffectSummary], pullback_m: float) -> dict[str, float]:
@@ -101,16 +97,10 @@ def _parts(run: RunResult) -> tuple[float, float, float] | None:
     friction = run_value(run, _FRICTION)
     if friction is None or friction.value <= 0.0:
         return None
-    model = math.hypot(
-        *(
-            line.standard_uncertainty
-            for line in run.budget
-            if line.contribution_to == _FRICTION and line.source is BudgetSource.MODEL
-        )
-    )
-    noise = math.sqrt(max(0.0, friction.repeatable**2 - model**2))
-    shared = math.hypot(*friction.common.values())
-    return noise / friction.value, model / friction.value, shared / friction.value
+    others = (share for error, share in friction.common.items() if error.source is not BudgetSource.MODEL)
+    parts = friction.repeatable, friction.model, math.hypot(*others)
+    noise, model, shared = (part / friction.value for part in parts)
+    return noise, model, shared
 
 
 def _between_runs(runs: Sequence[RunResult]) -> float | None:

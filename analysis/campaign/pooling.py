@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from analysis.arrays import Floats
 from analysis.campaign.scatter import RepeatedValues, SeriesScatter, estimate_scatter, find_outliers
 from analysis.campaign.series import RunResult
 from analysis.quantities import COVERAGE_FACTOR_95, BudgetLine, BudgetSource, Quantity, SharedBy, Source
@@ -40,6 +41,7 @@ class RunValue:
     common: dict[SharedError, float]  # standard uncertainties of errors shared with other runs
     half_widths: tuple[float, float]  # of the 95 % interval, below and above the value
     unit: str
+    model: float = 0.0  # the part of `common` that the run's model leaves unexplained
 
 
 def run_value(run: RunResult, name: str) -> RunValue | None:
@@ -59,7 +61,8 @@ def run_value(run: RunResult, name: str) -> RunValue | None:
     reach = quantity.value - low, high - quantity.value
     own = max(own, _own_by_interval(sum(reach) / 2.0 / COVERAGE_FACTOR_95, stated, common))
     smallest = max(_SMALLEST * abs(quantity.value), 1.0 / _LARGEST)
-    return RunValue(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit)
+    model = math.hypot(*(share for error, share in common.items() if error.source is BudgetSource.MODEL))
+    return RunValue(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit, model)
 
 
 def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
@@ -133,10 +136,11 @@ def pool(
 ) -> list[PooledQuantity]:
     """Pool one quantity of several series, each with one reading at least.
 
-    Weights are the inverse sum of each run's own variance and the variance between runs. Few repeats
-    determine the latter poorly: series of one kind (contact) determine it together, relative to the value if
-    `proportional` (`estimate_scatter`). The interval has Student's coverage factor, and is never narrower
-    than the runs' own uncertainties give. Shared errors are added at full size (JCGM 100, 5.2.4).
+    Weights are the inverse sum of each run's own variance, that of its model and that between runs. Few
+    repeats determine the latter poorly: series of one kind (contact) determine it together, relative to the
+    value if `proportional` (`estimate_scatter`). The interval has Student's coverage factor, and is never
+    narrower than the runs' own uncertainties give. Shared errors, those of models among them, are added at
+    full size (JCGM 100, 5.2.4).
 
     `kinds` is the kind of each series; by default all are of one kind. The result has the order of `series`.
     """
@@ -168,10 +172,11 @@ def _repeats(series: Sequence[Sequence[RunValue]], proportional: bool) -> Repeat
 def _pooled(
     readings: Sequence[RunValue], repeats: RepeatedValues, scatter: SeriesScatter, far: NDArray[np.bool_]
 ) -> PooledQuantity:
-    weights = repeats.weights(scatter.between)
-    shares = weights / weights.sum()
-    value, stated = float(shares @ repeats.values), 1.0 / math.sqrt(repeats.weights(0.0).sum())
-    seen, common = math.sqrt(scatter.factor / weights.sum()), defaultdict[SharedError, float](float)
+    model = np.array([one.model for one in readings])
+    shares, seen = _shares(repeats.weights(scatter.between), model)
+    _, stated = _shares(repeats.weights(0.0), model)
+    value, seen = float(shares @ repeats.values), math.sqrt(scatter.factor) * seen
+    common = defaultdict[SharedError, float](float)
     for one, share in zip(readings, shares.tolist(), strict=True):
         for key, deviation in one.common.items():
             common[key] += share * deviation
@@ -190,6 +195,16 @@ def _pooled(
         scatter.degrees_of_freedom,
         tuple(one.run for one, is_far in zip(readings, far, strict=True) if is_far),
     )
+
+
+def _shares(weights: Floats, model: Floats) -> tuple[Floats, float]:
+    """Share (n,) of each run in the mean, and the mean's standard uncertainty without what runs share.
+
+    A run that its model explains badly counts less, although all runs share what is left.
+    """
+    shares = 1.0 / (1.0 / weights + model**2)
+    shares /= shares.sum()
+    return shares, math.sqrt(float(np.sum(shares**2 / weights)))
 
 
 def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:

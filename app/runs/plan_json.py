@@ -42,7 +42,7 @@ def with_effects(
     return test.replace(
         effects=planned_sizes(effects, test.parameters.pullback_m),
         effects_pullback_m=test.parameters.pullback_m,
-        model_spread=observed.model if observed and observed.model_is_shared else 0.0,
+        model_spread=observed.model if observed else 0.0,
     )
 
 
@@ -60,7 +60,7 @@ def plan_document(test: PlannedTest, last: LastRuns | None = None) -> Document:
 def _with_last_runs(test: PlannedTest, last: LastRuns) -> tuple[PlannedTest, Document]:
     """The test with the stand's effects in it, and what the last runs say."""
     effects = summarize_effects(last.results)
-    observed = observe_uncertainty(last.results, effects)
+    observed = observe_uncertainty(last.results)
     changed = with_effects(test, effects, observed)
     ideal = expected_budget(test).results.get("friction_dynamic")
     described = None

@@ -287,7 +287,7 @@ def _expectations(code: str, runs: CollectedRuns, campaign: Campaign, stand: Sta
         **values,
     )
     effects = campaign.effects_of_stand
-    observed = observe_uncertainty([run for run in runs.runs if not run.excluded], effects)
+    observed = observe_uncertainty([run for run in runs.runs if not run.excluded])
     planned = plan(with_effects(build_planned_test(parameters, stand, load_gauges()), effects, observed))
     if _FRICTION in found:
         so_far = _with_uncertainty(found[_FRICTION].quantity)

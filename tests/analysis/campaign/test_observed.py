@@ -28,11 +28,11 @@ def with_model(run, share):
 
 def test_parts_are_medians_of_the_runs():
     runs = [friction_run(f"{n}", "1FFM0", 0.1, own=own) for n, own in enumerate((1e-4, 2e-4, 9e-4))]
-    found = observe_uncertainty([with_model(run, 0.004) for run in runs], ())
+    found = observe_uncertainty([with_model(run, 0.004) for run in runs])
 
     assert found.runs == 3
     assert (found.noise, found.model, found.shared) == pytest.approx((2e-3, 4e-3, SHARED))
-    assert not found.model_is_shared
+    assert found.floor == pytest.approx(math.hypot(4e-3, SHARED))
     assert found.standard_uncertainty == pytest.approx(math.sqrt(2e-3**2 + 4e-3**2 + SHARED**2))
 
 
@@ -40,17 +40,16 @@ def test_scatter_between_repeats_is_seen():
     rng = np.random.default_rng(1)
     frictions = 0.1 * (1.0 + 0.01 * rng.standard_normal(12))
     runs = [friction_run(f"{n}", "1FFM0", friction) for n, friction in enumerate(frictions)]
-    found = observe_uncertainty(runs, ())
+    found = observe_uncertainty(runs)
 
     assert found.between_runs == pytest.approx(np.std(frictions, ddof=1) / 0.1, rel=0.05)
-    assert observe_uncertainty(runs[:1], ()).between_runs is None
+    assert observe_uncertainty(runs[:1]).between_runs is None
 
 
 def test_what_the_stands_effects_leave_is_no_smaller_in_a_mean():
     runs = [with_model(effect_run(f"{n}", mode()), 0.01) for n in range(3)]
-    found = observe_uncertainty(runs, summarize_effects(runs))
+    found = observe_uncertainty(runs)
 
-    assert found.model_is_shared
     assert found.floor == pytest.approx(math.hypot(0.01, SHARED))
     assert found.of_mean(10_000) == pytest.approx(found.floor, rel=1e-3)
     assert found.runs_to_halve is None
@@ -61,7 +60,7 @@ def test_what_the_stands_effects_leave_is_no_smaller_in_a_mean():
     ("noise", "between", "model", "shared"), [(0.01, None, 0.0, 0.001), (0.004, 0.01, 0.003, 0.004)]
 )
 def test_the_runs_that_halve_it_do_and_one_less_does_not(noise, between, model, shared):
-    found = ObservedUncertainty(5, noise, between, model, shared, model_is_shared=False)
+    found = ObservedUncertainty(5, noise, between, model, shared)
     half = 0.5 * found.standard_uncertainty
 
     assert found.of_mean(found.runs_to_halve) <= half * (1.0 + 1e-12)
@@ -72,8 +71,8 @@ def test_the_runs_that_halve_it_do_and_one_less_does_not(noise, between, model, 
 def test_runs_without_friction_say_nothing():
     run = friction_run("a", "1FFM0", 0.1)
 
-    assert observe_uncertainty([], ()) is None
-    assert observe_uncertainty([replace(run, results={})], ()) is None
+    assert observe_uncertainty([]) is None
+    assert observe_uncertainty([replace(run, results={})]) is None
 
 
 def test_sizes_of_the_stand_alone_are_planned_with_at_the_planned_pullback():

@@ -1,6 +1,7 @@
 """Pooled repeats: which uncertainties shrink, and whether intervals hold the truth."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from scipy import stats
 from analysis.campaign.pooling import RunValue, SharedError, pool, run_ratio, run_value
 from analysis.quantities import COVERAGE_FACTOR_95, BudgetLine, BudgetSource, Quantity
 from tests.campaign_kit import FRICTION, run
+
+MODEL = SharedError(BudgetSource.MODEL, "1FFM0")
 
 
 def readings(values, own, gain=0.0, name=""):
@@ -212,3 +215,32 @@ def test_not_stated_sources_are_left_out_of_the_number():
     object.__setattr__(given, "budget", lines)
 
     assert math.isfinite(run_value(given, FRICTION).repeatable)
+
+
+def test_what_models_leave_unexplained_is_alike_in_repeats():
+    """Weights 1/(u^2 + m^2); noise shrinks, what models leave does not; another series has its own."""
+    friction, own, left = (0.1000, 0.1004), (3e-4, 4e-4), (4e-4, 3e-4)  # u^2 + m^2 is 25e-8 in both
+    repeats = [
+        run(f"{number}", "1FFM0", {FRICTION: (value, noise, 0.0)})
+        for number, (value, noise) in enumerate(zip(friction, own, strict=True))
+    ]
+    repeats = [
+        replace(each, budget=(*each.budget, BudgetLine(BudgetSource.MODEL, FRICTION, share)))
+        for each, share in zip(repeats, left, strict=True)
+    ]
+    values = [run_value(each, FRICTION) for each in repeats]
+    (found,) = pool([values], proportional=True)
+
+    assert found.quantity.value == pytest.approx(0.1002)
+    assert found.repeatable == pytest.approx(2.5e-4)  # half of (3e-4, 4e-4)
+    assert found.common[MODEL] == pytest.approx(3.5e-4)
+    assert found.quantity.standard_uncertainty == pytest.approx(math.hypot(2.5e-4, 3.5e-4))
+
+
+def test_a_run_that_its_model_explains_badly_counts_less():
+    values = [RunValue("a", 1.0, 0.01, {}, (0.02, 0.02), "1")]
+    values += [RunValue("b", 1.01, 0.01, {MODEL: 0.03}, (0.06, 0.06), "1", 0.03)]
+    (found,) = pool([values], proportional=True)
+
+    assert found.quantity.value == pytest.approx((10.0 * 1.0 + 1.01) / 11.0)
+    assert found.common == pytest.approx({MODEL: 0.03 / 11.0})
