@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.clock import Skew
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFullError, SettingsError
-from drivers.host_time import host_ns
+from drivers.host_time import ArrivalRate, host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses, SampleBlock
 from drivers.source import Decoder, Link
@@ -33,6 +33,14 @@ _STALL_S = 0.5
 """A read waits for 50 ms: where more time has passed, this computer stood still."""
 _MIN_WAIT_S = 0.1  # bytes that wait in the port are looked at, even if the deadline has passed
 _DRAIN_S = 0.3  # stopped devices still send what is in their buffers
+
+_WINDOW_S = 0.5
+_WINDOW_SAMPLES = 20
+"""How long, and for how many samples, arrivals are counted at least."""
+_MOST_ARRIVING, _LEAST_ARRIVING = 1.1, 0.9
+"""Arrivals by the rate that are right at once: bytes come late by up to 50 ms on a common computer."""
+_LEAST_OF_BUSY = 0.5
+"""Share that a busy computer may go on losing; where fewer come, the device has another rate."""
 
 
 class SampleSource(ABC):
@@ -182,6 +190,26 @@ class SampleSource(ABC):
         if self._rate_hz is None or measured_hz is None:
             return True
         return abs(measured_hz / self._rate_hz - 1) <= RATE_TOLERANCE
+
+    def time_stream(self, link: Link, frame_bytes: int) -> tuple[bytes, float | None]:
+        """Read until frames come at the nominal rate; returns what came, and the rate where it is another.
+
+        Only a steady rate that is far off counts: a busy computer loses samples, now more, now less.
+        """
+        arrivals = ArrivalRate(max(_WINDOW_S, _WINDOW_SAMPLES / self.rate_hz))
+
+        def is_right(received: bytes) -> bool:
+            arrivals.add(len(received) / frame_bytes if frame_bytes else 0.0)
+            return bool(arrivals.windows_hz) and self._may_be(arrivals.windows_hz[-1], _LEAST_ARRIVING)
+
+        received, agreed = self.await_data(link, self.timeout_s, is_right)
+        sent_hz = arrivals.steady_hz
+        if agreed or sent_hz is None or self._may_be(sent_hz, _LEAST_OF_BUSY):
+            return received, None
+        return received, sent_hz
+
+    def _may_be(self, arrival_hz: float, least: float) -> bool:
+        return least <= arrival_hz / self.rate_hz <= _MOST_ARRIVING
 
     def request(
         self, link: Link, command: bytes, find: Callable[[bytes], _Answer | None], tries: int = 1

@@ -9,7 +9,8 @@ from drivers.arrays import Counts, Floats, Ints, Record, Records, UInt8s, record
 from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
-from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet, state_type
+from drivers.fixed_frames import FixedFrameDecoder, read_numbers
+from drivers.packets import MAX_GAP_S, state_type
 from drivers.samples import SampleStatus
 from messages.i18n import N_
 
@@ -118,57 +119,28 @@ def encode_frames(layout: FrameLayout, counts: Counts, flags: int | UInt8s = 0) 
     return wire
 
 
-class FrameDecoder(PacketDecoder):
-    """Bytes to sample blocks. A frame has no checksum and no number that would prove a loss.
-
-    A row stands for each frame that came broken. Frames that did not come are estimated from the host's
-    clock, in `losses` alone. A wrong bit within a value is not noticed. The sample of a frame is given once
-    the next frame has begun. After a broken connection, rows stand for the time until the next frame.
+class FrameDecoder(FixedFrameDecoder):
+    """A `FixedFrameDecoder` of a GSV. The sample of a frame is given once the next frame has begun.
 
     An overload is marked on both gauges, because the device does not report its input.
     """
 
-    _has_time = False
-
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
-        super().__init__(STATE, rate_hz, max_gap_s)
+        super().__init__(STATE, layout.length, rate_hz, max_gap_s)
         self._layout = layout
         self._pattern = frame_pattern(layout)
-        self._loss_estimator = LossEstimator(rate_hz)
 
-    def expect_restart(self) -> None:
-        self._state["garbage"] += len(self._unfinished)
-        super().expect_restart()
+    def _find_frames(self, buffer: UInt8s, offsets: Ints, broken: Ints) -> tuple[int, int]:
+        return find_frames(buffer, self._pattern, self._state, offsets, broken)
 
-    def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
-        buffer = np.frombuffer(data, dtype=np.uint8)
-        offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
-        broken = np.empty(len(offsets), dtype=np.int64)
-        found, used = find_frames(buffer, self._pattern, self._state, offsets, broken)
-        offsets, self._unfinished = offsets[:found], data[used:]
-        packets = np.zeros(found, dtype=PACKET)
-        packets["samples"] = 1
-        packets["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
-        packets["damaged"] = broken[:found]
-        if self._arrival_ns is None:
-            packets["damaged"][:1] = 0
-        if found and self._state[0]["restarting"]:
-            gap = self._rows_since(arrival_ns, found)
-            packets["damaged"][0] = min(gap, broken[0])
-            packets["missing"][0] = gap - packets["damaged"][0]
-        if found:
-            count_packets(packets, self._state)
-        return packets, self._values(buffer, offsets)
-
-    def _values(self, buffer: UInt8s, offsets: Ints) -> Floats:
-        kind, size = self._layout.kind, self._layout.kind.size
-        starts = [self._layout.offset(channel) for channel in (self._layout.table, self._layout.relative)]
-        places = np.add.outer(offsets, np.add.outer(starts, np.arange(size)))
+    def _read_frames(self, buffer: UInt8s, offsets: Ints) -> tuple[Floats, Ints]:
+        status = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH_OVERLOADED, 0)
+        kind = self._layout.kind
+        places = [self._layout.offset(channel) for channel in (self._layout.table, self._layout.relative)]
+        numbers = read_numbers(buffer, offsets, places, kind.size)
         if kind is ValueKind.FLOAT32:
-            return buffer[places].view(">f4")[:, :, 0].astype(np.float64)
-        weights = 256.0 ** np.arange(size - 1, -1, -1)
-        values: Floats = buffer[places] @ weights - _ZERO[kind]
-        return values
+            return numbers.astype(np.uint32).view(np.float32).astype(np.float64), status
+        return (numbers - _ZERO[kind]).astype(np.float64), status
 
 
 FRAME_PATTERN = record_type("header kind length table relative is_float", "")
@@ -218,16 +190,6 @@ def find_frames(
         at += 1
     state.discarded_bytes += at - found * pattern.length
     return found, at
-
-
-@compiled
-def count_packets(packets: Records, states: Records) -> None:
-    """Add packets to the counts in `states` (1,)."""
-    state = states[0]
-    for packet in packets:
-        count_packet(state, packet, True)
-    state.restarts += state.restarting
-    state.restarting = 0
 
 
 @inlined

@@ -9,7 +9,6 @@ from drivers.devices.gsv import DRIVER, codec, commands
 from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.devices.gsv.commands import Code, InputType, Response
 from drivers.errors import ProtocolError
-from drivers.host_time import ArrivalRate
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
@@ -21,13 +20,6 @@ _TRIES = 2
 _CORNER_PER_RATE = 0.4
 """Corner by the data rate of the decimating filter, a weighted mean (kb.me-systeme.de, "Grenzfrequenz des
 GSV-8")."""
-_WINDOW_S = 0.5
-_WINDOW_SAMPLES = 20
-"""How long, and for how many samples, arrivals are counted at least."""
-_MOST_ARRIVING, _LEAST_ARRIVING = 1.1, 0.9
-"""Arrivals by the rate that are right at once: bytes come late by up to 50 ms on a common computer."""
-_LEAST_OF_BUSY = 0.5
-"""Share that a busy computer may go on losing; where fewer come, the device has another rate."""
 _INPUTS = dict(zip(("bridge-8.75v", "bridge-5v", "bridge-2.5v", "single-ended"), InputType, strict=True))
 
 
@@ -141,25 +133,14 @@ class GsvSource(SampleSource):
         self._rate_hz = actual_hz
 
     def _check_sent_rate(self, link: Link) -> bytes:
-        """Read until the stream has its rate; a steady one that is far off is refused, others are not."""
-        arrivals = ArrivalRate(max(_WINDOW_S, _WINDOW_SAMPLES / self.rate_hz))
-
-        def is_right(received: bytes) -> bool:
-            arrivals.add(len(received) / self._layout.length if self._layout else 0.0)
-            return bool(arrivals.windows_hz) and self._may_be(arrivals.windows_hz[-1], _LEAST_ARRIVING)
-
-        received, agreed = self.await_data(link, self.timeout_s, is_right)
-        steady_hz = arrivals.steady_hz
-        if not agreed and steady_hz is not None and not self._may_be(steady_hz, _LEAST_OF_BUSY):
+        received, sent_hz = self.time_stream(link, self._layout.length if self._layout else 0)
+        if sent_hz is not None:
             template = N_(
                 "the device says {rate_hz:g} Hz and sends {actual_hz:.3g} Hz: switch it off and on, after"
                 " which a GSV-6 takes a new rate, raise its baud rate, or ask for --rate {actual_hz:.3g}"
             )
-            raise ProtocolError(template, rate_hz=self._rate_hz, actual_hz=steady_hz)
+            raise ProtocolError(template, rate_hz=self._rate_hz, actual_hz=sent_hz)
         return received
-
-    def _may_be(self, arrival_hz: float, least: float) -> bool:
-        return least <= arrival_hz / self.rate_hz <= _MOST_ARRIVING
 
     def _set_layout(self, data: bytes) -> None:
         found = codec.find_layout(data)
