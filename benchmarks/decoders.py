@@ -21,6 +21,9 @@ from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT
 from drivers.devices.gsv.codec import FrameDecoder as GsvDecoder
 from drivers.devices.gsv.codec import FrameLayout, ValueKind
 from drivers.devices.gsv.codec import encode_frames as encode_gsv
+from drivers.devices.gsv_234.codec import FORMATS as GSV_FORMATS
+from drivers.devices.gsv_234.codec import FrameDecoder as Gsv234Decoder
+from drivers.devices.gsv_234.codec import encode_frames as encode_gsv_234
 from drivers.devices.harp.codec import EventDecoder, encode_events
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import encode_read_response
@@ -104,6 +107,9 @@ def report_amplifiers(counts: np.ndarray) -> None:
         wire = encode_gsv(layout, counts).tobytes()
         report_frames(name, lambda layout=layout: GsvDecoder(layout, RATE_HZ), wire, loop)
     print(f"| GSV, 2 channels, float32, struct loop | {millions(loop)} | | 1 |")
+    for model, layout in GSV_FORMATS.items():
+        wire = encode_gsv_234(layout, counts >> 8).tobytes()
+        report_frames(model.upper(), lambda layout=layout: Gsv234Decoder(layout, RATE_HZ), wire, loop)
     wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
     report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
     poll = plan_poll(tuple(read_map("generic", {}).channels.values()))

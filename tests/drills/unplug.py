@@ -40,14 +40,13 @@ from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 from tests.drivers.examples import RecordingExample, recording_examples
 
-RATE_HZ = 1000.0
 DURATION_S = 4.0
 PULLED_WITHIN_S = 1.0
 AWAY_S = (0.05, 2.0)
 RETURN_LIMIT_S = 2.0
 ESTIMATE_LIMIT_S = 0.1
 BEHIND_S = 0.05
-EXACT_S = 0.1 / RATE_HZ
+EXACT_PERIODS = 0.1
 
 SIXTEEN_BITS = """
 [table]
@@ -123,7 +122,7 @@ def unplug(
         gauges_file.write_text(SIXTEEN_BITS)
     options = SimulatedStandOptions(
         protocol=protocol,
-        rate_hz=RATE_HZ,
+        rate_hz=device.unplugged_hz,
         seed=1,
         tcp_port=0 if tcp else None,
         decay_s=5.0,
@@ -133,7 +132,9 @@ def unplug(
     report, moments, sent = UnplugReport(), random.Random(seed), Sent()
     files = (str(settings_file("stand.toml")), str(gauges_file))
     with SimulatedStand.start(options) as stand:
-        port = PortSettings(url=stand.port, protocol=protocol, rate_hz=device.polled_hz or RATE_HZ)
+        port = PortSettings(
+            url=stand.port, protocol=protocol, rate_hz=device.polled_hz or device.unplugged_hz
+        )
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
             for number in range(count):
@@ -221,7 +222,7 @@ def _check_places(
         is_same = after.stream == before.stream
         # A device of its own power tells what it has not sent yet; that of another stream is lost with it.
         wrong_s = (after.first - before.end) / rate_hz - (next_s - (heard_s if is_same else lost_s))
-        if abs(wrong_s) < EXACT_S and is_same and is_exact:
+        if abs(wrong_s) * rate_hz < EXACT_PERIODS and is_same and is_exact:
             continue
         if lost_s - heard_s > BEHIND_S:
             report.starved += 1

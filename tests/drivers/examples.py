@@ -40,7 +40,7 @@ class RecordingExample:
     """How the simulated device is recorded in benchmarks and drills."""
 
     title: str
-    rates_hz: tuple[int, ...] = (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
+    rates_hz: tuple[float, ...] = (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
     """To be tried for the highest one without loss."""
     is_exact: bool = True
     """Whether it tells how many samples it has taken while it was unplugged."""
@@ -48,6 +48,8 @@ class RecordingExample:
     """Rate at which a polled device is asked."""
     has_16_bits: bool = False
     """Its converter is narrower than that of the usual calibration."""
+    unplugged_hz: float = 1000.0
+    """Rate at which it is unplugged."""
 
 
 def wire_examples() -> list[WireExample]:

@@ -7,7 +7,7 @@ import numpy as np
 from drivers.devices.harp.codec import encode_events
 from drivers.registry import find_driver
 
-RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "csv": 500.0}
+RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "gsv-234": 500.0, "csv": 500.0}
 
 
 DURATION_S = 0.7

@@ -72,6 +72,7 @@ def sending(protocol: str, settings: dict[str, str], sent: LineSettings) -> Call
         ("csv", {"columns": "time_us,table,relative"}, LineSettings(115200)),
         ("csv", {"format": "openscale"}, LineSettings(9600)),
         ("gsv", {}, LineSettings(230400)),
+        ("gsv-234", {"format": "gsv-2"}, LineSettings(38400)),
         ("slipstand-binary", {}, LineSettings(460800)),
         ("harp", {}, LineSettings(1_000_000)),
         ("csv", {"columns": "time_us,table,relative"}, LineSettings(19200, "E")),
@@ -153,7 +154,13 @@ def test_each_question_is_asked_at_its_baud_rates_and_in_order():
         (tuning, question.data) for _, question in identity_queries() for tuning in question.line_settings
     ]
     assert wire.sent == expected
-    known = ["slipstand-binary", "harp", "gsv", "modbus"]
+    known = [
+        "gsv-234",
+        "slipstand-binary",
+        "harp",
+        "gsv",
+        "modbus",
+    ]  # AA, which a GSV sends, is a rate to a GSV-4
     assert [protocol for protocol, _ in identity_queries() if protocol in known] == known
 
 
@@ -170,4 +177,6 @@ def test_the_first_answer_ends_it():
     answered = query_identity(wire, lambda _: None, clock=wire.clock)
     assert answered.line_settings == LineSettings(115200)
     assert str(answered.recognition.remark) == "firmware 1.4, 2000 Hz"
-    assert wire.sent == [(tuning, b"I") for tuning in identity_queries()[0][1].line_settings]
+    (_, first), (_, second) = identity_queries()[:2]
+    before = [(tuning, first.data) for tuning in first.line_settings]
+    assert wire.sent == before + [(tuning, b"I") for tuning in second.line_settings]

@@ -11,6 +11,9 @@ DEVICES = {
     "harp": ("harp", {}),
     "gsv": ("gsv", {}),
     "gsv-int24": ("gsv", {"format": "device"}),
+    "gsv-4": ("gsv-234", {}),
+    "gsv-3": ("gsv-234", {"format": "gsv-3"}),
+    "gsv-2": ("gsv-234", {"format": "gsv-2"}),
     "openscale": ("csv", {"format": "openscale"}),
     "csv": ("csv", {"columns": "time_us,table,relative"}),
     "csv-ms": ("csv", {"columns": "time_ms,sequence,table,relative", "separator": "tab"}),
@@ -38,9 +41,10 @@ def test_each_device_is_known_by_its_bytes(name):
     assert (found.protocol, found.settings) == (protocol, given)
     assert found.share > 0.95
     assert found.rate_hz == pytest.approx(RATES_HZ[protocol], rel=0.01)
-    assert found.channels == (1 if "value" in given.get("columns", "") or name == "openscale" else 2)
+    has_one = "value" in given.get("columns", "") or name in ("openscale", "gsv-3", "gsv-2")
+    assert found.channels == (1 if has_one else 2)
     assert found.needs_rate == (name in ("csv-bare", "csv-crc"))
-    assert bool(found.remark) == (name == "harp")
+    assert bool(found.remark) == (name in ("harp", "gsv-4"))
 
 
 def test_the_time_of_many_lines_a_second_is_known():
@@ -64,7 +68,7 @@ def test_what_is_suggested_reads_the_bytes(name):
 
 
 def _given_rate(found):
-    return found.rate_hz if found.needs_rate or found.protocol == "gsv" else None
+    return found.rate_hz if found.needs_rate or found.protocol in ("gsv", "gsv-234") else None
 
 
 @pytest.mark.parametrize("name", DEVICES)

@@ -7,7 +7,7 @@ from drivers.errors import SettingsError
 from drivers.registry import DRIVERS, find_driver
 
 NAMES = [
-    "slipstand-binary", "csv", "gsv", "dataq", "modbus",
+    "slipstand-binary", "csv", "gsv", "gsv-234", "dataq", "modbus",
     "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
 ]  # fmt: skip
 
@@ -18,7 +18,14 @@ def test_all_promised_names_are_there_in_order():
 
 @pytest.mark.parametrize(
     ("name", "baud"),
-    [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200), ("modbus", 115200), ("harp", 1_000_000)],
+    [
+        ("slipstand-binary", 460800),
+        ("csv", 115200),
+        ("gsv", 115200),
+        ("gsv-234", 115200),
+        ("modbus", 115200),
+        ("harp", 1_000_000),
+    ],
 )
 def test_what_is_built_makes_a_source(name, baud):
     info = find_driver(name)

@@ -72,13 +72,25 @@ def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) 
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
-@pytest.mark.parametrize(("preset", "rate_hz"), [("mantracourt-dscusb", 300), ("loadstar-iload", 500)])
+@pytest.mark.parametrize(
+    ("protocol", "format_", "rate_hz"),
+    [
+        ("csv", "mantracourt-dscusb", 300),
+        ("csv", "loadstar-iload", 500),
+        ("gsv-234", "gsv-3", 500),
+        ("gsv-234", "gsv-2", 500),
+    ],
+)
 def test_two_streams_without_time_find_the_true_friction(
-    slipstand: Any, tmp_path: Path, preset: str, rate_hz: int
+    slipstand: Any, tmp_path: Path, protocol: str, format_: str, rate_hz: int
 ) -> None:
-    with two_stands(protocol="csv", device={"format": preset}, rate_hz=rate_hz, **QUICK) as (first, second):
-        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "csv", "--rate", rate_hz]
+    device = {"format": format_}
+    with two_stands(protocol=protocol, device=device, rate_hz=rate_hz, **QUICK) as (first, second):
+        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", protocol]
+        ports += ["--calibration", first.calibration] if first.calibration else []
         wanted = [
+            "--rate",
+            rate_hz,
             "--series",
             "1FFM0",
             "--pretrigger",
@@ -89,7 +101,7 @@ def test_two_streams_without_time_find_the_true_friction(
             60,
             "--json",
         ]
-        given = ["--set", f"format={preset}", "--directory", tmp_path]
+        given = ["--set", f"format={format_}", "--directory", tmp_path]
         recorded = slipstand("record", *ports, *given, *wanted).json
         true = first.truth().stand.friction_dynamic
     if (uncertainty_s := recorded["skew_standard_uncertainty_s"]) > 2e-3:
