@@ -18,6 +18,7 @@ import serial
 from drivers.devices.csv_lines.codec import LineDecoder, encode_line, encode_lines
 from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.devices.csv_lines.inference import OPENSCALE_FORMAT
+from drivers.devices.dataq.codec import WITH_DIGITAL, ScanDecoder, encode_scans
 from drivers.devices.gsv.codec import FrameDecoder as GsvDecoder
 from drivers.devices.gsv.codec import FrameLayout, ValueKind
 from drivers.devices.gsv.codec import encode_frames as encode_gsv
@@ -112,6 +113,10 @@ def report_amplifiers(counts: np.ndarray) -> None:
         report_frames(model.upper(), lambda layout=layout: Gsv234Decoder(layout, RATE_HZ), wire, loop)
     wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
     report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
+    wire = encode_scans(WITH_DIGITAL, counts >> 8).tobytes()
+    report_frames(
+        "DATAQ, 2 gauges and digital inputs", lambda: ScanDecoder(WITH_DIGITAL, RATE_HZ), wire, loop
+    )
     poll = plan_poll(tuple(read_map("generic", {}).channels.values()))
     wire = modbus_wire(poll, counts[:PLAIN_SAMPLES])
     report_frames(

@@ -7,7 +7,14 @@ import numpy as np
 from drivers.devices.harp.codec import encode_events
 from drivers.registry import find_driver
 
-RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "gsv-234": 500.0, "csv": 500.0}
+RATES_HZ = {
+    "slipstand-binary": 2000.0,
+    "harp": 1000.0,
+    "gsv": 1000.0,
+    "gsv-234": 500.0,
+    "csv": 500.0,
+    "dataq": 2000.0,
+}
 
 
 DURATION_S = 0.7
@@ -16,6 +23,8 @@ DURATION_S = 0.7
 def wire_of(protocol: str, settings: dict[str, str] | None = None) -> bytes:
     """0.7 s of a stand at rest, as the simulated device sends it, the first frame cut."""
     packing = find_driver(protocol).make_simulated(settings or {})
+    if protocol == "dataq":
+        packing.find_commands(b"slist 0 0\rslist 1 1\rslist 2 8\r")
     rate_hz = RATES_HZ[protocol]
     per_frame = packing.samples_per_frame(rate_hz)
     rng = np.random.default_rng(4)

@@ -14,6 +14,7 @@ DEVICES = {
     "gsv-4": ("gsv-234", {}),
     "gsv-3": ("gsv-234", {"format": "gsv-3"}),
     "gsv-2": ("gsv-234", {"format": "gsv-2"}),
+    "dataq": ("dataq", {}),
     "openscale": ("csv", {"format": "openscale"}),
     "csv": ("csv", {"columns": "time_us,table,relative"}),
     "csv-ms": ("csv", {"columns": "time_ms,sequence,table,relative", "separator": "tab"}),
@@ -44,7 +45,7 @@ def test_each_device_is_known_by_its_bytes(name):
     has_one = "value" in given.get("columns", "") or name in ("openscale", "gsv-3", "gsv-2")
     assert found.channels == (1 if has_one else 2)
     assert found.needs_rate == (name in ("csv-bare", "csv-crc"))
-    assert bool(found.remark) == (name in ("harp", "gsv-4"))
+    assert bool(found.remark) == (name in ("harp", "gsv-4", "dataq"))
 
 
 def test_the_time_of_many_lines_a_second_is_known():
