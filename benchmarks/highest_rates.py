@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -55,12 +55,19 @@ class Contender:
     """Its device samples at its own pace, and is asked at the rate that is tried."""
     gauges: tuple[Literal["table", "relative"] | None, ...] = (None,)
     """Of each device; None: both gauges are on the one."""
+    settings: dict[str, str] = field(default_factory=dict)
 
 
 CONTENDERS = (
     *(
-        Contender(example.title, protocol, example.rates_hz, is_polled=example.polled_hz is not None)
-        for protocol, example in recording_examples().items()
+        Contender(
+            example.title,
+            example.protocol,
+            example.rates_hz,
+            is_polled=example.polled_hz is not None,
+            settings=example.settings,
+        )
+        for example in recording_examples().values()
     ),
     Contender(
         "two Modbus devices of one gauge", "modbus", POLLED, is_polled=True, gauges=("table", "relative")
@@ -151,7 +158,13 @@ def running(
             for options in stand_options(contender, tcp, rate_hz)
         ]
         urls = [stand.port for stand in stands]
-        port = PortSettings(urls[0], contender.protocol, rate_hz=rate_hz, relative_url="".join(urls[1:]))
+        port = PortSettings(
+            urls[0],
+            contender.protocol,
+            rate_hz=rate_hz,
+            device=contender.settings,
+            relative_url="".join(urls[1:]),
+        )
         engine = stack.enter_context(EngineClient.start(port, *FILES))
         until(engine, Connected)
         time.sleep(SETTLED_S)
@@ -163,6 +176,7 @@ def stand_options(contender: Contender, tcp: bool, rate_hz: float) -> Iterator[S
     for number, gauge in enumerate(contender.gauges):
         yield SimulatedStandOptions(
             protocol=contender.protocol,
+            device=contender.settings,
             rate_hz=2000.0 if contender.is_polled else rate_hz,
             seed=number,
             tcp_port=0 if tcp else None,

@@ -65,9 +65,11 @@ class DeviceDriver:
         return recognise(data, duration_s) if recognise else None
 
     @property
-    def identity_query(self) -> "IdentityQuery | None":
-        """The question that asks a silent device who it is; None where there is none."""
-        return getattr(self._source(), "IDENTITY_QUERY", None)
+    def identity_queries(self) -> "tuple[IdentityQuery, ...]":
+        """The questions that ask a silent device who it is; `IDENTITY_QUERIES` where there are several."""
+        source = self._source()
+        one = getattr(source, "IDENTITY_QUERY", None)
+        return getattr(source, "IDENTITY_QUERIES", (one,) if one else ())
 
     def explain(self, received: bytes) -> Message | None:
         """Why the device sent `received` instead of samples, where its own bytes show it."""

@@ -210,6 +210,11 @@ class Port:
         return first + (self._socket_rest() if self._is_socket else self._rest())
 
     @property
+    def is_network(self) -> bool:
+        """Whether it leads to a TCP port."""
+        return self._is_socket
+
+    @property
     def has_baud(self) -> bool:
         """Whether the baud rate has an effect; it has none on a network or a pseudo-terminal."""
         return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")

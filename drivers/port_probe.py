@@ -33,6 +33,8 @@ _MAX_BYTES = 1 << 18
 _ANSWER_S = 0.4
 """How long an answer is waited for; serial devices answer within 100 ms."""
 
+_REOPEN_S = 0.5  # until a device that takes one connection has noticed that the last one was closed
+
 _USUAL_BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
 _BAUDS = dict.fromkeys((*_USUAL_BAUDS, *(driver.default_baud for driver in AVAILABLE if driver.default_baud)))
 _BAUDS_WITH_PARITY = (115200, 9600, 19200, 38400, 57600)
@@ -110,6 +112,11 @@ def _probe_link(
         template = N_("nothing sends by itself: try {option}, which asks the device who it is")
         return ProbeOutcome.SILENT, message(template, option=option("--write")), found
     answered = query_identity(link, on_progress)
+    if answered is None and link.is_network:
+        link.close()
+        time.sleep(_REOPEN_S)
+        with open_port(link.url, COMMON_LINE_SETTINGS[0].baud) as anew:
+            answered = query_identity(anew, on_progress, is_network=True)
     if answered is not None:
         return ProbeOutcome.RECOGNISED, EMPTY, answered
     template = N_(
@@ -145,24 +152,29 @@ def listen(
 
 
 def query_identity(
-    link: Port, on_progress: Callable[[Message], None], clock: Callable[[], float] = time.monotonic
+    link: Port,
+    on_progress: Callable[[Message], None],
+    clock: Callable[[], float] = time.monotonic,
+    *,
+    is_network: bool = False,
 ) -> ListenResult | None:
-    """Ask one question after the other of all devices. Raises DeviceLostError."""
+    """Ask one question after the other of all devices, or of those of networks. Raises DeviceLostError."""
     for protocol, query in identity_queries():
-        for settings in query.line_settings if link.has_baud else query.line_settings[:1]:
-            with_baud = N_("asking for {protocol} at {line_settings}")
-            template = with_baud if link.has_baud else N_("asking for {protocol}")
-            on_progress(message(template, protocol=protocol, line_settings=settings))
-            remark = _query_once(link, query, settings, clock)
-            if remark is not None:
-                found = Recognition(protocol, 1.0, 1, remark=remark)
-                return ListenResult(found, settings if link.has_baud else None)
+        if query.is_network is is_network:
+            for settings in query.line_settings if link.has_baud else (None,):
+                with_baud = N_("asking for {protocol} at {line_settings}")
+                template = with_baud if link.has_baud else N_("asking for {protocol}")
+                on_progress(message(template, protocol=protocol, line_settings=settings))
+                remark = _query_once(link, query, settings, clock)
+                if remark is not None:
+                    found = Recognition(protocol, 1.0, 1, settings=query.settings, remark=remark)
+                    return ListenResult(found, settings)
     return None
 
 
 def identity_queries() -> list[tuple[str, IdentityQuery]]:
     """Protocol and question of each device that has one."""
-    queries = [(driver.name, query) for driver in AVAILABLE if (query := driver.identity_query) is not None]
+    queries = [(driver.name, query) for driver in AVAILABLE for query in driver.identity_queries]
     return sorted(queries, key=lambda named: named[1].order)
 
 
@@ -194,9 +206,9 @@ def _informativeness(result: ListenResult) -> tuple[float, bool, float]:
 
 
 def _query_once(
-    link: Port, query: IdentityQuery, settings: LineSettings, clock: Callable[[], float]
+    link: Port, query: IdentityQuery, settings: LineSettings | None, clock: Callable[[], float]
 ) -> Message | None:
-    if link.has_baud:
+    if settings is not None:
         try:
             link.configure(settings)
         except SettingsError:

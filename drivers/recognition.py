@@ -60,6 +60,10 @@ class IdentityQuery:
     """Usual ones of such devices."""
     parse: Callable[[bytes], Message | None]
     """Identity in the answer, maybe empty; None while there is no answer."""
+    settings: dict[str, str] = field(default_factory=dict)
+    """Settings to record with from a device that answers."""
+    is_network: bool = False
+    """Whether only network addresses are asked, on a connection that no other question has spoilt."""
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:

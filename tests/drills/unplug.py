@@ -121,7 +121,8 @@ def unplug(
         gauges_file = folder / "sixteen-bits.toml"
         gauges_file.write_text(SIXTEEN_BITS)
     options = SimulatedStandOptions(
-        protocol=protocol,
+        protocol=device.protocol,
+        device=device.settings,
         rate_hz=device.unplugged_hz,
         seed=1,
         tcp_port=0 if tcp else None,
@@ -133,7 +134,10 @@ def unplug(
     files = (str(settings_file("stand.toml")), str(gauges_file))
     with SimulatedStand.start(options) as stand:
         port = PortSettings(
-            url=stand.port, protocol=protocol, rate_hz=device.polled_hz or device.unplugged_hz
+            stand.port,
+            device.protocol,
+            rate_hz=device.polled_hz or device.unplugged_hz,
+            device=device.settings,
         )
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)

@@ -1,7 +1,7 @@
 """Streams of all devices for benchmarks and drills, from `examples.py` of their test folders."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 
 import numpy as np
@@ -50,6 +50,9 @@ class RecordingExample:
     """Its converter is narrower than that of the usual calibration."""
     unplugged_hz: float = 1000.0
     """Rate at which it is unplugged."""
+    settings: dict[str, str] = field(default_factory=dict)
+    """Of the device, as `--set` takes them."""
+    protocol: str = ""
 
 
 def wire_examples() -> list[WireExample]:
@@ -58,8 +61,13 @@ def wire_examples() -> list[WireExample]:
 
 
 def recording_examples() -> dict[str, RecordingExample]:
-    """By the name of the protocol."""
-    return {driver.name: _examples(driver.package).RECORDING for driver in AVAILABLE}
+    """By the name of the protocol, and by those of its `VARIANTS`, which have other settings."""
+    found = {}
+    for driver in AVAILABLE:
+        examples = _examples(driver.package)
+        every = {driver.name: examples.RECORDING} | getattr(examples, "VARIANTS", {})
+        found |= {name: replace(example, protocol=driver.name) for name, example in every.items()}
+    return found
 
 
 def times_s(first: int, counts: Counts) -> NDArray[np.float64]:

@@ -161,7 +161,21 @@ def test_each_question_is_asked_at_its_baud_rates_and_in_order():
         "gsv",
         "modbus",
     ]  # AA, which a GSV sends, is a rate to a GSV-4
-    assert [protocol for protocol, _ in identity_queries() if protocol in known] == known
+    on_serial_lines = [protocol for protocol, query in identity_queries() if not query.is_network]
+    assert [protocol for protocol in on_serial_lines if protocol in known] == known
+
+
+def test_network_addresses_alone_are_asked_for_protocols_of_networks():
+    wire = FakeWire()
+    wire.has_baud = False
+    assert query_identity(wire, lambda _: None, clock=wire.clock) is None
+    of_all = [data for _, data in wire.sent]
+    wire.sent = []
+    assert query_identity(wire, lambda _: None, clock=wire.clock, is_network=True) is None
+    # units 1 and 255, function 3, one register from 0 on, behind transaction, protocol 0 and length 6
+    asked = [bytes.fromhex("0001 0000 0006 01 03 0000 0001"), bytes.fromhex("00FF 0000 0006 FF 03 0000 0001")]
+    assert [data for _, data in wire.sent] == asked
+    assert not set(asked) & set(of_all)
 
 
 def test_the_first_answer_ends_it():
@@ -177,6 +191,5 @@ def test_the_first_answer_ends_it():
     answered = query_identity(wire, lambda _: None, clock=wire.clock)
     assert answered.line_settings == LineSettings(115200)
     assert str(answered.recognition.remark) == "firmware 1.4, 2000 Hz"
-    (_, first), (_, second) = identity_queries()[:2]
-    before = [(tuning, first.data) for tuning in first.line_settings]
-    assert wire.sent == before + [(tuning, b"I") for tuning in second.line_settings]
+    (asked,) = [query for protocol, query in identity_queries() if protocol == "slipstand-binary"]
+    assert wire.sent[-len(asked.line_settings) :] == [(tuning, b"I") for tuning in asked.line_settings]

@@ -76,22 +76,29 @@ def test_what_sends_by_itself_is_recognised_without_a_word(make, protocol, setti
 
 
 @pytest.mark.parametrize(
-    ("make", "protocol", "remark"),
+    ("make", "protocol", "settings", "remark"),
     [
-        (open_tcp_port, "slipstand-binary", "firmware simulated-1, 500 Hz"),
-        pytest.param(open_pseudo_terminal, "harp", "", marks=posix),
-        (open_tcp_port, "dataq", "DI-2108"),
-        (open_tcp_port, "modbus", "unit 1 answers: choose its register map with --set map=NAME"),
+        (open_tcp_port, "slipstand-binary", {}, "firmware simulated-1, 500 Hz"),
+        pytest.param(open_pseudo_terminal, "harp", {}, "", marks=posix),
+        (open_tcp_port, "dataq", {}, "DI-2108"),
+        (open_tcp_port, "modbus", {}, "unit 1 answers: choose its register map with --set map=NAME"),
+        (
+            open_tcp_port,
+            "modbus",
+            {"framing": "tcp"},
+            "unit 1 answers: choose its register map with --set map=NAME",
+        ),
     ],
 )
-def test_what_waits_to_be_asked_is_asked_only_when_told_to(make, protocol, remark):
-    with simulated(make(), protocol, {}, 500.0) as url:
+def test_what_waits_to_be_asked_is_asked_only_when_told_to(make, protocol, settings, remark):
+    with simulated(make(), protocol, settings, 500.0) as url:
         silent = probe_port(port_info(url), False, lambda _: None)
         asked = probe_port(port_info(url), True, lambda _: None)
     assert (silent.outcome, silent.recognition) == (ProbeOutcome.SILENT, None)
     assert str(silent.message) == "nothing sends by itself: try --write, which asks the device who it is"
     assert asked.outcome is ProbeOutcome.RECOGNISED
     assert (asked.recognition.protocol, str(asked.recognition.remark)) == (protocol, remark)
+    assert asked.recognition.settings == settings
 
 
 def test_bytes_that_nobody_knows_are_shown():

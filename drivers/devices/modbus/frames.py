@@ -1,7 +1,8 @@
-"""Frames of Modbus RTU: requests to read and write registers, and the answers to them.
+"""Frames of Modbus: requests to read and write registers, and the answers to them; Modbus RTU.
 
-`unit | function | ... | CRC`, whole numbers most significant byte first, the CRC least significant byte
-first (MODBUS Application Protocol Specification V1.1b3; MODBUS over Serial Line V1.02, 2.5.1.2).
+A frame of RTU is `unit | function | ... | CRC`, whole numbers most significant byte first, the CRC least
+significant byte first (MODBUS Application Protocol Specification V1.1b3; MODBUS over Serial Line V1.02,
+2.5.1.2). What is before the CRC is the body of a frame, which `tcp_frames` has in common with it.
 """
 
 import struct
@@ -14,10 +15,10 @@ from messages.message import EMPTY, Message, message
 MAX_REGISTERS = 125  # registers that one request may read
 MAX_UNIT = 247
 EXCEPTION_BYTES = 5
-_REFUSED = 0x80
+REFUSED = 0x80
 _HEAD = 3
 _CHECK = 2
-_ECHO_BYTES = 8
+_ECHO_BYTES = 6
 
 
 class Function(IntEnum):
@@ -47,9 +48,9 @@ _EXCEPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request to a unit."""
+    """A request to a unit, in the framing of Modbus RTU."""
 
-    unit: int  # 1 to 247
+    unit: int
     function: Function
     register: int
     """First register, counted from 0."""
@@ -57,14 +58,28 @@ class Request:
     values: tuple[int, ...] = ()  # values to write; none where registers are read
 
     def encode(self) -> bytes:
-        frame = struct.pack(">BBHH", self.unit, self.function, self.register, self._second)
+        return with_crc(self.body)
+
+    @property
+    def body(self) -> bytes:
+        """Unit, function and what follows, as in all framings."""
+        body = struct.pack(">BBHH", self.unit, self.function, self.register, self._second)
         if self.function is Function.WRITE_MULTIPLE:
-            frame += struct.pack(f">B{self.count}H", 2 * self.count, *self.values)
-        return with_crc(frame)
+            body += struct.pack(f">B{self.count}H", 2 * self.count, *self.values)
+        return body
 
     @property
     def response_bytes(self) -> int:
-        return _HEAD + 2 * self.count + _CHECK if self.function in READ_FUNCTIONS else _ECHO_BYTES
+        return self._response_body_bytes + _CHECK
+
+    @property
+    def _response_body_bytes(self) -> int:
+        return _HEAD + 2 * self.count if self.function in READ_FUNCTIONS else _ECHO_BYTES
+
+    @property
+    def is_numbered(self) -> bool:
+        """Whether a response shows which request it answers."""
+        return False
 
     @property
     def description(self) -> Message:
@@ -79,7 +94,7 @@ class Request:
 
     def is_complete(self, received: bytes) -> bool:
         """Whether as many bytes came as the response, or an exception, has; they may still be wrong."""
-        is_exception = len(received) >= EXCEPTION_BYTES and received[1] == self.function | _REFUSED
+        is_exception = len(received) >= EXCEPTION_BYTES and received[1] == self.function | REFUSED
         return is_exception or len(received) >= self.response_bytes
 
     def parse_response(self, received: bytes) -> "Response":
@@ -88,19 +103,31 @@ class Request:
         if with_crc(received[:-_CHECK]) != received:
             template = N_("{count} bytes came, {expected} with a right CRC are expected")
             return Response(fault=message(template, count=len(received), expected=self.response_bytes))
-        if received[0] != self.unit:
+        return self.parse_response_body(received[:-_CHECK])
+
+    def parse_response_body(self, body: bytes) -> "Response":
+        """Response in a body of 3 bytes or more, which its framing has found whole."""
+        if body[0] != self.unit:
             template = N_("unit {answered} answered where unit {unit} was asked")
-            return Response(fault=message(template, answered=received[0], unit=self.unit))
-        if received[1] == self.function | _REFUSED:
-            return exception_response(received[2])
+            return Response(fault=message(template, answered=body[0], unit=self.unit))
+        if body[1] == self.function | REFUSED:
+            return exception_response(body[2])
         is_read = self.function in READ_FUNCTIONS
-        is_wanted = received[1] == self.function and len(received) == self.response_bytes
-        if is_read and is_wanted and received[2] == 2 * self.count:
-            return Response(received[_HEAD:-_CHECK])
+        is_wanted = body[1] == self.function and len(body) == self._response_body_bytes
+        if is_read and is_wanted and body[2] == 2 * self.count:
+            return Response(body[_HEAD:])
         echo = struct.pack(">HH", self.register, self._second)
-        if not is_read and is_wanted and received[2:6] == echo:
+        if not is_read and is_wanted and body[2:6] == echo:
             return Response()
         return Response(fault=message("it is the answer to another request"))
+
+    def numbered(self, number: int) -> "Request":  # noqa: ARG002 - RTU numbers nothing
+        """The same request with the number of its transaction, where the framing has one."""
+        return self
+
+    def split(self, received: bytes) -> tuple[bytes, bytes]:
+        """What came before the response to this very request, and the response, whole or not."""
+        return b"", received
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +155,7 @@ def find_exception(received: bytes) -> Response | None:
     """The first exception in `received`, of any unit; None where there is none."""
     for at in range(len(received) - EXCEPTION_BYTES + 1):
         frame = received[at : at + EXCEPTION_BYTES]
-        if frame[1] & _REFUSED and frame[2] in _EXCEPTIONS and with_crc(frame[:-_CHECK]) == frame:
+        if frame[1] & REFUSED and frame[2] in _EXCEPTIONS and with_crc(frame[:-_CHECK]) == frame:
             return exception_response(frame[2])
     return None
 
@@ -140,7 +167,7 @@ def encode_read_response(unit: int, function: int, data: bytes) -> bytes:
 
 def encode_exception(unit: int, function: int, code: int) -> bytes:
     """Exception response of a unit."""
-    return with_crc(bytes([unit, function | _REFUSED, code]))
+    return with_crc(bytes([unit, function | REFUSED, code]))
 
 
 def with_crc(frame: bytes) -> bytes:

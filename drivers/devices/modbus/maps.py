@@ -11,14 +11,20 @@ from typing import Any
 
 import msgspec
 
-from drivers.devices.modbus.frames import MAX_UNIT, READ_FUNCTIONS, WRITE_FUNCTIONS, Function
-from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, ValueType
+from drivers.devices.modbus.frames import (
+    MAX_REGISTERS,
+    MAX_UNIT,
+    READ_FUNCTIONS,
+    WRITE_FUNCTIONS,
+    Function,
+)
+from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, Framing, ValueType
 from drivers.driver import GAUGES
 from drivers.errors import SettingsError
 from messages.i18n import N_
 from messages.message import Message, message
 
-_TEXTS = ("title", "source", "caution")
+_TEXTS = ("base", "title", "source", "framing", "caution")
 _SHIPPED = files("drivers.devices.modbus").joinpath("maps")
 
 
@@ -31,6 +37,8 @@ class RegisterMap:
     caution: str
     """Note for every run that is read by this map; "" for none."""
     channels: dict[str, Channel]  # of the gauges `table` and `relative`, or of one of them
+    framing: Framing = Framing.RTU
+    """That of the transmitter, unless the setting `framing` names another one."""
 
 
 def shipped_maps() -> list[str]:
@@ -51,9 +59,17 @@ def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUG
     for both gauges, `table_register` for one. Raises SettingsError, which names file, key, value and remedy.
     """
     where, content = _content(name)
-    _check_keys(where, content, [*_TEXTS, *GAUGES, *_ALLOWED])
     channels = {gauge: _channel(gauge, _given(where, content, given, gauge), where) for gauge in gauges}
-    return RegisterMap(name, content.get("title") or name, content.get("caution", ""), channels)
+    framing = content.get("framing", Framing.RTU)
+    if framing not in tuple(Framing):
+        raise _impossible(f"{where}: framing", framing, message("one of {names}", names=list(Framing)))
+    title = content.get("title") or name
+    return RegisterMap(name, title, content.get("caution", ""), channels, Framing(framing))
+
+
+def map_source(name: str) -> str:
+    """Document that a shipped map, or a file, is from; "" where it names none."""
+    return str(_content(name)[1].get("source", ""))
 
 
 def _content(name: str) -> tuple[str, dict[str, Any]]:
@@ -66,8 +82,17 @@ def _content(name: str) -> tuple[str, dict[str, Any]]:
             raise SettingsError(template, name=name, shipped=shipped_maps())
         path = _SHIPPED.joinpath(f"{name}.toml")
     where = f"map {name}"
+    content = _read_toml(path, where)
+    _check_keys(where, content, [*_TEXTS, *GAUGES, *_ALLOWED])
+    base = content.pop("base", None)
+    if base is not None and base not in shipped_maps():
+        raise _impossible(f"{where}: base", base, message("one of {names}", names=shipped_maps()))
+    return where, (_content(base)[1] if base else {}) | content
+
+
+def _read_toml(path: Any, where: str) -> dict[str, Any]:
     try:
-        return where, tomllib.loads(path.read_text("utf-8"))
+        return tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
         template = N_("{where} cannot be read ({fault}): check its path")
         raise SettingsError(template, where=where, fault=error.strerror) from None
@@ -136,8 +161,12 @@ def _parse(key: str, value: Any, place: str) -> Any:
         is_possible = False
     if is_possible:
         return parsed
+    raise _impossible(place, value, _ALLOWED[key])
+
+
+def _impossible(where: str, value: object, allowed: Message) -> SettingsError:
     template = N_("{where} = {value} cannot be: give {allowed}")
-    raise SettingsError(template, where=place, value=repr(value), allowed=_ALLOWED[key])
+    return SettingsError(template, where=where, value=repr(value), allowed=allowed)
 
 
 def _whole(low: int, high: int) -> Message:
@@ -149,7 +178,7 @@ _FUNCTIONS = {"function": READ_FUNCTIONS, "zero_function": WRITE_FUNCTIONS}
 _BITS = message("bits from 0 to {last}, such as [2, 3] (--set: 2,3)", last=WORD_BITS - 1)
 _WORD = _whole(0, 0xFFFF)
 _ALLOWED = {
-    "unit": _whole(1, MAX_UNIT),
+    "unit": message("{usual}, with framing tcp also 0 and 255", usual=_whole(1, MAX_UNIT)),
     "function": message("{first} or {second}", first=3, second=4),
     "register": _WORD,
     "type": message("one of {names}", names=list(ValueType)),
@@ -158,6 +187,7 @@ _ALLOWED = {
     "status_register": _WORD,
     "overload_bits": _BITS,
     "fault_bits": _BITS,
+    "max_hole": _whole(0, MAX_REGISTERS),
     "sign_bit": _whole(0, WORD_BITS - 1),
     "zero_register": _WORD,
     "zero_value": _WORD,

@@ -7,9 +7,20 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, field
 
-from drivers.devices.modbus.frames import MAX_REGISTERS, MAX_UNIT, Function, Request
+from drivers.devices.modbus.frames import MAX_REGISTERS, Function, Request
+from drivers.devices.modbus.tcp_frames import MAX_UNIT, TcpRequest
 
 WORD_BITS = 16
+
+
+class Framing(StrEnum):
+    """What surrounds the body of a frame."""
+
+    RTU = "rtu"  # on serial lines, and behind device servers that pass bytes on
+    TCP = "tcp"
+
+
+_REQUESTS: dict[Framing, type[Request]] = {Framing.RTU: Request, Framing.TCP: TcpRequest}
 
 
 class ValueType(StrEnum):
@@ -46,7 +57,7 @@ _Bit = Annotated[int, Meta(ge=0, le=WORD_BITS - 1)]
 class Channel(Struct, frozen=True):
     """Registers of one gauge; the names on the wire are the keys of a register map."""
 
-    unit: Annotated[int, Meta(ge=1, le=MAX_UNIT)]
+    unit: Annotated[int, Meta(ge=0, le=MAX_UNIT)]
     function: Function
     """Function that reads it, 3 or 4."""
     register: _Register  # first register, counted from 0
@@ -58,6 +69,8 @@ class Channel(Struct, frozen=True):
     """Register with the state of the value, whose bits are counted from 0, the least significant."""
     overload_bits: tuple[_Bit, ...] = ()  # one of these marks an overload
     fault_bits: tuple[_Bit, ...] = ()  # one of these marks an invalid value
+    max_hole: Annotated[int, Meta(ge=0, le=MAX_REGISTERS)] = 0
+    """Registers that are not needed, between two that are, over which one request may read."""
     sign_bit: _Bit | None = None  # marks a negative value, whose own sign is then ignored
     zero_register: _Register | None = None  # register that takes the command which sets the value to zero
     zero_value: Annotated[int, Meta(ge=0, le=0xFFFF)] | None = None
@@ -161,27 +174,29 @@ class Poll:
         return answers[number][start : start + 2 * registers]
 
 
-def plan_poll(channels: tuple[Channel, ...]) -> Poll:
-    """The fewest requests that read only the needed registers."""
+def plan_poll(channels: tuple[Channel, ...], framing: Framing = Framing.RTU) -> Poll:
+    """The fewest requests that read only the needed registers, and holes as large as the channels allow."""
+    make_request = _REQUESTS[framing]
     spans: dict[tuple[int, Function], list[tuple[int, int]]] = {}
     for channel in channels:
         needed = spans.setdefault((channel.unit, channel.function), [])
         needed.append((channel.register, channel.register + channel.registers))
         if channel.status_register is not None:
             needed.append((channel.status_register, channel.status_register + 1))
+    max_hole = min(channel.max_hole for channel in channels)
     requests = tuple(
-        Request(unit, function, first, end - first)
+        make_request(unit, function, first, end - first)
         for (unit, function), parts in spans.items()
-        for first, end in _merge_spans(parts)
+        for first, end in _merge_spans(parts, max_hole)
     )
     return Poll(requests, channels)
 
 
-def _merge_spans(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Join spans that touch or overlap, while one request may read them."""
+def _merge_spans(spans: list[tuple[int, int]], max_hole: int) -> list[tuple[int, int]]:
+    """Join spans with at most `max_hole` registers between them, while one request may read them."""
     joined: list[tuple[int, int]] = []
     for first, end in sorted(spans):
-        if joined and first <= joined[-1][1] and end - joined[-1][0] <= MAX_REGISTERS:
+        if joined and first <= joined[-1][1] + max_hole and end - joined[-1][0] <= MAX_REGISTERS:
             joined[-1] = (joined[-1][0], max(end, joined[-1][1]))
         else:
             joined.append((first, end))

@@ -1,6 +1,7 @@
-"""A simulated Modbus RTU transmitter: the units of a register map, which answer requests."""
+"""A simulated Modbus transmitter, RTU or TCP: the units of a register map, which answer requests."""
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from drivers.arrays import Int32s
 from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.frames import Function
 from drivers.devices.modbus.maps import RegisterMap
-from drivers.devices.modbus.registers import ChannelValue, encode_channel
+from drivers.devices.modbus.registers import ChannelValue, Framing, encode_channel, plan_poll
 from drivers.devices.modbus.source import read_modbus_settings
+from drivers.devices.modbus.tcp_frames import find_bodies, with_header
 from drivers.driver import GAUGES
 from drivers.samples import SampleStatus
 from drivers.simulated.protocol import Command, CommandKind, PolledProtocol
@@ -19,8 +21,13 @@ _BITS_PER_BYTE = 10
 _TURNAROUND_S = 0.0004
 """At least 3.5 bytes of silence (MODBUS over Serial Line V1.02, 2.5.1.1), 0.3 ms at 115200 baud, and the time
 of a microcontroller."""
+_TCP_BYTE_S = 8e-8  # of Ethernet at 100 Mbit/s
+_TCP_TURNAROUND_S = 0.001
+"""Assumed for the network stack of a microcontroller; the manuals state no time."""
 _ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _ILLEGAL_VALUE = 1, 2, 3
+_UNIT_SILENT = 11  # a gateway's, whose unit did not answer
 _READ_BYTES = 8
+_CHECK_BYTES = 2
 _OVERLOADS = {"table": SampleStatus.OVERLOAD_TABLE, "relative": SampleStatus.OVERLOAD_RELATIVE}
 
 
@@ -51,6 +58,9 @@ class SimulatedModbus(PolledProtocol):
     def __init__(self, register_map: RegisterMap) -> None:
         self._channels = register_map.channels
         self._registers: dict[tuple[int, int], dict[int, int]] = {}
+        for request in plan_poll(tuple(self._channels.values())).requests:
+            held = self._registers.setdefault((request.unit, request.function), {})
+            held.update(dict.fromkeys(range(request.register, request.register + request.count), 0))
         self._latest = dict.fromkeys(GAUGES, 0)
         self._zero = dict.fromkeys(GAUGES, 0)
         self.store_sample(np.zeros(2, dtype=np.int32), 0)
@@ -111,6 +121,30 @@ class SimulatedModbus(PolledProtocol):
         return frames.with_crc(struct.pack(">B", unit) + asked[:5])
 
 
+def find_tcp_commands(data: bytes) -> tuple[list[Command], int]:
+    """Requests in `data`: `code` is transaction * 256 + unit, `parameters` are all from the function on."""
+    bodies, used = find_bodies(data)
+    return [
+        Command(CommandKind.OTHER, code=transaction << 8 | body[0], parameters=body[1:])
+        for transaction, body in bodies
+    ], used
+
+
+class SimulatedModbusTcp(SimulatedModbus):
+    """The same behind Modbus TCP, where a unit that is not there is refused, as by a gateway."""
+
+    find_commands = staticmethod(find_tcp_commands)
+    byte_s = _TCP_BYTE_S
+    turnaround_s = _TCP_TURNAROUND_S
+
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+        transaction, unit = divmod(command.code, 1 << 8)
+        response = super().respond(replace(command, code=unit), is_done, rate_hz)
+        response = response or frames.encode_exception(unit, command.parameters[0], _UNIT_SILENT)
+        return with_header(transaction, response[:-_CHECK_BYTES])
+
+
 def make_protocol(settings: dict[str, str]) -> SimulatedModbus:
     """The simulated device with its own settings. Raises SettingsError."""
-    return SimulatedModbus(read_modbus_settings(settings)[1])
+    register_map = read_modbus_settings(settings)[1]
+    return (SimulatedModbusTcp if register_map.framing is Framing.TCP else SimulatedModbus)(register_map)

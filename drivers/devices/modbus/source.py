@@ -1,19 +1,23 @@
-"""A transmitter that is polled by Modbus RTU, as a `SampleSource`."""
+"""A transmitter that is polled by Modbus RTU or Modbus TCP, as a `SampleSource`."""
 
+import itertools
 import time
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import msgspec
 
 from drivers.devices.modbus import DRIVER, frames
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.devices.modbus.frames import Function, Request, Response
+from drivers.devices.modbus.frames import MAX_UNIT, Function, Request, Response
 from drivers.devices.modbus.maps import MAP_KEYS, RegisterMap, is_map_key, read_map
-from drivers.devices.modbus.registers import plan_poll
+from drivers.devices.modbus.registers import Framing, plan_poll
+from drivers.devices.modbus.tcp_frames import TcpRequest, find_tcp_exception
 from drivers.driver import GAUGES
-from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.polling import (
     TOO_BUSY,
     TRIALS,
@@ -33,13 +37,20 @@ from messages.i18n import N_
 from messages.message import Message, joined, message, option
 
 MAX_RATE_HZ = 1000.0
+_SILENCE_S = 2.0
+"""A TCP connection does not show that its device was switched off: after so long without an answer it is
+closed and opened again."""
 _QUERY = Request(1, Function.READ_HOLDING, 0)
+_TCP_UNITS = (1, 255)
+"""Units asked for over TCP: the usual one, and the one that stands for the device at the IP address (MODBUS
+Messaging on TCP/IP Implementation Guide V1.0b, 4.4.2.1)."""
 
 
 class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What `--set` and `[device.settings]` may give, beside the keys of a register map."""
 
     map: str = "generic"  # a shipped register map, or a file that ends in `.toml`
+    framing: Framing | None = None  # of the frames; None: that of the map
     channel: Literal["both", "table", "relative"] = "both"
     """Gauges on this port; the column of another gauge is 0."""
     zero: bool = False  # whether to send the zero command of the map at the start
@@ -53,6 +64,17 @@ class ModbusSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def gauges(self) -> tuple[str, ...]:
         return GAUGES if self.channel == "both" else (self.channel,)
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """A request, and what came after it."""
+
+    transaction: Transaction
+    earlier: bytes
+    """What came before the response: the responses to earlier requests, and garbage."""
+    data: bytes  # the response, whole or not
+    response: Response
 
 
 class ModbusSource(SampleSource):
@@ -71,7 +93,10 @@ class ModbusSource(SampleSource):
         super().__init__(identity, DRIVER.default_baud, rate_hz)
         self._settings = settings
         self._map = register_map
-        self._poll = plan_poll(tuple(register_map.channels[gauge] for gauge in settings.gauges))
+        channels = tuple(register_map.channels[gauge] for gauge in settings.gauges)
+        self._poll = plan_poll(channels, register_map.framing)
+        self._numbers = itertools.count(1)
+        self._last_answer_s = 0.0
         self._schedule: PollSchedule | None = None
         self._timing: ResponseTiming | None = None
         self._response_overdue = False
@@ -102,8 +127,7 @@ class ModbusSource(SampleSource):
     def prepare(self) -> None:
         decoder = self._decoder_at(1.0)
         for number, request in enumerate(self._poll.requests):
-            data = frames.encode_read_response(request.unit, request.function, bytes(2 * request.count))
-            list(decoder.feed(wrap_response(number, 0, data), 0))
+            list(decoder.feed(wrap_response(number, 0, bytes(request.response_bytes)), 0))
 
     def start(self, link: Link) -> bytes:
         """Wait for a response, zero the device if asked to, and choose or check the rate."""
@@ -113,11 +137,13 @@ class ModbusSource(SampleSource):
             self._zero(link)
             self._await_responses(link)
         self._measure_timing(link)
+        self._last_answer_s = time.monotonic()
         return b""
 
     def resume(self, link: Link) -> bytes:
         self._await_responses(link)
         self._response_overdue = self._was_invalid = False
+        self._last_answer_s = time.monotonic()
         return b""
 
     def set_poll_rate(self, rate_hz: float) -> None:
@@ -134,24 +160,27 @@ class ModbusSource(SampleSource):
         self._was_busy = schedule.is_computer_busy
         if not is_due:
             return b""
-        wrapped, measured_ns = b"", 0
-        for number, request in enumerate(self._poll.requests):
-            transaction = transact(link, request, self._settings.timeout_s)
+        wrapped, earlier, measured_ns = b"", b"", 0
+        for number, planned in enumerate(self._poll.requests):
+            found = self._ask(link, planned)
+            transaction, response, earlier = found.transaction, found.response, earlier + found.earlier
             measured_ns = measured_ns or transaction.measured_ns
-            is_stale = self._response_overdue or timing.is_stale(transaction)
+            is_stale = not planned.is_numbered and (self._response_overdue or timing.is_stale(transaction))
             is_late = is_stale or not timing.is_on_schedule(number, transaction, schedule)
-            if transaction.data:
-                wrapped += wrap_response(number, transaction.measured_ns, transaction.data, is_late=is_late)
-            response = request.parse_response(transaction.data)
+            if found.data:
+                wrapped += wrap_response(number, transaction.measured_ns, found.data, is_late=is_late)
             # One damaged response leaves no bytes behind; two in a row may be out of step with the requests.
             was_invalid, self._was_invalid = self._was_invalid, response.is_invalid
-            if transaction.data and (is_stale or (was_invalid and response.is_invalid)):
+            if found.data and (is_stale or (was_invalid and response.is_invalid)):
                 drain(link)
-            self._response_overdue = not transaction.data
+            self._response_overdue = not found.data
             if not response.fault and not is_stale:
                 timing.update(number, transaction, schedule)
             if is_late or response.fault:
                 break
+        if earlier:  # before the responses, because a late one ends the poll that it belongs to
+            wrapped = wrap_response(0, measured_ns, earlier, is_late=True) + wrapped
+        self._check_silence(bool(wrapped))
         schedule.mark_used(measured_ns)
         return wrapped
 
@@ -165,18 +194,31 @@ class ModbusSource(SampleSource):
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
         return ResponseDecoder(self._poll, columns, rate_hz)
 
+    def _ask(self, link: Link, planned: Request) -> Exchange:
+        request = planned.numbered(next(self._numbers))
+        transaction = transact(link, request, self._settings.timeout_s)
+        earlier, data = request.split(transaction.data)
+        return Exchange(transaction, earlier, data, request.parse_response(data))
+
+    def _check_silence(self, has_answered: bool) -> None:
+        now_s = time.monotonic()
+        if has_answered:
+            self._last_answer_s = now_s
+        elif self._map.framing is Framing.TCP and now_s - self._last_answer_s > _SILENCE_S:
+            template = N_("the device has not answered for {seconds:g} s: check its power and the network")
+            raise DeviceLostError(template, seconds=_SILENCE_S)
+
     def _await_responses(self, link: Link) -> None:
         deadline_s = time.monotonic() + self.timeout_s
         received = drain(link)
         for request in self._poll.requests:
             last: Response | None = None
             while True:
-                transaction = transact(link, request, self._settings.timeout_s)
-                response = request.parse_response(transaction.data)
-                if not response.fault:
+                found = self._ask(link, request)
+                if not found.response.fault:
                     break
-                received += transaction.data + drain(link)
-                last = response if last is None or transaction.data else last
+                received += found.earlier + found.data + drain(link)
+                last = found.response if last is None or found.data else last
                 if time.monotonic() > deadline_s:
                     raise self._no_response_error(request, last, received)
 
@@ -192,6 +234,11 @@ class ModbusSource(SampleSource):
                 "unit {unit} does not answer {request}: check baud rate, parity and unit,"
                 " cable and power, and whether A and B are swapped"
             )
+            if self._map.framing is Framing.TCP:
+                template = N_(
+                    "unit {unit} does not answer {request}: check unit and port number (usually 502), and"
+                    " whether another program holds the device's only connection"
+                )
             return NoDataError(template, unit=unit, request=asked)
         what = describe_unreadable(received, DRIVER.name, DRIVER.default_baud)
         template = N_("no answer of unit {unit} to {request} ({reason}); {what}")
@@ -202,8 +249,10 @@ class ModbusSource(SampleSource):
             if channel.zero_register is None or channel.zero_value is None:
                 continue
             values = (channel.zero_value,)
-            request = Request(channel.unit, channel.zero_function, channel.zero_register, 1, values)
-            response = request.parse_response(transact(link, request, self._settings.timeout_s).data)
+            kind = type(self._poll.requests[0])
+            response = self._ask(
+                link, kind(channel.unit, channel.zero_function, channel.zero_register, 1, values)
+            ).response
             if response.fault:
                 template = N_("the {gauge} gauge was not set to zero: {reason}. Try again, or without zero")
                 raise ProtocolError(template, gauge=gauge, reason=response.fault)
@@ -219,8 +268,9 @@ class ModbusSource(SampleSource):
     def _trial_poll(self, link: Link) -> list[Transaction]:
         transactions = []
         for request in self._poll.requests:
-            transactions.append(transact(link, request, self._settings.timeout_s))
-            if request.parse_response(transactions[-1].data).fault:
+            found = self._ask(link, request)
+            transactions.append(found.transaction)
+            if found.response.fault:
                 drain(link)
         return transactions
 
@@ -252,6 +302,9 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
     parsed = parse_settings(ModbusSettings, own, DRIVER.name)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(parsed.map, given, parsed.gauges)
+    if parsed.framing is not None:
+        register_map = replace(register_map, framing=parsed.framing)
+    _check_units(register_map)
     if parsed.zero and all(one.zero_register is None for one in register_map.channels.values()):
         raise SettingsError(
             "zero is asked for, but map {map} has no zero command: leave zero out, or give"
@@ -261,24 +314,50 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
     return parsed, register_map
 
 
+def _check_units(register_map: RegisterMap) -> None:
+    places = []
+    for gauge, channel in register_map.channels.items():
+        if register_map.framing is Framing.RTU and not 1 <= channel.unit <= MAX_UNIT:
+            template = N_("{gauge}_unit = {unit} is no unit of a serial line: give 1 to {most}")
+            raise SettingsError(template, gauge=gauge, unit=channel.unit, most=MAX_UNIT)
+        places.append((channel.unit, channel.function, channel.register))
+    if len(places) > len(set(places)):
+        template = N_(
+            "both gauges would be read from register {register} of unit {unit}: give the unit or the register"
+            " of one (relative_unit, relative_register), or the port of its own device with --relative-port"
+        )
+        raise SettingsError(template, register=places[0][2], unit=places[0][0])
+
+
 def explain(received: bytes) -> Message | None:
     """Meaning of a Modbus exception in `received`; None without one."""
-    refused = frames.find_exception(received)
+    refused = frames.find_exception(received) or find_tcp_exception(received)
     if refused is None:
         return None
     return message("the device refuses, {fault}: hold its registers against its manual", fault=refused.fault)
 
 
-def _parse_response(received: bytes) -> Message | None:
-    if _QUERY.parse_response(received).is_invalid:
+def _parse_response(request: Request, received: bytes) -> Message | None:
+    if request.parse_response(request.split(received)[1]).is_invalid:
         return None
     template = N_("unit {unit} answers: choose its register map with {option} map=NAME")
-    return message(template, unit=_QUERY.unit, option=option("--set"))
+    return message(template, unit=request.unit, option=option("--set"))
 
 
-IDENTITY_QUERY = IdentityQuery(
-    4,
-    _QUERY.encode(),
-    tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
-    _parse_response,
+def _tcp_query(unit: int) -> IdentityQuery:
+    request = TcpRequest(unit, Function.READ_HOLDING, 0, transaction=unit)
+    settings = {"framing": "tcp"} | ({"unit": str(unit)} if unit != _QUERY.unit else {})
+    return IdentityQuery(
+        5, request.encode(), (), partial(_parse_response, request), settings, is_network=True
+    )
+
+
+IDENTITY_QUERIES = (
+    *map(_tcp_query, _TCP_UNITS),
+    IdentityQuery(
+        4,
+        _QUERY.encode(),
+        tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
+        partial(_parse_response, _QUERY),
+    ),
 )

@@ -54,6 +54,23 @@ def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Pat
     assert friction["interval_95"][0] < true < friction["interval_95"][1]
 
 
+def test_two_transmitters_on_ethernet_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
+    device = {"map": "flintec-dad141"}
+    with two_stands(protocol="modbus", device=device, tcp_port=0, rate_hz=1000.0, **QUICK) as (first, second):
+        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "modbus"]
+        wanted = ["--series", "1FFM0", "--rate", 100, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        given = ["--set", "map=flintec-dad141", "--directory", tmp_path]
+        recorded = slipstand("record", *ports, *given, *wanted).json
+        true = first.truth().stand.friction_dynamic
+    lost = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
+    if lost > 0.5:
+        pytest.skip(f"this computer is too busy for its polls: {lost:.0%} of them were late")
+    assert open_run(recorded["run"]).metadata.port == f"{first.port} + {second.port}"
+    assert first.port.startswith("socket://127.0.0.1:")
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
 def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
     """Lines that are asked for have the host's time, so those of two ports belong together."""
     with two_stands(protocol="csv", device={"format": "scpi-read"}, **QUICK) as (first, second):

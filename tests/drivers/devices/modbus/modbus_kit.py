@@ -8,7 +8,7 @@ from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import Request, encode_read_response
 from drivers.devices.modbus.maps import GAUGES
 from drivers.devices.modbus.registers import Poll, plan_poll
-from drivers.devices.modbus.simulated import SimulatedModbus, find_commands
+from drivers.devices.modbus.simulated import make_protocol
 from drivers.devices.modbus.source import read_modbus_settings
 from drivers.errors import DeviceLostError
 from drivers.samples import SampleBlock
@@ -19,7 +19,8 @@ COUNTS = np.array([70_000, -80_000], dtype=np.int32)
 
 def poll_for(**settings: str) -> Poll:
     chosen, register_map = read_modbus_settings(settings)
-    return plan_poll(tuple(register_map.channels[gauge] for gauge in chosen.gauges))
+    channels = tuple(register_map.channels[gauge] for gauge in chosen.gauges)
+    return plan_poll(channels, register_map.framing)
 
 
 def decoder_for(rate_hz: float = 100.0, **settings: str) -> ResponseDecoder:
@@ -50,9 +51,9 @@ class Transmitter:
 
     def __init__(self, clock: Clock, **settings: str) -> None:
         self._clock = clock
-        self.registers = SimulatedModbus(read_modbus_settings(settings)[1])
+        self.registers = make_protocol(settings)
         self.registers.store_sample(COUNTS, 0)
-        self._listener = CommandParser(find_commands)
+        self._listener = CommandParser(self.registers.find_commands)
         self.waiting = b""
         self.sent: list[bytes] = []
         self.is_lost = False

@@ -9,6 +9,7 @@ from drivers.devices.modbus.registers import (
     ByteOrder,
     Channel,
     ChannelValue,
+    Framing,
     ValueType,
     decode_channel,
     encode_channel,
@@ -17,7 +18,10 @@ from drivers.errors import SettingsError
 
 
 def test_the_shipped_maps_can_be_read():
-    assert shipped_maps() == ["generic", "laumas-tlb4", "scaime-enod4"]
+    assert shipped_maps() == [
+        "flintec-dad141", "generic", "laumas-ethernet", "laumas-tlb4", "scaime-enod4",
+        "scaime-enod4-ethernet",
+    ]  # fmt: skip
     for name in shipped_maps():
         assert set(read_map(name, {}).channels) == {"table", "relative"}
 
@@ -49,6 +53,23 @@ def test_the_status_of_an_enod4():
         assert (reading.is_overloaded, reading.is_faulty) == (is_overloaded, is_faulty)
     assert [(one.register, one.count) for one in poll.requests] == [(0x7D, 3), (0x7D, 3)]
     assert not read_map("scaime-enod4", {}).caution
+
+
+def test_a_dad141_is_read_in_one_request():
+    """Gross weight, net weight and qualifier of the combined result lie side by side from 3300h on."""
+    poll = poll_for(map="flintec-dad141", channel="relative")
+    assert [request.body for request in poll.requests] == [bytes.fromhex("01 03 33 00 00 05")]
+    words = {0x0000: (False, False), 0x0001: (True, False), 0x0002: (True, False), 0x0130: (False, False)}
+    for word, (is_overloaded, is_faulty) in words.items():
+        (reading,) = poll.channel_values([struct.pack(">iiH", -70_000, 5, word)])
+        assert reading == ChannelValue(-70_000.0, is_overloaded, is_faulty)
+
+
+def test_a_map_is_based_on_another():
+    ethernet, serial = read_map("laumas-ethernet", {}), read_map("laumas-tlb4", {})
+    assert (ethernet.framing, serial.framing) == (Framing.TCP, Framing.RTU)
+    assert ethernet.channels["table"] == serial.channels["table"]
+    assert ethernet.channels["relative"] == ethernet.channels["table"]
 
 
 def test_registers_that_do_not_touch_are_read_apart():
@@ -145,10 +166,12 @@ def test_a_map_of_your_own(tmp_path):
         ("unit = 1\nregister = 0\noverload_bits = 3\n", "overload_bits = 3 cannot be"),
         ("unit = 1\nregister = 0\nzero_register = 5\n", "table.zero_value is missing"),
         ("unit = 1\n", "table.register is missing: give it in the map, or --set table_register=NUMBER"),
-        ("registers = 7\n", "registers = 7 is not known: allowed are title, source, caution, table"),
+        ("registers = 7\n", "registers = 7 is not known: allowed are base, title, source, framing, caution"),
         ("[table]\nadress = 7\n", "table.adress = 7 is not known: allowed are unit, function"),
         ("table = 7\n", "table = 7 is no table: write [table] and its keys below"),
         ("title = 7\n", "title = 7 is no line of text"),
+        ("unit = 1\nregister = 0\nframing = 'udp'\n", "framing = 'udp' cannot be: give one of rtu, tcp"),
+        ("base = 'kern'\n", "base = 'kern' cannot be: give one of flintec-dad141, generic"),
         ("unit = = 1\n", "is no TOML (Invalid value"),
     ],
 )  # fmt: skip
@@ -165,7 +188,10 @@ def test_a_bad_map_is_one_clear_line(tmp_path, text, said):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("laumas", "map 'laumas' is not known: give one of generic, laumas-tlb4, scaime-enod4, or a file"),
+        (
+            "laumas",
+            "map 'laumas' is not known: give one of flintec-dad141, generic, laumas-ethernet, laumas-tlb4,",
+        ),
         ("nowhere.toml", "map nowhere.toml cannot be read (No such file or directory): check its path"),
     ],
 )

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from wire_helpers import join
 
+from drivers import port_probe
 from drivers.devices.modbus.source import make_source
 from drivers.errors import ProtocolError
-from drivers.port import open_port
+from drivers.port import open_port, port_info
 from drivers.registry import find_driver
 from drivers.samples import SampleBlock, SampleStatus
 from drivers.simulated.device import DeviceSetup, make_device
@@ -58,9 +59,13 @@ def simulated(transport: Transport, settings: dict[str, str]) -> Iterator[str]:
 # --- pymodbus as transmitter -------------------------------------------------------------
 
 
+FRAMINGS = ("rtu", "tcp")
+"""Pymodbus speaks both over TCP."""
+
+
 @contextmanager
-def pymodbus_server(values: dict[int, list[int]], first: int = 0) -> Iterator[str]:
-    """Units with the registers `values`, as RTU over TCP; yields what a reader opens."""
+def pymodbus_server(values: dict[int, list[int]], first: int = 0, framing: str = "rtu") -> Iterator[str]:
+    """Units with the registers `values`, on a TCP port; yields what a reader opens."""
     server_module = pytest.importorskip("pymodbus.server", reason="pymodbus is not installed")
     from pymodbus import FramerType
     from pymodbus.simulator import DataType, SimData, SimDevice
@@ -72,12 +77,16 @@ def pymodbus_server(values: dict[int, list[int]], first: int = 0) -> Iterator[st
         SimDevice(unit, [SimData(first, values=held, datatype=DataType.REGISTERS)])
         for unit, held in values.items()
     ]
+    framer_name = {"rtu": "RTU", "tcp": "SOCKET"}[framing]
     loop = asyncio.new_event_loop()
     is_ready = threading.Event()
 
     async def serve() -> None:
         server = server_module.ModbusTcpServer(
-            units, framer=FramerType.RTU, address=("127.0.0.1", number), ignore_missing_devices=True
+            units,
+            framer=getattr(FramerType, framer_name),
+            address=("127.0.0.1", number),
+            ignore_missing_devices=True,
         )
         await server.serve_forever(background=True)
         is_ready.set()
@@ -130,29 +139,47 @@ def test_we_read_the_registers_that_pymodbus_serves(settings, held, expected):
     assert np.all(block.counts[good] == expected)
 
 
-def test_we_read_two_units_of_pymodbus_with_status_and_sign():
+@pytest.mark.parametrize("framing", FRAMINGS)
+def test_we_read_two_units_of_pymodbus_with_status_and_sign(framing):
     held = {1: registers(">Hi", 0x80, 70_000), 2: registers(">Hi", 0x08, 123)}
-    with pymodbus_server(held, first=6) as url:
-        block, source = read_some(url, {"map": "laumas-tlb4"})
+    with pymodbus_server(held, first=6, framing=framing) as url:
+        block, source = read_some(url, {"map": "laumas-tlb4", "framing": framing})
     read = (block.status & (SampleStatus.MISSING | SampleStatus.DAMAGED)) == 0
     assert np.all(block.counts[read] == [-70_000, 123])
     assert np.all(block.status[read] == SampleStatus.OVERLOAD_RELATIVE)
     assert source.skew_s > 0
 
 
-def test_an_exception_of_pymodbus_is_told(monkeypatch):
+def test_we_read_a_dad141_of_pymodbus_and_the_probe_finds_it(monkeypatch):
+    """Gross weight, net weight and qualifier, of which the net weight is not needed."""
+    monkeypatch.setattr(port_probe, "FIRST_WAIT_S", 0.1)
+    with pymodbus_server({1: registers(">iiH", -70_000, 5, 0x0002)}, 0x3300, "tcp") as url:
+        block, source = read_some(url, {"map": "flintec-dad141", "channel": "table"})
+        report = port_probe.probe_port(port_info(url), True, lambda _: None)
+    read = (block.status & (SampleStatus.MISSING | SampleStatus.DAMAGED)) == 0
+    assert np.all(block.counts[read] == [-70_000, 0])
+    assert np.all(block.status[read] == SampleStatus.OVERLOAD_TABLE)
+    assert source.skew_s == 0.0
+    found = report.recognition  # the register asked for is not there, and pymodbus says so
+    assert (found.protocol, found.settings) == ("modbus", {"framing": "tcp"})
+
+
+@pytest.mark.parametrize("framing", FRAMINGS)
+def test_an_exception_of_pymodbus_is_told(monkeypatch, framing):
     monkeypatch.setattr("drivers.devices.modbus.source.ModbusSource.timeout_s", 0.1)
     said = "refuses function 03 for registers 2 to 5: illegal data address"
-    with pymodbus_server({1: [0, 1, 2, 3]}) as url, pytest.raises(ProtocolError, match=said):
-        read_some(url, {"table_register": "2", "relative_register": "4"})
+    server = pymodbus_server({1: [0, 1, 2, 3]}, framing=framing)
+    with server as url, pytest.raises(ProtocolError, match=said):
+        read_some(url, {"table_register": "2", "relative_register": "4", "framing": framing})
 
 
 def test_our_zero_command_is_taken_by_pymodbus():
     for function in ("6", "16"):
         settings = {"zero": "true", "zero_register": "3", "zero_value": "99", "zero_function": function}
-        with pymodbus_server({1: [0, 1, 0, 0]}) as url:
-            block, _ = read_some(url, settings)
-        assert block.counts[0].tolist() == [1.0, 99.0]
+        for framing in FRAMINGS:
+            with pymodbus_server({1: [0, 1, 0, 0]}, framing=framing) as url:
+                block, _ = read_some(url, settings | {"framing": framing})
+            assert block.counts[0].tolist() == [1.0, 99.0]
 
 
 # --- masters that read the simulated device ----------------------------------------------
@@ -214,13 +241,15 @@ def test_minimalmodbus_is_refused_and_heard_as_a_transmitter_does(master_for):
             master.read_register(0)
 
 
-def test_pymodbus_reads_our_units():
+@pytest.mark.parametrize("framing", FRAMINGS)
+def test_pymodbus_reads_our_units(framing):
     client_module = pytest.importorskip("pymodbus.client", reason="pymodbus is not installed")
     from pymodbus import FramerType
 
-    with simulated(open_tcp_port(), {"map": "laumas-tlb4"}) as url:
+    framer = {"rtu": FramerType.RTU, "tcp": FramerType.SOCKET}[framing]
+    with simulated(open_tcp_port(), {"map": "laumas-tlb4", "framing": framing}) as url:
         number = int(url.rpartition(":")[2])
-        client = client_module.ModbusTcpClient("127.0.0.1", port=number, framer=FramerType.RTU)
+        client = client_module.ModbusTcpClient("127.0.0.1", port=number, framer=framer)
         assert client.connect()
         found = [client.read_holding_registers(6, count=3, device_id=unit).registers for unit in (1, 2)]
         refused = client.read_holding_registers(60, count=3, device_id=1)

@@ -381,11 +381,22 @@ def test_a_lost_device_is_lost(clock):
 @pytest.mark.parametrize(
     ("settings", "rate_hz", "said"),
     [
-        ({"baud": "9600"}, None, "setting 'baud' is not known to modbus: allowed are channel, map"),
+        ({"baud": "9600"}, None, "setting 'baud' is not known to modbus: allowed are channel, framing, map"),
         ({"channel": "gauge"}, None, "settings of modbus: Invalid enum value 'gauge'"),
         ({"timeout_s": "3"}, None, "timeout_s 3 is out of range: give 0.005 to 1"),
         ({"zero": "true"}, None, "zero is asked for, but map generic has no zero command"),
-        ({"table_unit": "0"}, None, "--set table_unit = '0' cannot be: give a whole number from 1 to 247"),
+        (
+            {"table_unit": "256"},
+            None,
+            "--set table_unit = '256' cannot be: give a whole number from 1 to 247",
+        ),
+        ({"table_unit": "0"}, None, "table_unit = 0 is no unit of a serial line: give 1 to 247"),
+        ({"framing": "udp"}, None, "settings of modbus: Invalid enum value 'udp'"),
+        (
+            {"map": "laumas-ethernet"},
+            None,
+            "both gauges would be read from register 7 of unit 1: give the unit or the register of one",
+        ),
         ({"type": "double"}, None, "--set type = 'double' cannot be: give one of int16"),
         ({"map": "kern"}, None, "map 'kern' is not known"),
         ({}, 1001.0, "rate 1001 Hz cannot be polled: give one up to 1000, or leave it out"),
