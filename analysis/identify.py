@@ -140,8 +140,9 @@ def _identify(
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
                 report(0.75, f"fitting {law.name}")
-                fallback = search.fit_fallback(law, widest)
-                fits += [fallback] if _is_adequate(problem, decay, [fallback]) else []
+                fallback = search.explain_by_fallback(law, widest)
+                if fallback is not None and _is_adequate(problem, decay, [fallback]):
+                    fits.append(fallback)
 
     report(0.8, "uncertainty")
     if stand_search is not None and stand is not None and _explains_more(stand, decay, fits):

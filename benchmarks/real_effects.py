@@ -208,11 +208,11 @@ def _effects() -> tuple[Effect, ...]:
         ("gauge 2 in gauge 1, 0.1 to 2 %", 1e-3, 2e-2, on_gauge(1, "cross_talk"), one("cross-talk"), True),
         (
             "gauge 1 creeps, 20 to 200 um", 2e-5, 2e-4,
-            on_gauge(1, "creep_m", creep_time_s=(2.0, 15.0)), one(), True,
+            on_gauge(1, "creep_m", creep_time_s=(2.0, 15.0)), one("gauge-1-creep"), True,
         ),
         (
             "gauge 2 creeps, 20 to 200 um", 2e-5, 2e-4,
-            on_gauge(2, "creep_m", creep_time_s=(2.0, 15.0)), one(), True,
+            on_gauge(2, "creep_m", creep_time_s=(2.0, 15.0)), one("gauge-2-creep"), True,
         ),
     ]  # fmt: skip
     surroundings = [
@@ -254,7 +254,7 @@ def _effects() -> tuple[Effect, ...]:
         ("presliding, 2 to 10 um", 2e-6, 1e-5, on_stand("presliding_m"), one("presliding")),
         (
             "f_s grows with contact time, 1 to 10 % a decade", 0.01, 0.1,
-            on_stand("dwell_per_decade"), STATIC,
+            on_stand("dwell_per_decade"), STATIC | {"dwell"},
         ),
         ("tilt, 0.3 to 3 mrad", 3e-4, 3e-3, on_stand("tilt_rad"), TILT, True),
     ]  # fmt: skip

@@ -40,6 +40,7 @@ _FALLBACK_GRID, _FALLBACK_SCANS = np.geomspace(1.0, 2.0, 71), 4
 """f_s over f_d in steps of 1 %, and most scans. Minima of chi-square along f_s are a few per cent wide."""
 _EXPLAINED = 1.1
 """Chi-square a reading below which an integrated law needs no scan of f_s: its minimum is the right one."""
+_UNEXPLAINED = 2.0  # chi-square a reading above which a law leaves more than noise
 _WORTH = 0.5
 """Share of the simpler law's chi-square below which a scan of f_s is worth its second: the law explains the
 larger part, and a neighbouring minimum may explain the rest."""
@@ -148,10 +149,33 @@ class Search:
 
     def fit_fallback(self, law: FrictionLaw, simpler: Fit) -> Fit:
         """Fit a law that is too slow for a search, from its start points about the fit of a simpler law."""
-        some = self.window(np.inf)
         starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
-        starts.sort(key=lambda point: some.chi_square(point, law))
-        rough = [some.minimise(point, law, _FALLBACK_STEPS) for point in starts[:_FALLBACK_KEPT]]
+        return self._refine_fallback(law, self._rough_fallback(law, simpler, starts))
+
+    def explain_by_fallback(self, law: FrictionLaw, simpler: Fit) -> Fit | None:
+        """`fit_fallback`, but None where a shorter window shows that the law does not explain the record."""
+        first = self.window(simpler.value(Parameter.RELEASE) + _WINDOWS_PERIODS[1] * self.period_s)
+        starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
+        start = min(starts, key=lambda point: first.chi_square(point, law))
+        early = first.minimise(start, law, _FALLBACK_STEPS)
+        if early.cost > _UNEXPLAINED * first.sample_count:
+            return None
+        rough = self.window(np.inf).minimise(early.parameters, law, _FALLBACK_STEPS)
+        if rough.cost > _EXPLAINED * self.window(np.inf).sample_count:
+            rough = self._rough_fallback(law, simpler, starts)
+        if rough.cost > _UNEXPLAINED * self.window(np.inf).sample_count:
+            return None
+        return self._refine_fallback(law, rough)
+
+    def _refine_fallback(self, law: FrictionLaw, rough: Minimum) -> Fit:
+        last = self.problem.minimise(rough.parameters, law, _FALLBACK_STEPS)
+        return fit_at_minimum(self.problem, law, last)
+
+    def _rough_fallback(self, law: FrictionLaw, simpler: Fit, starts: list[Floats]) -> Minimum:
+        """Minimum of a law with some of the readings, from the best of a few start points."""
+        some = self.window(np.inf)
+        nearest = sorted(starts, key=lambda point: some.chi_square(point, law))[:_FALLBACK_KEPT]
+        rough = [some.minimise(point, law, _FALLBACK_STEPS) for point in nearest]
         best = min(rough, key=lambda minimum: minimum.cost)
         worth = _WORTH * some.chi_square(simpler.parameters, simpler.law)
         for _ in range(_FALLBACK_SCANS if best.cost < worth else 0):
@@ -164,8 +188,7 @@ class Search:
             if lowest.cost > best.cost - 1.0:
                 break
             best = lowest
-        last = self.problem.minimise(best.parameters, law, _FALLBACK_STEPS)
-        return fit_at_minimum(self.problem, law, last)
+        return best
 
     def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each of `laws` from several starts.

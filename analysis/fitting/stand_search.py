@@ -55,7 +55,14 @@ _MODE_DAMPING = 0.01  # damping ratio of a bolted joint
 _STEP_SHARES = (1.0, 0.3)  # of a linear step that are tried: phases of fast motions are far from linear
 _MASSES = (Parameter.TABLE_MASS, Parameter.PLATE_MASS)
 _BASE_DAMPING = 0.03  # damping ratio of a base on the ground or on a floor
-_SECOND_ORDER = (StandParameter.MODE_DAMPING, StandParameter.BASE_DAMPING)  # without effect to first order
+_CREEP_S = 5.0  # time constant of a gauge that warms up or creeps: seconds
+_SECOND_ORDER = {
+    StandParameter.MODE_DAMPING: _MODE_DAMPING,
+    StandParameter.BASE_DAMPING: _BASE_DAMPING,
+    StandParameter.CREEP_1_TIME: _CREEP_S,
+    StandParameter.CREEP_2_TIME: _CREEP_S,
+}
+"""Parameters without effect to first order, and where a fit begins."""
 _EFFORT_MAX = 1.2e6
 """Steps of integration after which a search adds no effect and follows only the best: 1 s of a core."""
 _STEPS_A_PERIOD = 75.0  # of motions with two slips a period ...
@@ -71,6 +78,7 @@ _RIVAL_BIC = 20.0  # rise above which another model does not bear on f_d: odds o
 PROMISE_MIN = 10.0
 """Fall of the BIC below which an effect is not tried: odds of 150 to 1 (Kass and Raftery: very strong)."""
 _EVIDENCE_MIN = 10.0  # fall of the BIC below which it is not kept
+_RISE_CERTAIN = 400.0  # of chi-square without an effect: 20 standard uncertainties, and no refit is needed
 _CLEAR_SIGMAS = 3.0  # of a size that is not zero
 _STEPS_TRIAL, _STEPS_WINDOW, _STEPS_LAST = 6, 10, 6
 _EXPLAINED = 1.15  # chi-square a reading below which a window asks for no further effect
@@ -211,7 +219,9 @@ class StandSearch:
         window = self._whole().decimated(_READINGS_WHOLE, self._slip_end_s)
         followed = self._continue(window, trials)
         trials = self._extend_while(
-            window, followed[:1], lambda _window, best: is_adequate(self._finish(best))
+            window,
+            followed[:1],
+            lambda window, best: _explains(window, best) and is_adequate(self._finish(best)),
         )
         return self._stand_fit(window, trials[0], [*trials, *followed])
 
@@ -360,6 +370,10 @@ class StandSearch:
         """Effort of one motion in a window, in steps of its integration; reading it costs some too."""
         fastest_hz = max(float(point[_PLACES[place]]) for place in _FREQUENCIES)
         steps_per_s = max(_STEPS_A_PERIOD / self._period_s, _STEPS_A_CYCLE * fastest_hz)
+        presliding_m = float(point[_PLACES[StandParameter.PRESLIDING]])
+        if presliding_m > 0.0:
+            square = point[Parameter.FRICTION_DYNAMIC] * point[Parameter.GRAVITY] / presliding_m
+            steps_per_s += float(square) ** 0.5
         squares = [float(point[_PLACES[place]]) for place in _FILTERS if point[_PLACES[place]] > 0.0]
         if squares:
             steps_per_s += _STEPS_A_GRID_POINT / filter_step_s(min(squares) ** 0.5)
@@ -368,18 +382,17 @@ class StandSearch:
 
     def _starts(self, window: FitProblem, effect: StandEffect, trial: _Trial) -> list[Floats]:
         """Points to begin the fit of one effect more from, where a linear step may lead elsewhere."""
-        point = trial.point.copy()
-        if effect is STATIC_FRICTION:
-            model = compose(self._law, (*trial.model.effects, effect))
-            points = np.tile(point, (len(_STATIC_RATIOS), 1))
-            points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * point[Parameter.FRICTION_DYNAMIC]
-            costs = [window.chi_square(one, model) for one in points]
-            self._effort += len(points) * self._steps(window, point)
-            return [points[int(np.argmin(costs))]]
-        starts = []
-        for probe in effect.probes:
-            starts.append(point.copy())
-            starts[-1][[_PLACES[place] for place in effect.own]] = probe
+        model, starts = compose(self._law, (*trial.model.effects, effect)), []
+        for probe in effect.probes or [()] * (effect is STATIC_FRICTION):
+            start = trial.point.copy()
+            start[[_PLACES[place] for place in effect.own]] = probe
+            if STATIC_FRICTION.name in (effect.name, effect.needs):
+                points = np.tile(start, (len(_STATIC_RATIOS), 1))
+                points[:, Parameter.FRICTION_STATIC] = _STATIC_RATIOS * start[Parameter.FRICTION_DYNAMIC]
+                costs = [window.chi_square(one, model) for one in points]
+                self._effort += len(points) * self._steps(window, start)
+                start = points[int(np.argmin(costs))]
+            starts.append(start)
         return starts
 
     def _without_needless(self, window: FitProblem, trial: _Trial) -> tuple[_Trial, dict[str, float]]:
@@ -387,6 +400,10 @@ class StandSearch:
         evidence: dict[str, float] = {}
         for effect in trial.model.effects:
             if any(other.needs == effect.name for other in trial.model.effects):
+                continue
+            rise = self._linear_rise(window, trial, effect)
+            if effect is not STATIC_FRICTION and rise > _RISE_CERTAIN:
+                evidence[effect.name] = rise - self._price(window, effect)
                 continue
             effects = tuple(other for other in trial.model.effects if other is not effect)
             point = trial.point.copy()
@@ -398,6 +415,16 @@ class StandSearch:
             else:
                 evidence[effect.name] = without.bic - trial.bic
         return trial, evidence
+
+    def _linear_rise(self, window: FitProblem, trial: _Trial, effect: StandEffect) -> float:
+        """Rise of chi-square without an effect of the trial, as a linear motion tells."""
+        free = _open_shared(window, trial.model).free_parameters(trial.model)
+        mine = np.isin(free, _sizes(effect))
+        normal = trial.minimum.quadratic.normal
+        inverse, _ = covariance(normal[np.ix_(~mine, ~mine)])
+        cross = normal[np.ix_(mine, ~mine)]
+        size = trial.point[free[mine]]
+        return float(size @ (normal[np.ix_(mine, mine)] - cross @ inverse @ cross.T) @ size)
 
     def _linear_steps(
         self,
@@ -414,10 +441,9 @@ class StandSearch:
         own_places = {place for effect in candidates for place in effect.own}
         for place in own_places.intersection(_FREQUENCIES):
             point[_PLACES[place]] = (frequencies_hz or {})[place]
-        if StandParameter.MODE_FREQUENCY in own_places:
-            point[_PLACES[StandParameter.MODE_DAMPING]] = _MODE_DAMPING
-        if StandParameter.BASE_FREQUENCY in own_places:
-            point[_PLACES[StandParameter.BASE_DAMPING]] = _BASE_DAMPING
+        for place, first in _SECOND_ORDER.items():
+            if place in own_places:
+                point[_PLACES[place]] = first
         law, effects = trial.model.law, trial.model.effects
         model = compose(law, (*effects, *candidates))
         free = window.free_parameters(model)
@@ -478,11 +504,16 @@ class StandSearch:
 def is_clear(fit: Fit, effect: StandEffect) -> bool:
     """Whether a size of the effect is not zero: without it a search may only end at a jump of f_s."""
     spread, _ = covariance(fit.normal_matrix)
-    sizes = [_PLACES[place] for place in effect.own if place not in (*_FREQUENCIES, *_SECOND_ORDER)]
-    mine = np.isin(fit.free, [*sizes, *effect.shared])
+    mine = np.isin(fit.free, _sizes(effect))
     return bool(
         (np.abs(fit.parameters[fit.free[mine]]) > _CLEAR_SIGMAS * np.sqrt(np.diag(spread)[mine])).any()
     )
+
+
+def _sizes(effect: StandEffect) -> list[int]:
+    """Places of the parameters that are zero without the effect."""
+    own = [_PLACES[place] for place in effect.own if place not in (*_FREQUENCIES, *_SECOND_ORDER)]
+    return [*own, *effect.shared]
 
 
 def extended_problem(problem: FitProblem) -> FitProblem:

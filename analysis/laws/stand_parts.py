@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
-from functools import cache
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from functools import cache, lru_cache
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -71,6 +71,11 @@ STAND_PARAMETERS = {
     StandParameter.BASE_DAMPING: OwnParameter("base_damping", "1", 0.0, 0.0, 0.3),
     StandParameter.HOLD_CREEP: OwnParameter("hold_creep_m_per_s", "m/s", 0.0, -0.01, 0.01),
     StandParameter.FILTER_DAMPING: OwnParameter("filter_damping", "1", 0.0, -0.4, 1.0),
+    StandParameter.PRESLIDING: OwnParameter("presliding_m", "m", 0.0, 1e-7, 5e-5),
+    StandParameter.CREEP_1: OwnParameter("gauge_1_creep_m", "m", 0.0, -2e-3, 2e-3),
+    StandParameter.CREEP_1_TIME: OwnParameter("gauge_1_creep_time_s", "s", 0.0, 0.5, 60.0),
+    StandParameter.CREEP_2: OwnParameter("gauge_2_creep_m", "m", 0.0, -2e-3, 2e-3),
+    StandParameter.CREEP_2_TIME: OwnParameter("gauge_2_creep_time_s", "s", 0.0, 0.5, 60.0),
 }
 """Names, units and bounds; at zero the stand is ideal. The bounds are beyond what a stand that still serves
 its purpose shows."""
@@ -127,6 +132,12 @@ EFFECTS = (
         bends_tail=True,
         misleads_plate=True,
     ),
+    StandEffect(
+        "dwell", (StandParameter.DWELL,), probes=((0.02,), (0.05,)), needs="static-friction", rarity=_RARE
+    ),
+    StandEffect("presliding", (StandParameter.PRESLIDING,), probes=((2e-6,),), bends_tail=True),
+    StandEffect("gauge-1-creep", (StandParameter.CREEP_1, StandParameter.CREEP_1_TIME), bends_tail=True),
+    StandEffect("gauge-2-creep", (StandParameter.CREEP_2, StandParameter.CREEP_2_TIME)),
     StandEffect("log-velocity", (StandParameter.LOGARITHMIC,), rarity=_RARE, varies_friction=True),
     StandEffect("gradient", (StandParameter.GRADIENT,), varies_friction=True),
     StandEffect("wear", (StandParameter.WEAR,), varies_friction=True),
@@ -181,9 +192,10 @@ class StandSolver(MotionSolver):
 
     def __init__(self, law: FrictionLaw) -> None:
         if isinstance(law.solver, IntegratedSolver):
-            self.kernels = stand_kernels(law.solver.friction, law.name.replace("+", "_"))
+            kernels = stand_kernels(law.solver.friction, law.name.replace("+", "_"))
         else:
-            self.kernels = stand_kernels(_constant_friction, "coulomb")
+            kernels = stand_kernels(_constant_friction, "coulomb")
+        self.kernels = replace(kernels, integrate=_remembered(kernels.integrate))
 
     def displacements(self, vector: Floats, time_s: Floats, duration_s: float) -> Floats:
         return gauge_readings(self.kernels, vector, self.kernels.integrate(vector, duration_s), time_s)
@@ -244,6 +256,20 @@ class StandSolver(MotionSolver):
         return found
 
 
+_Integrate: TypeAlias = Callable[[Floats, float], tuple[Floats, ...]]
+_MOTIONS_KEPT = 64  # those of two points for each parameter, as derivatives by differences need
+
+
+def _remembered(integrate: _Integrate) -> _Integrate:
+    """`integrate` that keeps its last motions: peaks, ends and means of one motion are asked one by one."""
+
+    @lru_cache(maxsize=_MOTIONS_KEPT)
+    def integrate_bytes(parameters: bytes, duration_s: float) -> tuple[Floats, ...]:
+        return integrate(np.frombuffer(parameters).copy(), duration_s)
+
+    return lambda parameters, duration_s: integrate_bytes(parameters.tobytes(), duration_s)
+
+
 @compiled_part
 def _constant_friction(_speed: float, parameters: Floats) -> float:
     coefficient: float = parameters[FRICTION_DYNAMIC]
@@ -261,6 +287,10 @@ _READ_ONLY = (
     StandParameter.SQUARE_2,
     StandParameter.CROSS_TALK,
     StandParameter.CROSS_TALK_1,
+    StandParameter.CREEP_1,
+    StandParameter.CREEP_1_TIME,
+    StandParameter.CREEP_2,
+    StandParameter.CREEP_2_TIME,
 )
 """Parameters of gauges, which leave the motion as it is."""
 _LAG_STEP_S = 1e-6
@@ -271,6 +301,7 @@ _OWN_STEPS = {
     StandParameter.FILTER_2: 2.5e-5,
     StandParameter.MODE_MASS: 1e-3,  # less is lost in the errors of shorter steps of integration
     StandParameter.BASE_COMPLIANCE: 1e-3,
+    StandParameter.PRESLIDING: 1e-8,  # less is lost in the errors of integration
 }
 _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction

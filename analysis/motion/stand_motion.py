@@ -65,6 +65,11 @@ class StandParameter(IntEnum):
     BASE_FREQUENCY = 29  # own frequency of the base (Hz)
     HOLD_CREEP = 30  # velocity of the table before the release and at it (m/s)
     BASE_DAMPING = 31  # damping ratio of the base
+    PRESLIDING = 32  # elastic deflection of the contact at which it slides (Dahl; m)
+    CREEP_1 = 33  # of the zero of gauge 1 since the release, in the end (m)
+    CREEP_1_TIME = 34  # its time constant (s)
+    CREEP_2 = 35  # the same of gauge 2
+    CREEP_2_TIME = 36
 
 
 STAND_PARAMETER_COUNT = len(StandParameter)
@@ -101,6 +106,11 @@ STAND_PARAMETER_COUNT = len(StandParameter)
     BASE_FREQUENCY,
     HOLD_CREEP,
     BASE_DAMPING,
+    PRESLIDING,
+    CREEP_1,
+    CREEP_1_TIME,
+    CREEP_2,
+    CREEP_2_TIME,
 ) = range(STAND_PARAMETER_COUNT)
 """The same places for compiled functions, which take no enumerations."""
 
@@ -111,6 +121,9 @@ _STEP_RAD = 0.14  # of the slipping table's motion: local errors of 1e-7 of the 
 _MODE_STEP_RAD = 0.3  # of the second mode's motion, which is some per cent of the swing
 _TURN_STEPS = 4  # of the search for the time at which the table turns; its velocity is nearly a line there
 INTEGRATION_ERROR_M = 1e-6  # of displacements, against motions in closed form
+_PRESLIDING_DAMPING = 0.1  # damping ratio of a plate on its contact; it rings by micrometres
+_PRESLIDING_STEP_RAD = 1.0  # of that ringing, which is below the noise of readings
+_SATURATED = 0.9999  # share of the friction at which a contact slides
 _NODES_MOST = 400_000  # a motion that needs more has parameters that no stand can have
 _EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halved at the least every other
 _GRAZING_DIVISIONS = 4  # of a first step of a slip that seems to end within it, each to a quarter
@@ -119,10 +132,10 @@ _ESCAPE, _ESCAPE_M = 10.0, 0.1
 TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE = range(7)
 """Columns of a node: time since release, u1 with its derivatives, and u2 - u1 with its derivatives."""
 FIRST_NODE = 5  # column of a phase beside those of `events`: row of its first node
-_STATE = 8
+_STATE = 9
 """u1, u1', u2' - u1', u2 - u1, then displacement and velocity of the second mode on the table and of the
-base."""
-_PLAIN = 4  # of them without second mode and moving base
+base, and the deflection of the contact."""
+_PLAIN = 4  # of them without second mode, moving base and presliding
 
 
 Phase: TypeAlias = tuple[float, float, float]
@@ -134,7 +147,8 @@ named tuple has another name."""
 @compiled_part
 def state_size(parts: Floats) -> int:
     """How many of the state's values move."""
-    return _STATE if parts[MODE_MASS] != 0.0 or parts[BASE_COMPLIANCE] != 0.0 else _PLAIN
+    is_plain = parts[MODE_MASS] == 0.0 and parts[BASE_COMPLIANCE] == 0.0 and parts[PRESLIDING] == 0.0
+    return _PLAIN if is_plain else _STATE
 
 
 @compiled_part
@@ -188,6 +202,16 @@ def table_force(parameters: Floats, parts: Floats, time: float, state: Floats) -
     return force
 
 
+@compiled_part
+def presliding_friction(parameters: Floats, parts: Floats, slip: float, deflection: float) -> float:
+    """Coefficient of friction of a contact that is deflected but does not slide (Dahl, 1968)."""
+    share = deflection / parts[PRESLIDING]
+    stiffness = parameters[FRICTION_DYNAMIC] / parts[PRESLIDING]
+    damping = 2.0 * _PRESLIDING_DAMPING * math.sqrt(stiffness / parameters[GRAVITY])
+    coefficient: float = stiffness * deflection + damping * (slip - abs(slip) * share)
+    return coefficient
+
+
 def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: Floats, out: Floats) -> float:
     """Write the derivative of `state` into `out`; return the plate's vertical acceleration."""
     sign, path, heading = phase
@@ -197,17 +221,20 @@ def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: F
     both = plate + table
     is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
     force = table_force(parameters, parts, time, state) - both * arc * arc * u * v * v
-    if sign == 0.0:
+    if sign == 0.0 and parts[PRESLIDING] == 0.0:
         if is_dry:
             force += dry_force(parameters, parts, u, heading, force)
         acceleration = force / (both * (1.0 + arc * arc * u * u))
         rate = 0.0
     else:
-        speed = abs(slip)
-        friction = friction_coefficient(speed, parameters) * (1.0 + parts[FILM] * speed)
-        if parts[LOGARITHMIC] != 0.0:
-            friction *= 1.0 + parts[LOGARITHMIC] * math.log(1.0 + speed / _LOGARITHMIC_VELOCITY_M_PER_S)
-        friction *= sign * track_factor(parts, sign, relative, path + sign * relative)
+        if sign == 0.0:
+            friction = presliding_friction(parameters, parts, slip, state[8])
+        else:
+            speed = abs(slip)
+            friction = friction_coefficient(speed, parameters) * (1.0 + parts[FILM] * speed)
+            if parts[LOGARITHMIC] != 0.0:
+                friction *= 1.0 + parts[LOGARITHMIC] * math.log(1.0 + speed / _LOGARITHMIC_VELOCITY_M_PER_S)
+            friction *= sign * track_factor(parts, sign, relative, path + sign * relative)
         load = gravity * (friction - parameters[TILT]) + friction * arc * v * v
         if is_dry:
             force += dry_force(parameters, parts, u, heading, force + plate * load)
@@ -223,6 +250,8 @@ def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: F
     else:
         out[6] = 0.0
     out[0], out[1], out[2], out[3], out[7] = v, acceleration - base, rate, slip, base
+    deflects = sign == 0.0 and parts[PRESLIDING] != 0.0
+    out[8] = slip - abs(slip) * state[8] / parts[PRESLIDING] if deflects else 0.0
     if parts[MODE_MASS] != 0.0:
         w = 2.0 * math.pi * parts[MODE_FREQUENCY]
         out[4] = state[5]
@@ -302,8 +331,16 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY] + parts[HOLD_CREEP]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
     heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
-    excess, direction = demand(parameters, parts, (0.0, 0.0, heading), 0.0, _HELD_S, state, slopes[4])
-    sign = direction if excess > 0.0 else 0.0
+    deflected, sign = parts[PRESLIDING], 0.0
+    if deflected != 0.0:
+        friction = parameters[FRICTION_DYNAMIC]
+        state[8] = deflected * min(max(parameters[TILT] / friction, -_SATURATED), _SATURATED)
+        square = friction * parameters[GRAVITY] / deflected
+        fastest = math.sqrt(square * (1.0 + parameters[PLATE_MASS] / parameters[TABLE_MASS]))
+        longest_at_rest = min(longest, _PRESLIDING_STEP_RAD / fastest)
+    else:
+        excess, direction = demand(parameters, parts, (0.0, 0.0, heading), 0.0, _HELD_S, state, slopes[4])
+        sign, longest_at_rest = direction if excess > 0.0 else 0.0, longest
     new_phase, unchecked = True, False
     while time < duration_s and node < _NODES_MOST and abs(state[0]) < _ESCAPE * pull + _ESCAPE_M:
         phase = (sign, path - sign * state[3], heading)
@@ -315,7 +352,12 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
             slope(parameters, parts, phase, time, state, slopes[0])
             nodes = _append_node(nodes, node, time, state, slopes[0])
             count, node, new_phase, began = count + 1, node + 1, False, time
-        step = min(longest, duration_s - time)
+        step = min(longest if sign != 0.0 else longest_at_rest, duration_s - time)
+        if sign == 0.0 and deflected != 0.0:  # no farther than half of a deflection
+            speed = abs(state[2])
+            step = min(
+                step, deflected / (speed + math.sqrt(speed**2 + deflected * abs(slopes[0, 2])) + 1e-12)
+            )
         if time < parts[RAMP]:
             step = min(step, max(parts[RAMP] - time, 1e-9))
         _step(parameters, parts, phase, time, state, trial, slopes, step)
@@ -376,6 +418,12 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
         node += 1
         if new_phase:
             stuck_s = time - began if sign == 0.0 else 0.0
+            if deflected != 0.0:
+                if sign != 0.0:
+                    state[2], state[8], sign = 0.0, sign * _SATURATED * deflected, 0.0
+                else:
+                    sign = math.copysign(1.0, state[8])
+                continue
             phase = (0.0, path, heading)
             excess, direction = demand(parameters, parts, phase, time, stuck_s, state, slopes[4])
             if sign != 0.0:
@@ -399,6 +447,9 @@ def _event(
     if phase[0] != 0.0:
         overrun: float = -phase[0] * state[2]
         return overrun
+    if parts[PRESLIDING] != 0.0:
+        beyond: float = abs(state[8]) / parts[PRESLIDING] - _SATURATED
+        return beyond
     excess, _ = demand(parameters, parts, phase, time, since_s, state, rates)
     return excess
 
@@ -525,6 +576,9 @@ def gauge_readings(
     if bends.any() or squares.any():
         share = read / pull
         read = read * (1.0 + (squares + bends * share) * share)
+    for row, size, time in ((0, CREEP_1, CREEP_1_TIME), (1, CREEP_2, CREEP_2_TIME)):
+        if parts[size] != 0.0:
+            read[row] -= parts[size] * np.expm1((vector[RELEASE] - times_s) / parts[time])
     return read
 
 

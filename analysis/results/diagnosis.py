@@ -33,6 +33,11 @@ SENTENCES = {
         " mean over the slid path."
     ),
     "gradient": N_("friction changes along the track by {size}: f_d is a mean over the slid path."),
+    "dwell": N_(
+        "static friction grows by {size} of itself as a stick lasts longer by a factor of e: wait as long"
+        " before each release."
+    ),
+    "presliding": N_("the contact gives way by {size} before it slides: look for dust or a film between."),
     "wear": N_("friction changes with the slid path by {size}: f_d is a mean over the slid path."),
     "spring-hardening": N_("the springs harden by {size} at the pullback: pull back less."),
     "spring-asymmetry": N_(
@@ -44,6 +49,11 @@ SENTENCES = {
     "second-mode": N_(
         "a second mode at {frequency}, of {size} of the table's mass: tighten what is mounted."
     ),
+    "gauge-1-creep": N_(
+        "the zero of gauge 1 creeps by {size}: let the amplifier warm up, and hold the table for a shorter"
+        " time."
+    ),
+    "gauge-2-creep": N_("the zero of gauge 2 creeps by {size}: let the amplifier warm up."),
     "filter": N_("a filter of {size} before both gauges rounds their readings: raise its corner."),
     "gauge-2-filter": N_("a filter of {size} before gauge 2 rounds its readings: raise its corner."),
     "gauge-1-bend": N_("gauge 1 is bent by {size} at the pullback: calibrate it over its whole range."),

@@ -48,6 +48,7 @@ MOTION_EFFECTS = {
     "wear": Effect("friction_wear_per_m", "1/m", -5.0, 5.0),
     "asymmetry": Effect("friction_asymmetry", "1", -0.5, 0.5),
     "dwell": Effect("friction_per_log_dwell", "1", 0.0, 0.5),
+    "presliding": Effect("presliding_m", "m", 1e-7, 5e-5),
 }
 GAUGE_EFFECTS = {
     "gauge-2-lag": Effect("gauge_2_lag_s", "s", 0.0, 0.1),

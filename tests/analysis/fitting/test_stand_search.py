@@ -1,5 +1,6 @@
 """Effects of a stand, found in records of an independent integrator."""
 
+import numpy as np
 import pytest
 from synthetic import Truth, simulate_record
 
@@ -18,17 +19,26 @@ KINDS = {
         {"second_mode_frequency_hz": 8.2, "second_mode_share": 0.01},
         "second-mode", "second_mode_frequency_hz", 8.2,
     ),
+    "presliding": ({"presliding_m": 3e-6}, "presliding", "presliding_m", 3e-6),
 }  # fmt: skip
 
 
-def record_of(stand: RealStand, truth: Truth | None = None, creep_m_per_s: float = 0.0, bend: float = 0.0):
-    """A record with a table that moves before its release and a gauge 1 that is bent, and its friction."""
+def record_of(
+    stand: RealStand,
+    truth: Truth | None = None,
+    *,
+    creep_m_per_s: float = 0.0,
+    bend: float = 0.0,
+    zero_creep_m: float = 0.0,
+):
+    """A record with its friction: the table moves before its release, gauge 1 is bent, its zero creeps."""
     motion = stand.simulate(10.5)
 
     def displacements(since_s):
         state = motion.sample(since_s.clip(0.0))
         table_m = state[U] + creep_m_per_s * since_s.clip(max=0.0)
-        return table_m * (1.0 + bend * (table_m / stand.pullback_m) ** 2), state[REL]
+        crept_m = -zero_creep_m * np.expm1(-since_s / 6.0)
+        return table_m * (1.0 + bend * (table_m / stand.pullback_m) ** 2) + crept_m, state[REL]
 
     return simulate_record(truth or Truth(), displacements), motion.friction_dynamic
 
@@ -83,6 +93,27 @@ def test_a_pull_that_goes_on_until_the_release_is_found():
     assert (found.model.degree, found.model.parts) == (Degree.STAND, ("hold-creep",))
     assert "hold-creep" in [warning.code for warning in found.warnings]
     assert found.results["hold_creep_m_per_s"].value == pytest.approx(2e-4, rel=0.05)
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+def test_a_zero_that_creeps_is_found():
+    record, friction = record_of(RealStand(), zero_creep_m=1e-4)
+    found = identify(record)
+
+    assert (found.model.degree, found.model.parts) == (Degree.STAND, ("gauge-1-creep",))
+    assert "gauge-1-creep" in [warning.code for warning in found.warnings]
+    assert found.results["gauge_1_creep_m"].value == pytest.approx(1e-4, rel=0.1)
+    assert found.results["gauge_1_creep_time_s"].value == pytest.approx(6.0, rel=0.2)
+    assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
+
+
+def test_static_friction_that_grows_with_dwell_is_found():
+    record, friction = record_of(RealStand(dwell_per_decade=0.09))
+    found = identify(record)
+
+    assert found.model.degree is Degree.STAND
+    assert set(found.model.parts) == {"static-friction", "dwell"}
+    assert "dwell" in [warning.code for warning in found.warnings]
     assert found.results["friction_dynamic"].value == pytest.approx(friction, rel=2e-3)
 
 

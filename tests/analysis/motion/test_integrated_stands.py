@@ -77,3 +77,23 @@ def test_a_table_that_creeps_in_its_hold_leaves_it_with_that_velocity():
     held = TIMES_S < 0.0
     np.testing.assert_allclose(table[held], 0.012 + 1e-3 * TIMES_S[held], atol=1e-12)
     np.testing.assert_allclose(table[41:], state[U], atol=INTEGRATION_ERROR_M)
+
+
+@pytest.mark.parametrize("presliding_m", [1e-6, 5e-6])
+def test_presliding_is_that_of_an_independent_integrator(presliding_m):
+    moving = TIMES_S >= 0.0
+    state = RealStand(presliding_m=presliding_m).simulate(5.1).sample(TIMES_S[moving])
+    table, relative = stand_displacements(parameters(0.1), {"presliding_m": presliding_m}, 5.1)(TIMES_S)
+    ideal, _ = stand_displacements(parameters(0.1), {}, 5.1)(TIMES_S)
+    # Contacts slide here at 0.9999 of their friction: what is left of the deflection is a part of it.
+    np.testing.assert_allclose(table[moving], state[U], atol=INTEGRATION_ERROR_M)
+    np.testing.assert_allclose(relative[moving], state[REL], atol=INTEGRATION_ERROR_M + 0.5 * presliding_m)
+    assert np.abs(ideal[moving] - state[U]).max() > 20.0 * INTEGRATION_ERROR_M
+
+
+def test_creep_of_a_gauge_begins_at_the_release_and_leaves_the_motion():
+    crept = {"gauge_1_creep_m": 1e-4, "gauge_1_creep_time_s": 5.0}
+    ideal = stand_displacements(parameters(), {}, 5.1)(TIMES_S)
+    table, relative = stand_displacements(parameters(), crept, 5.1)(TIMES_S)
+    np.testing.assert_allclose(table - ideal[0], -1e-4 * np.expm1(-TIMES_S / 5.0), atol=1e-12)
+    np.testing.assert_array_equal(relative, ideal[1])
