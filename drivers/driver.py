@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, cast
 
 from drivers.errors import SettingsError
@@ -20,12 +21,24 @@ GAUGES = ("table", "relative")
 
 
 @dataclass(frozen=True, slots=True)
+class DeviceVariant:
+    """A device that is read by a protocol with settings: a preset, a register map."""
+
+    name: str
+    title: str
+    settings: Mapping[str, str]  # as given to `--set`
+    verified: str
+    """What it was tested against."""
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceDriver:
     """Description of a device folder, which is its `DRIVER`.
 
     The folder holds `source.py` with `make_source(settings, rate_hz)` and, where they apply,
     `recognise(data, duration_s)`, `IDENTITY_QUERY`, `explain(received)` and
-    `single_gauge_settings(gauge, settings)`; and `simulated.py` with `make_protocol(settings)`.
+    `single_gauge_settings(gauge, settings)`; `simulated.py` with `make_protocol(settings)`; where settings
+    choose the device also `variants.py` with `list_variants()`.
     """
 
     name: str  # as given to `--protocol`
@@ -47,6 +60,13 @@ class DeviceDriver:
     @property
     def available(self) -> bool:
         return bool(self.package)
+
+    def list_variants(self) -> list[DeviceVariant]:
+        """Devices that its settings choose, by title; none where it has no `variants.py`."""
+        if not self.available or find_spec(f"{self.package}.variants") is None:
+            return []
+        found = import_module(f"{self.package}.variants").list_variants()
+        return sorted(cast(list[DeviceVariant], found), key=lambda variant: variant.title.lower())
 
     def default_baud_for(self, settings: Mapping[str, str]) -> int:
         return self.format_bauds.get(settings.get("format", ""), self.default_baud)

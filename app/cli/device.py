@@ -10,6 +10,7 @@ from typing import Any
 import config
 from app.cli import output as out
 from app.cli.device_options import ListDevicesOptions, ListPortsOptions, ProbeOptions
+from drivers.driver import DeviceDriver, DeviceVariant
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, other_port_users, port_info
 from drivers.port import list_ports as present_ports
@@ -23,17 +24,31 @@ _NO_PORT = "No serial port found. Plug the amplifier in, or try: slipstand devic
 
 
 def list_devices(options: ListDevicesOptions) -> None:
+    documents = [document for info in DRIVERS.values() for document in device_documents(info)]
     if options.as_json:
-        out.print_json(
-            [
-                {"protocol": info.name, "title": info.title, "default_baud": info.default_baud,
-                 "available": info.available, "verified": info.verified}
-                for info in DRIVERS.values()
-            ]
-        )  # fmt: skip
+        out.print_json(documents)
         return
-    rows = [(info.name, info.title, str(info.default_baud or ""), info.verified) for info in DRIVERS.values()]
+    rows = []
+    for one in documents:
+        settings = [f"--set {key}={value}" for key, value in one["settings"].items()]
+        baud = str(one["default_baud"] or "")
+        rows.append((" ".join([one["protocol"], *settings]), one["title"], baud, one["verified"]))
     out.print_table(("protocol", "device", "baud", "verified"), rows)
+
+
+def device_documents(info: DeviceDriver) -> Iterator[dict[str, Any]]:
+    """JSON objects of a protocol, and of the devices that its settings choose."""
+    itself = DeviceVariant(info.name, info.title, {}, info.verified)
+    for one in (itself, *info.list_variants()):
+        yield {
+            "protocol": info.name,
+            "name": one.name,
+            "settings": one.settings,
+            "title": one.title,
+            "default_baud": info.default_baud_for(one.settings),
+            "available": info.available,
+            "verified": one.verified,
+        }
 
 
 def list_ports(options: ListPortsOptions) -> None:

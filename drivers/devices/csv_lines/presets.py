@@ -13,7 +13,8 @@ from messages.i18n import N_
 COLUMNS, OPENSCALE = "columns", "openscale"
 """Formats that are no preset."""
 _SHIPPED = files("drivers.devices.csv_lines").joinpath("presets")
-_ABOUT = ("title", "source", "caution", "baud")
+_TEXTS = ("title", "source", "peer", "caution")
+_ABOUT = (*_TEXTS, "baud")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,8 @@ class Preset:
     """A device that sends lines."""
 
     title: str
+    source: str  # document that its settings are from
+    peer: str  # program that is not ours and that it was tested against; "" for none
     caution: str  # note for every run that is read by it; "" for none
     baud: int
     settings: dict[str, str]
@@ -55,7 +58,8 @@ def read_preset(name: str) -> Preset:
     baud = content.get("baud", 0)
     if not isinstance(baud, int):
         raise SettingsError("format {name}: baud = {baud!r} is no whole number", name=name, baud=baud)
-    return Preset(str(content.get("title", name)), str(content.get("caution", "")), baud, settings)
+    texts = {key: str(content.get(key, "")) for key in _TEXTS}
+    return Preset(**texts | {"title": texts["title"] or name}, baud=baud, settings=settings)
 
 
 def with_preset(given: Mapping[str, str]) -> tuple[dict[str, str], Preset | None]:

@@ -24,7 +24,7 @@ from drivers.errors import SettingsError
 from messages.i18n import N_
 from messages.message import Message, message
 
-_TEXTS = ("base", "title", "source", "framing", "caution")
+_TEXTS = ("base", "title", "source", "peer", "framing", "caution")
 _SHIPPED = files("drivers.devices.modbus").joinpath("maps")
 
 
@@ -67,9 +67,20 @@ def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUG
     return RegisterMap(name, title, content.get("caution", ""), channels, Framing(framing))
 
 
-def map_source(name: str) -> str:
-    """Document that a shipped map, or a file, is from; "" where it names none."""
-    return str(_content(name)[1].get("source", ""))
+@dataclass(frozen=True, slots=True)
+class MapOrigin:
+    """What a map is of, and from."""
+
+    title: str
+    source: str  # document that its registers are from; "" for none
+    peer: str
+    """Program that is not ours and that it was tested against; "" for none."""
+
+
+def read_origin(name: str) -> MapOrigin:
+    """Origin of a shipped map, or of a file. Raises SettingsError."""
+    content = _content(name)[1]
+    return MapOrigin(content.get("title") or name, content.get("source", ""), content.get("peer", ""))
 
 
 def _content(name: str) -> tuple[str, dict[str, Any]]:

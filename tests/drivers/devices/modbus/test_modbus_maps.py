@@ -166,7 +166,7 @@ def test_a_map_of_your_own(tmp_path):
         ("unit = 1\nregister = 0\noverload_bits = 3\n", "overload_bits = 3 cannot be"),
         ("unit = 1\nregister = 0\nzero_register = 5\n", "table.zero_value is missing"),
         ("unit = 1\n", "table.register is missing: give it in the map, or --set table_register=NUMBER"),
-        ("registers = 7\n", "registers = 7 is not known: allowed are base, title, source, framing, caution"),
+        ("registers = 7\n", "registers = 7 is not known: allowed are base, title, source, peer, framing"),
         ("[table]\nadress = 7\n", "table.adress = 7 is not known: allowed are unit, function"),
         ("table = 7\n", "table = 7 is no table: write [table] and its keys below"),
         ("title = 7\n", "title = 7 is no line of text"),
