@@ -297,10 +297,15 @@ def _may_be_other_law(stand: StandFit, decay: FreeDecay) -> bool:
 
 
 def _explains_more(stand: StandFit, decay: FreeDecay, fits: list[Fit]) -> bool:
-    """Whether effects of the stand explain the record, or most of what the friction laws leave."""
+    """Whether effects of the stand explain the record, or most of what the friction laws leave.
+
+    What contradicts the stated gains and lag counts: two gauges that differ by 5 % once passed for ideal.
+    """
     best = min(fits, key=lambda fit: fit.bic)
     fit = stand.fit
-    if fit.bic > best.bic - _EVIDENCE_MIN or not isinstance(fit.law, StandModel) or not fit.law.effects:
+    if not isinstance(fit.law, StandModel) or not fit.law.effects:
+        return False
+    if fit.bic + fit.departure > best.bic + best.departure - _EVIDENCE_MIN:
         return False
     excess, left = _excess(best, stand.problem), _excess(fit, stand.problem)
     return left < _LEFT_MAX * excess or _is_adequate(stand.problem, decay, [fit])

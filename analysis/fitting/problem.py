@@ -244,9 +244,13 @@ class FitProblem:
 
     def cost(self, parameters: Floats, law: FrictionLaw) -> float:
         """Chi-square of the readings and of what is known beforehand."""
+        return self.chi_square(parameters, law) + self.departure(parameters)
+
+    def departure(self, parameters: Floats) -> float:
+        """Chi-square of parameters (p,) about what is known of them beforehand."""
         informed = (self.prior_deviation > 0.0) & np.isfinite(self.prior_deviation)
         away = (parameters - self.prior_mean)[informed] / self.prior_deviation[informed]
-        return self.chi_square(parameters, law) + float(away @ away)
+        return float(away @ away)
 
     def chi_squares(self, points: Floats, *, fit_zero: bool = False) -> Floats:
         """Chi-square of points (m, p) of laws in closed form; gauge 2's zero at its best if `fit_zero`."""

@@ -64,6 +64,7 @@ class Fit:
     table_residual_m: Floats
     """(n,) float64: reading minus curve."""
     relative_residual_m: Floats
+    departure: float  # chi-square of the parameters about what is stated of them: gains, lag, masses
 
     def value(self, parameter: Parameter) -> float:
         return float(self.parameters[parameter])
@@ -259,7 +260,8 @@ def fit_at_minimum(problem: FitProblem, law: FrictionLaw, minimum: Minimum) -> F
     chi_square = float(table @ table / weights[0] + relative @ relative / weights[1])
     bic = chi_square + len(problem.model_parameters(law)) * float(np.log(problem.sample_count))
     free = problem.free_parameters(law)
-    return Fit(law, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
+    point, departure = minimum.parameters, problem.departure(minimum.parameters)
+    return Fit(law, point, free, minimum.quadratic.normal, chi_square, bic, table, relative, departure)
 
 
 def _reading_count(problem: FitProblem) -> int:
