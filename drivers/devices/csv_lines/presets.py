@@ -1,6 +1,5 @@
 """Presets: settings of known devices, read from TOML."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import SettingsError
+from drivers.toml_files import load_toml, shipped_names
 from messages.i18n import N_
 
 COLUMNS, OPENSCALE = "columns", "openscale"
@@ -31,8 +31,7 @@ class Preset:
 
 def shipped_presets() -> list[str]:
     """Names of the presets in the driver's folder."""
-    names = [entry.name for entry in _SHIPPED.iterdir()]
-    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+    return shipped_names(_SHIPPED)
 
 
 def read_preset(name: str) -> Preset:
@@ -46,14 +45,7 @@ def read_preset(name: str) -> Preset:
             )
             raise SettingsError(template, name=name, known=known)
         path = _SHIPPED.joinpath(f"{name}.toml")
-    try:
-        content = tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        template = N_("format {name} cannot be read ({fault}): check its path")
-        raise SettingsError(template, name=name, fault=error.strerror) from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        template = N_("format {name} is no TOML ({fault}): see docs/how-to/read-lines.md")
-        raise SettingsError(template, name=name, fault=error) from None
+    content = load_toml(path, f"format {name}", "docs/how-to/read-lines.md")
     settings = {key: _text(value) for key, value in content.items() if key not in _ABOUT}
     baud = content.get("baud", 0)
     if not isinstance(baud, int):

@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -21,6 +20,7 @@ from drivers.devices.modbus.frames import (
 from drivers.devices.modbus.registers import WORD_BITS, ByteOrder, Channel, Framing, ValueType
 from drivers.driver import GAUGES
 from drivers.errors import SettingsError
+from drivers.toml_files import load_toml, shipped_names
 from messages.i18n import N_
 from messages.message import Message, message
 
@@ -43,8 +43,7 @@ class RegisterMap:
 
 def shipped_maps() -> list[str]:
     """Names of the maps in the driver's folder."""
-    names = [entry.name for entry in _SHIPPED.iterdir()]
-    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+    return shipped_names(_SHIPPED)
 
 
 def is_map_key(key: str) -> bool:
@@ -93,23 +92,12 @@ def _content(name: str) -> tuple[str, dict[str, Any]]:
             raise SettingsError(template, name=name, shipped=shipped_maps())
         path = _SHIPPED.joinpath(f"{name}.toml")
     where = f"map {name}"
-    content = _read_toml(path, where)
+    content = load_toml(path, where, "docs/how-to/map-modbus-registers.md")
     _check_keys(where, content, [*_TEXTS, *GAUGES, *_ALLOWED])
     base = content.pop("base", None)
     if base is not None and base not in shipped_maps():
         raise _impossible(f"{where}: base", base, message("one of {names}", names=shipped_maps()))
     return where, (_content(base)[1] if base else {}) | content
-
-
-def _read_toml(path: Any, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        template = N_("{where} cannot be read ({fault}): check its path")
-        raise SettingsError(template, where=where, fault=error.strerror) from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        template = N_("{where} is no TOML ({fault}): see docs/how-to/map-modbus-registers.md")
-        raise SettingsError(template, where=where, fault=error) from None
 
 
 def _check_keys(where: str, content: dict[str, Any], allowed: list[str], prefix: str = "") -> None:

@@ -21,24 +21,18 @@ def lines(layout: LineFormat) -> Callable[[int, Counts], list[bytes]]:
     return lambda first, counts: encode_lines(layout, times_s(first, counts), counts, first)
 
 
+def one_gauge(name: str, layout: LineFormat) -> WireExample:
+    return WireExample(
+        name, lambda: LineDecoder(layout, RATE_HZ), lines(layout), has_checksum=False, gauges=1
+    )
+
+
 WIRE = (
     WireExample(
         "csv with checksum", lambda: LineDecoder(CHECKED, RATE_HZ), lines(CHECKED), has_checksum=True
     ),
     WireExample("csv", lambda: LineDecoder(PLAIN, RATE_HZ), lines(PLAIN), has_checksum=False),
-    WireExample(
-        "csv with status",
-        lambda: LineDecoder(STATUS, RATE_HZ),
-        lines(STATUS),
-        has_checksum=False,
-        gauges=1,
-    ),
-    WireExample(
-        "openscale",
-        lambda: LineDecoder(OPENSCALE_FORMAT, RATE_HZ),
-        lines(OPENSCALE_FORMAT),
-        has_checksum=False,
-        gauges=1,
-    ),
+    one_gauge("csv with status", STATUS),
+    one_gauge("openscale", OPENSCALE_FORMAT),
 )
 RECORDING = RecordingExample("CSV lines, time and two values")
