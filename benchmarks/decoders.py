@@ -26,6 +26,9 @@ from drivers.devices.gsv_234.codec import FORMATS as GSV_FORMATS
 from drivers.devices.gsv_234.codec import FrameDecoder as Gsv234Decoder
 from drivers.devices.gsv_234.codec import encode_frames as encode_gsv_234
 from drivers.devices.harp.codec import EventDecoder, encode_events
+from drivers.devices.hbm_aed.codec import Format as HbmFormat
+from drivers.devices.hbm_aed.codec import ValueDecoder as HbmDecoder
+from drivers.devices.hbm_aed.codec import encode_frames as encode_hbm
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import encode_read_response
 from drivers.devices.modbus.maps import read_map
@@ -111,6 +114,9 @@ def report_amplifiers(counts: np.ndarray) -> None:
     for model, layout in GSV_FORMATS.items():
         wire = encode_gsv_234(layout, counts >> 8).tobytes()
         report_frames(model.upper(), lambda layout=layout: Gsv234Decoder(layout, RATE_HZ), wire, loop)
+    for kind in HbmFormat:
+        wire = b"".join(encode_hbm(kind, counts))
+        report_frames(f"HBM AED, {kind}", lambda kind=kind: HbmDecoder(kind, RATE_HZ), wire, loop)
     wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
     report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
     wire = encode_scans(WITH_DIGITAL, counts >> 8).tobytes()

@@ -38,6 +38,7 @@ from tests.drivers.examples import recording_examples
 
 FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
 POLLED = recording_examples()["modbus"].rates_hz
+GAUGES: tuple[Literal["table", "relative"], ...] = ("table", "relative")
 TRIES = 2
 """A busy machine may stop any run for a moment."""
 ENDLESS_S = 3600.0
@@ -66,12 +67,11 @@ CONTENDERS = (
             example.rates_hz,
             is_polled=example.polled_hz is not None,
             settings=example.settings,
+            gauges=GAUGES if example.is_pair else (None,),
         )
         for example in recording_examples().values()
     ),
-    Contender(
-        "two Modbus devices of one gauge", "modbus", POLLED, is_polled=True, gauges=("table", "relative")
-    ),
+    Contender("two Modbus devices of one gauge", "modbus", POLLED, is_polled=True, gauges=GAUGES),
 )
 
 

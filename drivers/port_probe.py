@@ -16,7 +16,7 @@ from drivers.recognition import (
     printable_share,
     recognise,
 )
-from drivers.registry import AVAILABLE
+from drivers.registry import AVAILABLE, DRIVERS
 from drivers.source import LineSettings, Link
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
@@ -167,7 +167,9 @@ def query_identity(
                 on_progress(message(template, protocol=protocol, line_settings=settings))
                 remark = _query_once(link, query, settings, clock)
                 if remark is not None:
-                    found = Recognition(protocol, 1.0, 1, settings=query.settings, remark=remark)
+                    found = Recognition(
+                        protocol, 1.0, 1, DRIVERS[protocol].channels, query.settings, remark=remark
+                    )
                     return ListenResult(found, settings)
     return None
 

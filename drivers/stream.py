@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -259,6 +260,13 @@ def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) 
         cause = error.__cause__
         fault = cause.message if isinstance(cause, MessageError) else str(error)
         raise SettingsError("settings of {protocol}: {fault}", protocol=protocol, fault=fault) from error
+
+
+def check_rate(rate_hz: float | None) -> None:
+    """Check a rate that was asked for. Raises SettingsError."""
+    if rate_hz is not None and not 0 < rate_hz < math.inf:
+        template = N_("rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
+        raise SettingsError(template, rate_hz=rate_hz)
 
 
 def check_gauge_channels(table: int, relative: int, allowed: range) -> None:

@@ -97,7 +97,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Fraction by which the device samples faster than it reports; the times that it sends are right."""
     first_sequence: int = 0  # what the device's counter of samples reads at sample 0; it wraps at 2**32
     gauge: Literal["table", "relative"] | None = None
-    """The only gauge of the device, where it has but one: a `modbus` device, or `csv` lines of one value."""
+    """The only gauge of the device, where it has but one, which the driver of its protocol says."""
     lag_s: float = 0.0  # how much older its readings are than the time at which they are taken
     first_time_s: float = 0.0  # what the device's clock reads at sample 0; its microseconds wrap at 2**32
 
@@ -153,7 +153,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     def device_settings(self) -> tuple[dict[str, str], bool]:
         """Settings of the device, and whether its first column holds gauge 2. Raises SettingsError."""
         driver = find_driver(self.protocol)
-        if self.gauge is None or not driver.has_single_gauge_settings:
+        if self.gauge is None or (driver.channels > 1 and not driver.has_single_gauge_settings):
             return self.device, False
         settings, column = driver.single_gauge_settings(self.gauge, self.device)
         return settings, self.gauge == "relative" and column == 0

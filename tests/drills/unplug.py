@@ -260,7 +260,9 @@ def main() -> int:
     ways: dict[str, Callable[[int, Path], DrillReport]] = {}
     for tcp in (True,) if sys.platform == "win32" else (False, True):
         for protocol in given.protocols.split(","):
-            drill = unplug_pair if protocol == PAIR else partial(unplug, protocol=protocol)
+            drill = partial(unplug, protocol=protocol)
+            if protocol == PAIR or DEVICES[protocol].is_pair:
+                drill = partial(unplug_pair, protocol="modbus" if protocol == PAIR else protocol)
             for kind in ("unplug", "power"):
                 said = f"{kind}, {protocol}, {'TCP' if tcp else 'pseudo-terminal'}"
                 ways[said] = partial(drill, kind=kind, tcp=tcp, seed=given.seed)

@@ -20,9 +20,11 @@ from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
+from drivers.driver import GAUGES
 from drivers.samples import ABSENT_BY_GAUGE
 from tests.drills.sent import Sent
 from tests.drills.unplug import AWAY_S, DURATION_S, PULLED_WITHIN_S, UnplugReport, wait_for
+from tests.drivers.examples import recording_examples
 
 ASKED_HZ = 100.0
 STARTS_S = 5.0
@@ -31,25 +33,33 @@ CELLS_OFF = 3.0
 
 
 def unplug_pair(
-    count: int, folder: Path, kind: str = "unplug", tcp: bool = False, seed: int | None = None
+    count: int,
+    folder: Path,
+    kind: str = "unplug",
+    tcp: bool = False,
+    seed: int | None = None,
+    protocol: str = "modbus",
 ) -> UnplugReport:
-    """Pull the cable of one of two Modbus devices, in turn, once in each of `count` runs.
+    """Pull the cable of one of two devices of one gauge, in turn, once in each of `count` runs.
 
     The run must go on with the other device alone, and each reading be what its stand took at that time.
     """
+    device = recording_examples()[protocol]
+    rate_hz = device.unplugged_hz if device.is_pair else ASKED_HZ
     report, moments = UnplugReport(), random.Random(seed)
     starts_at_s = time.time() + STARTS_S
     options = [
         SimulatedStandOptions(
-            protocol="modbus", gauge=gauge, rate_hz=1000.0, seed=number, tcp_port=0 if tcp else None,
-            decay_s=5.0, table_drift_m_per_s=1e-3, relative_drift_m_per_s=1e-3, start_at_unix_s=starts_at_s,
+            protocol=protocol, gauge=gauge, rate_hz=device.unplugged_hz, seed=number, decay_s=5.0,
+            tcp_port=0 if tcp else None, table_drift_m_per_s=1e-3, relative_drift_m_per_s=1e-3,
+            start_at_unix_s=starts_at_s,
         )
-        for number, gauge in enumerate(("table", "relative"), start=1)
+        for number, gauge in enumerate(GAUGES, start=1)
     ]  # fmt: skip
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
     with SimulatedStand.start(options[0]) as table, SimulatedStand.start(options[1]) as relative:
         stands, sent = (table, relative), (Sent(), Sent())
-        port = PortSettings(table.port, "modbus", rate_hz=ASKED_HZ, relative_url=relative.port)
+        port = PortSettings(table.port, protocol, rate_hz=rate_hz, relative_url=relative.port)
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
             time.sleep(max(0.0, starts_at_s - time.time()))
@@ -57,7 +67,7 @@ def unplug_pair(
                 lost = number % 2
                 try:
                     ended = _one_run(engine, stands[lost], folder, kind, moments)
-                    _check(ended, lost, stands, sent, starts_at_s, report)
+                    _check(ended, lost, stands, sent, starts_at_s, report, rate_hz)
                 except (ValueError, TimeoutError) as error:
                     report.faults.append(f"run {number}, {kind} of gauge {lost + 1}: {error}")
     return report
@@ -82,6 +92,7 @@ def _check(
     sent: tuple[Sent, Sent],
     starts_at_s: float,
     report: UnplugReport,
+    rate_hz: float,
 ) -> None:
     """Hold a run against what both stands took."""
     run = open_run(ended.path)
@@ -90,10 +101,10 @@ def _check(
     report.missing += ended.missing
     report.missing_estimated += ended.missing_estimated
     report.damaged += ended.damaged
-    if ended.ended is not EndReason.DURATION or abs(len(run) - DURATION_S * ASKED_HZ) > 1:
+    if ended.ended is not EndReason.DURATION or abs(len(run) - DURATION_S * rate_hz) > 1:
         raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
     gone = [np.flatnonzero(run.status & int(flag)) for flag in ABSENT_BY_GAUGE]
-    if len(gone[lost]) < AWAY_S[0] * ASKED_HZ or len(gone[lost]) > len(run) - 10:
+    if len(gone[lost]) < AWAY_S[0] * rate_hz or len(gone[lost]) > len(run) - 10:
         raise ValueError(f"{len(gone[lost])} readings of gauge {lost + 1} are marked as missing")
     began_s = run.metadata.start_time.timestamp() - starts_at_s
     for gauge in (0, 1):

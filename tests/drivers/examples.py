@@ -50,6 +50,8 @@ class RecordingExample:
     """Its converter is narrower than that of the usual calibration."""
     unplugged_hz: float = 1000.0
     """Rate at which it is unplugged."""
+    is_pair: bool = False
+    """Whether each gauge has a device of its own."""
     settings: dict[str, str] = field(default_factory=dict)
     """Of the device, as `--set` takes them."""
     protocol: str = ""

@@ -193,3 +193,17 @@ def test_the_first_answer_ends_it():
     assert str(answered.recognition.remark) == "firmware 1.4, 2000 Hz"
     (asked,) = [query for protocol, query in identity_queries() if protocol == "slipstand-binary"]
     assert wire.sent[-len(asked.line_settings) :] == [(tuning, b"I") for tuning in asked.line_settings]
+
+
+def test_a_device_of_one_gauge_that_answers_is_one():
+    wire = FakeWire()
+    write = wire.write
+
+    def answering(data: bytes) -> None:
+        write(data)
+        if data == b"IDN?;":
+            wire.answer = b'HBM,"AED104         ","1234   ",P20\r\n'
+
+    wire.write = answering
+    found = query_identity(wire, lambda _: None, clock=wire.clock).recognition
+    assert (found.protocol, found.channels, str(found.remark)) == ("hbm-aed", 1, "AED104, firmware P20")

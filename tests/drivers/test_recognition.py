@@ -15,6 +15,7 @@ DEVICES = {
     "gsv-3": ("gsv-234", {"format": "gsv-3"}),
     "gsv-2": ("gsv-234", {"format": "gsv-2"}),
     "dataq": ("dataq", {}),
+    "hbm-aed": ("hbm-aed", {}),
     "openscale": ("csv", {"format": "openscale"}),
     "csv": ("csv", {"columns": "time_us,table,relative"}),
     "csv-ms": ("csv", {"columns": "time_ms,sequence,table,relative", "separator": "tab"}),
@@ -42,7 +43,7 @@ def test_each_device_is_known_by_its_bytes(name):
     assert (found.protocol, found.settings) == (protocol, given)
     assert found.share > 0.95
     assert found.rate_hz == pytest.approx(RATES_HZ[protocol], rel=0.01)
-    has_one = "value" in given.get("columns", "") or name in ("openscale", "gsv-3", "gsv-2")
+    has_one = "value" in given.get("columns", "") or name in ("openscale", "gsv-3", "gsv-2", "hbm-aed")
     assert found.channels == (1 if has_one else 2)
     assert found.needs_rate == (name in ("csv-bare", "csv-crc"))
     assert bool(found.remark) == (name in ("harp", "gsv-4", "dataq"))
@@ -69,7 +70,7 @@ def test_what_is_suggested_reads_the_bytes(name):
 
 
 def _given_rate(found):
-    return found.rate_hz if found.needs_rate or found.protocol in ("gsv", "gsv-234") else None
+    return found.rate_hz if found.needs_rate or found.protocol in ("gsv", "gsv-234", "hbm-aed") else None
 
 
 @pytest.mark.parametrize("name", DEVICES)

@@ -35,7 +35,7 @@ from drivers.polling import (
 from drivers.recognition import Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
-from drivers.stream import SampleSource, parse_settings
+from drivers.stream import SampleSource, check_rate, parse_settings
 from messages.i18n import N_
 from messages.message import EMPTY, Message, joined, message
 
@@ -382,9 +382,7 @@ def _with_host_time(layout: LineFormat) -> LineFormat:
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
-    if rate_hz is not None and not 0 < rate_hz < math.inf:
-        template = N_("rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
-        raise SettingsError(template, rate_hz=rate_hz)
+    check_rate(rate_hz)
     parsed, preset = read_csv_settings(settings)
     if parsed.format == "openscale":
         return OpenScaleSource(None, rate_hz, parsed.overload_count)

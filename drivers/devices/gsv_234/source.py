@@ -12,7 +12,7 @@ from drivers.errors import ProtocolError, SettingsError
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import SampleSource, check_gauge_channels, parse_settings
+from drivers.stream import SampleSource, check_gauge_channels, check_rate, parse_settings
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message, option
 
@@ -115,9 +115,7 @@ class Gsv234Source(SampleSource):
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> Gsv234Source:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
-    if rate_hz is not None and not 0 < rate_hz < float("inf"):
-        template = N_("rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
-        raise SettingsError(template, rate_hz=rate_hz)
+    check_rate(rate_hz)
     return Gsv234Source(parse_settings(Gsv234Settings, settings, DRIVER.name), rate_hz)
 
 

@@ -96,6 +96,7 @@ def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) 
         ("csv", "loadstar-iload", 500),
         ("gsv-234", "gsv-3", 500),
         ("gsv-234", "gsv-2", 500),
+        ("hbm-aed", "ascii", 600),
     ],
 )
 def test_two_streams_without_time_find_the_true_friction(
