@@ -152,6 +152,21 @@ def state_size(parts: Floats) -> int:
 
 
 @compiled_part
+def longest_steps(parameters: Floats, parts: Floats) -> tuple[float, float]:
+    """Longest steps of integration in a slip and in a stick (s)."""
+    in_slip = _STEP_RAD / math.sqrt(parameters[STIFFNESS] / parameters[TABLE_MASS])
+    if parts[BASE_COMPLIANCE] != 0.0:
+        in_slip = min(in_slip, _MODE_STEP_RAD / (2.0 * math.pi * parts[BASE_FREQUENCY]))
+    if parts[MODE_MASS] != 0.0:
+        in_slip = min(in_slip, _MODE_STEP_RAD / (2.0 * math.pi * parts[MODE_FREQUENCY]))
+    if parts[PRESLIDING] == 0.0:
+        return in_slip, in_slip
+    square = parameters[FRICTION_DYNAMIC] * parameters[GRAVITY] / parts[PRESLIDING]
+    fastest = math.sqrt(square * (1.0 + parameters[PLATE_MASS] / parameters[TABLE_MASS]))
+    return in_slip, min(in_slip, _PRESLIDING_STEP_RAD / fastest)
+
+
+@compiled_part
 def hold_share(parts: Floats, time: float) -> float:
     """Share of the hook's first force that it still has."""
     if time >= parts[RAMP]:
@@ -317,30 +332,21 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     Phases are as `integrate_events` gives them, with the row of their first node.
     """
     parts = parameters[len(parameters) - STAND_PARAMETER_COUNT :]
-    frequency = math.sqrt(parameters[STIFFNESS] / parameters[TABLE_MASS])
-    longest = _STEP_RAD / frequency
-    size = state_size(parts)
-    if parts[BASE_COMPLIANCE] != 0.0:
-        longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[BASE_FREQUENCY]))
-    if parts[MODE_MASS] != 0.0:
-        longest = min(longest, _MODE_STEP_RAD / (2.0 * math.pi * parts[MODE_FREQUENCY]))
-    pull = abs(parameters[PULLBACK])
+    longest, longest_at_rest = longest_steps(parameters, parts)
+    size, pull, deflected = state_size(parts), abs(parameters[PULLBACK]), parts[PRESLIDING]
     is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
     phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 7))
     state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY] + parts[HOLD_CREEP]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
     heading = math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0
-    deflected, sign = parts[PRESLIDING], 0.0
+    sign = 0.0
     if deflected != 0.0:
-        friction = parameters[FRICTION_DYNAMIC]
-        state[8] = deflected * min(max(parameters[TILT] / friction, -_SATURATED), _SATURATED)
-        square = friction * parameters[GRAVITY] / deflected
-        fastest = math.sqrt(square * (1.0 + parameters[PLATE_MASS] / parameters[TABLE_MASS]))
-        longest_at_rest = min(longest, _PRESLIDING_STEP_RAD / fastest)
+        share = parameters[TILT] / parameters[FRICTION_DYNAMIC]
+        state[8] = deflected * min(max(share, -_SATURATED), _SATURATED)
     else:
         excess, direction = demand(parameters, parts, (0.0, 0.0, heading), 0.0, _HELD_S, state, slopes[4])
-        sign, longest_at_rest = direction if excess > 0.0 else 0.0, longest
+        sign = direction if excess > 0.0 else 0.0
     new_phase, unchecked = True, False
     while time < duration_s and node < _NODES_MOST and abs(state[0]) < _ESCAPE * pull + _ESCAPE_M:
         phase = (sign, path - sign * state[3], heading)
@@ -375,35 +381,10 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
                     state[2] = 0.0
                     continue
             else:
-                first = _event(parameters, parts, phase, time, time - began, state, slopes[4])
-                low, high, low_value, high_value = 0.0, step, min(first, 0.0), last
-                for _ in range(_EVENT_STEPS):
-                    step = high - (high - low) * high_value / (high_value - low_value)
-                    if not low < step < high:
-                        step = 0.5 * (low + high)
-                    _step(parameters, parts, phase, time, state, trial, slopes, step)
-                    value = _event(
-                        parameters, parts, phase, time + step, time + step - began, trial, slopes[4]
-                    )
-                    if value > 0.0:
-                        high, high_value, low_value = step, value, 0.5 * low_value
-                    else:
-                        low, low_value, high_value = step, value, 0.5 * high_value
-                    if high - low <= 1e-14 or abs(value) <= 1e-15:
-                        break
-                if high - step > 0.0 and step == low:
-                    step = high
-                    _step(parameters, parts, phase, time, state, trial, slopes, step)
+                step = _step_to_event(parameters, phase, time, began, state, trial, slopes, step)
                 new_phase = True
         if is_dry and heading * trial[1] < 0.0:  # the table turns within the step
-            low, high, low_value, high_value = 0.0, step, heading * state[1], heading * trial[1]
-            for _ in range(_TURN_STEPS):
-                step = low + (high - low) * low_value / (low_value - high_value)
-                _step(parameters, parts, phase, time, state, trial, slopes, step)
-                if heading * trial[1] > 0.0:
-                    low, low_value = step, heading * trial[1]
-                else:
-                    high, high_value = step, heading * trial[1]
+            step = _step_to_turn(parameters, parts, phase, time, state, trial, slopes, step)
             trial[1], new_phase = 0.0, False
         unchecked = False
         time += step
@@ -452,6 +433,65 @@ def _event(
         return beyond
     excess, _ = demand(parameters, parts, phase, time, since_s, state, rates)
     return excess
+
+
+def _step_to_event(
+    parameters: Floats,
+    phase: Phase,
+    time: float,
+    began: float,
+    state: Floats,
+    trial: Floats,
+    slopes: Floats,
+    step: float,
+) -> float:
+    """Shorten `step`, after which `trial` is, to the time at which the phase that `began` ends.
+
+    Writes the state there into `trial`. False position, the value of a bound that stays halved (Illinois).
+    """
+    parts = parameters[len(parameters) - STAND_PARAMETER_COUNT :]
+    last = _event(parameters, parts, phase, time + step, time + step - began, trial, slopes[4])
+    first = _event(parameters, parts, phase, time, time - began, state, slopes[4])
+    low, high, low_value, high_value = 0.0, step, min(first, 0.0), last
+    for _ in range(_EVENT_STEPS):
+        step = high - (high - low) * high_value / (high_value - low_value)
+        if not low < step < high:
+            step = 0.5 * (low + high)
+        _step(parameters, parts, phase, time, state, trial, slopes, step)
+        value = _event(parameters, parts, phase, time + step, time + step - began, trial, slopes[4])
+        if value > 0.0:
+            high, high_value, low_value = step, value, 0.5 * low_value
+        else:
+            low, low_value, high_value = step, value, 0.5 * high_value
+        if high - low <= 1e-14 or abs(value) <= 1e-15:
+            break
+    if high - step > 0.0 and step == low:
+        step = high
+        _step(parameters, parts, phase, time, state, trial, slopes, step)
+    return step
+
+
+def _step_to_turn(
+    parameters: Floats,
+    parts: Floats,
+    phase: Phase,
+    time: float,
+    state: Floats,
+    trial: Floats,
+    slopes: Floats,
+    step: float,
+) -> float:
+    """Shorten `step` to the time at which the table turns, and write the state there into `trial`."""
+    heading = phase[2]
+    low, high, low_value, high_value = 0.0, step, heading * state[1], heading * trial[1]
+    for _ in range(_TURN_STEPS):
+        step = low + (high - low) * low_value / (low_value - high_value)
+        _step(parameters, parts, phase, time, state, trial, slopes, step)
+        if heading * trial[1] > 0.0:
+            low, low_value = step, heading * trial[1]
+        else:
+            high, high_value = step, heading * trial[1]
+    return step
 
 
 @compiled
@@ -528,6 +568,8 @@ _TEMPLATES = (
     (compiled_part, _step),
     (compiled_part, demand),
     (compiled_part, _event),
+    (compiled_part, _step_to_event),
+    (compiled_part, _step_to_turn),
     (compiled, integrate),
 )
 """Functions that depend on friction, each before its callers."""
