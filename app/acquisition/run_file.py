@@ -122,7 +122,7 @@ class RunFile:
         self._is_closing = False
         self._began = (datetime.datetime.now().astimezone(), host_ns())
         wire_start = request.journal.start if request.journal else 0
-        started = request.metadata.start_time
+        started = request.metadata.known_start_time
         journal.append_metadata(Opened(start_index, started, request.layout, wire_start, tap.decoded_reads))
         self.path: Future[Path] = writer.open(request)
 

@@ -105,7 +105,7 @@ def with_device_filters(gauges: Gauges, filters: tuple[ChannelFilter | None, Cha
 
 def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
     """Create the journal of a run beside the file that the run will have. Raises JournalError."""
-    began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
+    began = metadata.format_start("%Y%m%dT%H%M%S")
     parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
     header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")

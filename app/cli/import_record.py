@@ -1,38 +1,130 @@
-"""`slipstand import`: a record made by another program becomes a run."""
+"""`slipstand import`: records made by other programs become runs."""
+
+import datetime
+import glob
+from pathlib import Path
+from typing import Any
 
 import msgspec
+import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
 from app.cli.option_values import checked_conditions, print_mass_overrides
 from app.cli.run_file_options import FileOptions, ImportOptions
-from app.runs.exchange.importing import CsvImport, import_csv
+from app.runs.errors import RunError
+from app.runs.exchange.import_run import ImportedRun, free_path, import_csv
+from app.runs.exchange.importing import CsvImport
 from config.files import load_stand
 
 
 def import_record(options: ImportOptions) -> None:
-    plan = _plan(options.source)
-    if options.output.suffix != ".h5":
-        raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")
-    checked = checked_conditions(options.conditions)
-    stored = import_csv(
-        options.file.expanduser(),
-        plan,
-        out.output_file(options.output, options.force),
-        load_stand(),
-        replace=options.force,
-        series=options.masses.series,
-        plate_mass_kg=options.masses.plate_mass,
-        table_mass_kg=options.masses.table_mass,
-        operator=options.operator,
-        note=options.note,
-        conditions=checked,
-    )
+    files, plan = _files(options.files), _plan(options.source)
+    facts = {
+        "series": options.masses.series,
+        "plate_mass_kg": options.masses.plate_mass,
+        "table_mass_kg": options.masses.table_mass,
+        "operator": options.operator,
+        "note": options.note,
+        "conditions": checked_conditions(options.conditions),
+    }
+    if len(files) == 1 and not options.output.expanduser().is_dir():
+        if options.output.suffix != ".h5":
+            raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")
+        output = out.output_file(options.output, options.force)
+        run = _import(files[0], plan, output, options.force, facts)
+        print_mass_overrides(options.masses)
+        _print_notes(run)
+        if options.as_json:
+            out.print_json(_document(run))
+        else:
+            out.print_line(f"{run.run}: {run.samples} samples, {', '.join(_row(run)[1:])}")
+        return
+    folder = _folder(options.output)
     print_mass_overrides(options.masses)
+    runs: list[ImportedRun] = []
+    documents: list[dict[str, Any]] = []
+    for file in files:
+        try:
+            output = folder / f"{file.stem}.h5" if options.force else free_path(folder, file.stem)
+            run = _import(file, plan, output, options.force, facts)
+        except RunError as error:
+            out.print_status(f"error: {error}")
+            documents.append({"file": str(file), "error": str(error)})
+        else:
+            _print_notes(run)
+            runs.append(run)
+            documents.append(_document(run))
     if options.as_json:
-        out.print_json({"run": str(stored.path), "samples": stored.samples})
-    else:
-        out.print_line(f"{stored.path}: {stored.samples} samples")
+        out.print_json(documents)
+    elif runs:
+        out.print_table(_HEADER, [_row(run) for run in runs])
+    if len(runs) < len(files):
+        raise typer.Exit(1)
+
+
+_HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
+
+
+def _import(file: Path, plan: CsvImport, output: Path, replace: bool, facts: dict[str, Any]) -> ImportedRun:
+    with out.progress_bar(f"reading {file.name}", total=1.0) as update:
+        return import_csv(file, plan, output, load_stand(), replace=replace, report=update, **facts)
+
+
+def _files(given: list[Path]) -> list[Path]:
+    """Files of which some may be given as patterns, as Windows hands them on. Raises CommandError."""
+    files: list[Path] = []
+    for one in given:
+        path = one.expanduser()
+        found = [] if path.exists() else sorted(glob.glob(str(path)))  # noqa: PTH207 - a pattern with its folder
+        if glob.has_magic(str(path)) and not found and not path.exists():
+            raise CommandError(f"{path}: there is no such file. Give paths of files")
+        files += map(Path, found) if found else [path]
+    return list(dict.fromkeys(files))
+
+
+def _folder(path: Path) -> Path:
+    """Folder for the runs of several files, made if it is not there. Raises CommandError."""
+    folder = path.expanduser().absolute()
+    if folder.suffix == ".h5" or (folder.exists() and not folder.is_dir()):
+        raise CommandError(f"-o {path}: several files become several runs. Give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _print_notes(run: ImportedRun) -> None:
+    for note in run.notes:
+        out.print_status(f"note: {Path(run.file).name}: {note}")
+
+
+def _document(run: ImportedRun) -> dict[str, Any]:
+    names = ("table_range", "relative_range")
+    return {
+        "run": run.run,
+        "samples": run.samples,
+        "file": run.file,
+        "duration_s": run.duration_s,
+        "rate_hz": run.rate_hz,
+        "start_time": run.start_time and run.start_time.isoformat(),
+        **dict(zip(names, map(list, run.ranges), strict=False)),
+        "unit": run.unit,
+        "release_s": run.release_s,
+        "notes": [str(note) for note in run.notes],
+    }
+
+
+def _row(run: ImportedRun) -> tuple[str, ...]:
+    """Name, length, rate, ranges and release."""
+    scale, unit = (1e3, "mm") if run.unit == "m" else (1.0, run.unit)
+    ranges = [f"{scale * low:.4g} to {scale * high:.4g} {unit}" for low, high in run.ranges]
+    return (
+        Path(run.run).name,
+        f"{run.duration_s:.4g} s",
+        "uneven times" if run.rate_hz is None else f"{run.rate_hz:.6g} Hz",
+        *ranges,
+        *[""] * (2 - len(ranges)),
+        "no release found" if run.release_s is None else f"released at {run.release_s:.3f} s",
+    )
 
 
 def _plan(source: FileOptions) -> CsvImport:
@@ -44,14 +136,21 @@ def _plan(source: FileOptions) -> CsvImport:
         )
     if source.skip < 0:
         raise CommandError(f"--skip {source.skip} lines cannot be left out. Give 0 or more")
+    if source.date is not None and source.time is None:
+        raise CommandError("--date goes with --time, the column of times of day. Give --time too")
     layout = {
-        "time": source.time,
+        "time": source.time or "",
         "table": source.table,
         "second": source.plate if source.relative is None else source.relative,
         "delimiter": source.delimiter,
         "decimal": source.decimal,
         "skip": source.skip,
         "header": not source.no_header,
+        "rate_hz": source.rate,
+        "date": source.date,
+        "date_order": source.date_order,
+        "missing": tuple(source.missing or ()),
+        "encoding": source.encoding,
     }
     same = ("unit", "gain", "unit_name", "gain_uncertainty", "quantity", "time_unit", "from_s", "until_s",
             "segment")  # fmt: skip
@@ -59,8 +158,21 @@ def _plan(source: FileOptions) -> CsvImport:
         "layout": layout,
         "measures": "relative" if source.plate is None else "plate",
         "offset": source.offset or 0.0,
+        "begun": _begun(source.begun),
     }
     try:
         return msgspec.convert(fields, CsvImport)
     except msgspec.ValidationError:
         raise CommandError("the options do not fit together. See slipstand import --help") from None
+
+
+def _begun(text: str | None) -> datetime.datetime | None:
+    if text is None:
+        return None
+    try:
+        begun = datetime.datetime.fromisoformat(text.strip())
+    except ValueError:
+        raise CommandError(
+            f"--begun {text!r} is no time. Give for example 2019-05-04T14:03:00, with +02:00 for a zone"
+        ) from None
+    return begun if begun.tzinfo else begun.astimezone()

@@ -12,11 +12,24 @@ from app.cli.shared_options import ConditionOptions, MassOptions
 class FileOptions:
     """How the file is read: the fields of `CsvImport` and of its layout."""
 
-    time: str = option("--time", "Time column: its name or number, from 0.", REQUIRED)
+    time: str | None = option(
+        "--time", "Time column: its name or number, from 0; found by its name or kind if absent."
+    )
+    rate: float | None = option("--rate", "Rows a second, of a file without times; instead of --time.")
+    date: str | None = option("--date", "Column of dates, where --time is one of times of day.")
+    date_order: str | None = choice(
+        "--date-order", ("dmy", "mdy", "ymd"), "Order of day and month in dates; detected if absent."
+    )
+    begun: str | None = option(
+        "--begun",
+        "When the file's first row was recorded: 2019-05-04T14:03:00+02:00; as the file says if absent.",
+    )
     table: str = option("--table", "Column of gauge 1, table against base.", REQUIRED)
     relative: str | None = option("--relative", "Column of gauge 2, plate against table.")
     plate: str | None = option("--plate", "Column of gauge 2, plate against base.")
-    unit: str | None = choice("--unit", ("m", "mm", "um"), "Length unit of the cells; m if absent.")
+    unit: str | None = choice(
+        "--unit", ("m", "mm", "um"), "Length unit of the cells; as the file names it, else m, if absent."
+    )
     gain: float | None = option(
         "--gain", "Metres, or --unit-name, that a cell of 1 means; instead of --unit."
     )
@@ -28,9 +41,17 @@ class FileOptions:
     quantity: str = choice(
         "--quantity", ("displacement", "velocity", "acceleration"), "What was measured.", "displacement"
     )
-    time_unit: str = choice("--time-unit", ("s", "ms", "us"), "Unit of the times.", "s")
+    time_unit: str | None = choice(
+        "--time-unit", ("s", "ms", "us"), "Unit of the times; as the file names it, else s, if absent."
+    )
     delimiter: str | None = option("--delimiter", "A character, tab or space; detected if absent.")
-    decimal: str = choice("--decimal", (".", ","), "Decimal sign.", ".")
+    decimal: str | None = choice("--decimal", (".", ","), "Decimal sign; detected if absent.")
+    encoding: str | None = option("--encoding", "Of a text: utf-8, cp1251, ...; detected if absent.")
+    missing: list[str] | None = option(
+        "--missing",
+        "A cell of an absent reading, besides nan, N/A, - and the like; repeatable.",
+        metavar="TEXT",
+    )
     skip: int = option("--skip", "Lines left out before the header.", 0)
     no_header: bool = flag("--no-header", "The first line is data.")
     from_s: float | None = option("--from", "First time that is kept (s); the file's first if absent.")
@@ -40,13 +61,13 @@ class FileOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """Make a run of a CSV, .mat, .xlsx or .parquet file.
+    """Make runs of files of other programs: text, .mat, .xlsx, .parquet.
 
     Times are kept, uneven ones and gaps included.
     """
 
-    file: Path = argument("CSV, .mat, .xlsx or .parquet file.", metavar="FILE")
-    output: Path = option("-o --output", "Run file to write, RUN.h5.", REQUIRED)
+    files: list[Path] = argument("Files of other programs, or patterns such as *.csv.", metavar="FILE...")
+    output: Path = option("-o --output", "Run file to write, RUN.h5; of several files a folder.", REQUIRED)
     source: FileOptions
     masses: MassOptions
     operator: str = option("--operator", "Who recorded.", "")

@@ -194,8 +194,10 @@ def unstated_warnings(record: Record, result: Identification) -> Iterator[Result
         yield ResultWarning("clock-not-timed", text)
 
 
-def calibration_warnings(gauges: "Gauges", day: datetime.date) -> Iterator[ResultWarning]:
-    """Say which gauges' calibrations had expired on the day of a run."""
+def calibration_warnings(gauges: "Gauges", day: datetime.date | None) -> Iterator[ResultWarning]:
+    """Say which gauges' calibrations had expired on the day of a run, where that is known."""
+    if day is None:
+        return
     template = N_(
         "the calibration of {gauge} was valid until {valid_until}, the run is of {day}. Calibrate"
         " it again: slipstand calibrate"

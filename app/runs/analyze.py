@@ -86,7 +86,9 @@ def analyze_run(
         [
             *analysis_json.mass_warnings(metadata, record.masses),
             *analysis_json.unstated_warnings(record, identification),
-            *analysis_json.calibration_warnings(metadata.gauges, metadata.start_time.date()),
+            *analysis_json.calibration_warnings(
+                metadata.gauges, metadata.start_time and metadata.start_time.date()
+            ),
             *analysis_json.gauge_check_warnings(metadata.gauge_checks),
             *(
                 analysis_json.zero_warnings(run.end, record, identification)

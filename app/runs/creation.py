@@ -148,7 +148,8 @@ def _signals(metadata: RunMetadata, layout: BlockLayout) -> list[str]:
 
 def _create_motion(file: h5py.File, metadata: RunMetadata, layout: BlockLayout) -> None:
     time = _create_column(file, schema.TIME_COLUMN)
-    time.attrs["start"] = metadata.start_time.isoformat()
+    if metadata.start_time is not None:
+        time.attrs["start"] = metadata.start_time.isoformat()
     time.make_scale("time")
     attributes = {
         "units": metadata.unit,

@@ -19,6 +19,8 @@ _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
 Quantity = Literal["displacement", "velocity", "acceleration"]
+IMPORT_PROTOCOL = "import"
+"""Protocol of runs that were imported."""
 QUANTITY_UNITS: dict[Quantity, str] = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 """SI unit of each quantity that a channel can hold."""
 
@@ -108,12 +110,21 @@ class Conditions(_FrozenStruct, frozen=True, gc=False):
         return cls(**known, other=other)
 
 
+class SourceFile(_FrozenStruct, frozen=True):
+    """The file that a run was imported from."""
+
+    name: str = ""
+    sha256: str = ""
+    """Of its bytes, 64 hexadecimal digits."""
+    size_bytes: int | None = None
+
+
 class RunMetadata(_FrozenStruct, frozen=True):
     """What is known when a run begins."""
 
     title: str
-    start_time: datetime.datetime
-    """Of the first stored sample, with zone."""
+    start_time: datetime.datetime | None
+    """Of the first stored sample, with zone; None of an imported record whose time is not known."""
     stand: Stand  # as configured; the masses of this run stand beside it
     gauges: Gauges
     table_mass_kg: float
@@ -135,17 +146,24 @@ class RunMetadata(_FrozenStruct, frozen=True):
     unit: str = "m"
     source: str = ""
     """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
+    source_file: SourceFile = SourceFile()
     truth: dict[str, float | int | str] = {}
     gauge_checks: tuple[GaugeCheck, ...] = ()
     """The last check of each gauge's calibration before the run, one a gauge at most."""
     excluded: str = ""
 
     def __post_init__(self) -> None:
-        start = self.start_time.isoformat()
-        if self.start_time.tzinfo is None:
-            raise MetadataError("start_time {isoformat} has no time zone. Give one", isoformat=start)
-        if not _YEARS[0] <= self.start_time.year <= _YEARS[1]:
-            raise MetadataError("start_time {isoformat} cannot be. Set the clock", isoformat=start)
+        start = self.start_time
+        if start is None and self.device.protocol != IMPORT_PROTOCOL:
+            raise MetadataError("a recorded run without start_time cannot be. Give it")
+        if start is not None and start.tzinfo is None:
+            raise MetadataError(
+                "start_time {isoformat} has no time zone. Give one", isoformat=start.isoformat()
+            )
+        if start is not None and not _YEARS[0] <= start.year <= _YEARS[1]:
+            raise MetadataError(
+                "start_time {isoformat} cannot be. Set the clock", isoformat=start.isoformat()
+            )
         if any(c in _NOT_IN_NAMES or not c.isprintable() for c in self.series or ""):
             template = N_("series {series!r} cannot be part of a file's name. Use letters and digits")
             raise MetadataError(template, series=self.series)
@@ -165,6 +183,17 @@ class RunMetadata(_FrozenStruct, frozen=True):
                 )
 
     @property
+    def known_start_time(self) -> datetime.datetime:
+        """Start of a run that this program recorded or simulated. Raises MetadataError for others."""
+        if self.start_time is None:
+            raise MetadataError("the start of the run is not known")
+        return self.start_time
+
+    def format_start(self, pattern: str) -> str:
+        """Start by a pattern of `strftime`; "" where it is not known."""
+        return "" if self.start_time is None else self.start_time.strftime(pattern)
+
+    @property
     def contact(self) -> str:
         """What rubs on what, from the series code; empty where the series is not one of the stand."""
         try:
@@ -177,7 +206,7 @@ class RunMetadata(_FrozenStruct, frozen=True):
 def create_metadata(
     stand: Stand,
     gauges: Gauges,
-    start_time: datetime.datetime,
+    start_time: datetime.datetime | None,
     *,
     series: str | None = None,
     pullback_m: float | None = None,
@@ -223,7 +252,8 @@ class EndMetadata(_FrozenStruct, frozen=True):
     """What is known when a run ends."""
 
     ended: str  # why, as in `record --json`: rest, enough, duration, stopped, device-lost, ...
-    end_time: datetime.datetime
+    end_time: datetime.datetime | None
+    """None of an imported record whose time is not known."""
     events: Events = Events()
     losses: Losses = msgspec.field(default_factory=Losses)
     """Of this run, not of the whole stream."""

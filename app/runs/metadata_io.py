@@ -43,7 +43,8 @@ def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "")
     if metadata.note:
         file[schema.NOTE].attrs["NX_class"] = "NXnote"
         fields.write_text(file, f"{schema.NOTE}/author", metadata.operator)
-        fields.write_text(file, f"{schema.NOTE}/date", metadata.start_time.isoformat())
+        if metadata.start_time is not None:
+            fields.write_text(file, f"{schema.NOTE}/date", metadata.start_time.isoformat())
         fields.write_text(file, f"{schema.NOTE}/type", "text/plain")
     _write_open_groups(file, metadata)
     _write_gauges(file, metadata)

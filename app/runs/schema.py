@@ -166,10 +166,13 @@ ZERO_OF_SOURCE: Final = "that of the source; no tare is subtracted"
 
 RUN_FIELDS: Final = (
     _text(f"{ENTRY}/title", "title", "title"),
-    Field(f"{ENTRY}/start_time", "time of the first stored sample", "start_time", Kind.DATE, required=True),
+    Field(f"{ENTRY}/start_time", "time of the first stored sample, if known", "start_time", Kind.DATE),
     _text(f"{USER}/name", "operator", "operator"),
     _text(f"{RUN}/series", "series code", "series", default=None),
     _text(f"{RUN}/source", "origin of a run that was not recorded by this program", "source"),
+    _text(f"{RUN}/source_file", "name of the file that a run was imported from", "source_file.name"),
+    _text(f"{RUN}/source_sha256", "SHA-256 of that file", "source_file.sha256"),
+    Field(f"{RUN}/source_size", "size of that file", "source_file.size_bytes", Kind.INTEGER, unit="byte"),
     _text(f"{RUN}/excluded", "reason why the run does not count in a campaign", "excluded"),
     _text(f"{NOTE}/description", "note", "note"),
     Field(f"{SAMPLE}/temperature", "temperature", "conditions.temperature_c", unit="degC"),

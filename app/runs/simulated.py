@@ -87,7 +87,7 @@ def store_motion(
     block = RunBlock(time_s=np.arange(n) / rate_hz, readings=readings, status=np.zeros(n, np.uint8))
     ending = EndMetadata(
         ended="simulated",
-        end_time=metadata.start_time + datetime.timedelta(seconds=n / rate_hz),
+        end_time=metadata.known_start_time + datetime.timedelta(seconds=n / rate_hz),
         events=Events(pulled_back_s=0.0, release_s=release_s),
         losses=Losses(samples=n),
     )

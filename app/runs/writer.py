@@ -8,7 +8,7 @@ import datetime
 import os
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -45,7 +45,7 @@ def create_run_in(
 ) -> "RunWriter":
     """Create a run under the next free name in `folder`: `20261121T143205_1FFM0_001.h5`. Raises RunError."""
     disk.make_folder(folder)
-    began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
+    began = metadata.format_start("%Y%m%dT%H%M%S")
     stem = f"{began}_{metadata.series}" if metadata.series else began
     for number in range(1, _NAMES_MAX):
         try:
@@ -87,14 +87,26 @@ def create_run(
 
 
 def write_run(
-    path: Path, metadata: RunMetadata, block: RunBlock, end: EndMetadata, *, replace: bool = False
+    path: Path,
+    metadata: RunMetadata,
+    blocks: RunBlock | Iterable[RunBlock],
+    end: EndMetadata,
+    *,
+    replace: bool = False,
 ) -> StoredRun:
-    """Write a whole run at once, or no file; `path` must not exist unless `replace`. Raises RunError."""
+    """Write a whole run, or no file; `path` must not exist unless `replace`. Raises RunError.
+
+    A long run is given as several blocks, of which no two are held.
+    """
     path = path.absolute()
     target = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") if replace else path
-    writer = create_run(target, metadata, BlockLayout.of(block))
+    rest = iter([blocks] if isinstance(blocks, RunBlock) else blocks)
+    first = next(rest)
+    writer = create_run(target, metadata, BlockLayout.of(first))
     try:
-        writer.append(block)
+        writer.append(first)
+        for block in rest:
+            writer.append(block)
         stored = writer.close(end)
         if replace:
             target.replace(path)

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import config
 from app.runs.errors import RunError
-from app.runs.exchange.csv_reading import CsvOptions, read_columns
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_reading import read_columns
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError
 from tests.drills.report import InputReport, arguments, run_ways

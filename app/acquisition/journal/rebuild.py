@@ -279,7 +279,7 @@ def _opening(summary: JournalSummary) -> Opened | None:
     since_armed = datetime.timedelta(seconds=(start_index - armed_index) / summary.rate_hz)
     return Opened(
         start_index=start_index,
-        start_time=summary.header.metadata.start_time + since_armed,
+        start_time=summary.header.metadata.known_start_time + since_armed,
         layout=layout,
         wire_start=max((start for start, end in places if end <= start_index), default=0),
     )

@@ -214,7 +214,7 @@ def _is_being_written(summary: JournalSummary, folder: Path) -> bool:
 def _stem(summary: JournalSummary) -> str:
     """Begin of the name that the writer gives to the run file."""
     metadata = summary.header.metadata
-    start = summary.opened.start_time if summary.opened else metadata.start_time
+    start = summary.opened.start_time if summary.opened else metadata.known_start_time
     return "_".join(part for part in (start.strftime("%Y%m%dT%H%M%S"), metadata.series) if part)
 
 

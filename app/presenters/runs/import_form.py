@@ -1,5 +1,6 @@
 """Fields of the import dialog: one table of titles, choices, options of the command line, and rules."""
 
+import datetime
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -61,11 +62,16 @@ _WHOLE = NumberRule(
 _GAIN = NumberRule(
     N_("{text} is no number other than 0. A negative one turns the gauge"), lambda value: value != 0.0
 )
+_RATE = NumberRule(
+    N_("{text} is no number above 0. Write rows a second, or leave it empty"), lambda value: value > 0.0
+)
 _SHARE = NumberRule(
     N_("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
     lambda value: value >= 0.0,
 )
-_LENGTH_UNITS = {"m": "m", "mm": "mm", "um": "µm", GAIN: N_("by a gain")}
+_AS_NAMED = {"": N_("as the file says")}
+_TIME_UNITS = _AS_NAMED | {"s": "s", "ms": "ms", "us": "µs"}
+_LENGTH_UNITS = _AS_NAMED | {"m": "m", "mm": "mm", "um": "µm", GAIN: N_("by a gain")}
 _MEASURES = {"relative": N_("plate against table"), "plate": N_("plate against base")}
 _QUANTITIES = {
     "displacement": N_("displacement"),
@@ -77,6 +83,9 @@ _DELIMITERS = _DETECT | {
     ",": N_("comma"), ";": N_("semicolon"), "\t": N_("tab"), " ": N_("blanks"), "|": "|"
 }  # fmt: skip
 _DECIMALS = _DETECT | {".": N_("point"), ",": N_("comma")}
+_DATE_ORDERS = _DETECT | {
+    "dmy": N_("day, month, year"), "mdy": N_("month, day, year"), "ymd": N_("year, month, day")
+}  # fmt: skip
 _HEADERS = _DETECT | {"yes": N_("yes"), "no": N_("no")}
 _CONDITION_HINTS = {
     "plate_id": N_("which one"),
@@ -85,8 +94,9 @@ _CONDITION_HINTS = {
 }
 
 _COLUMNS = (
-    Field("time", N_("Time"), choices={}),
-    Field("time_unit", N_("Unit of time"), choices={"s": "s", "ms": "ms", "us": "µs"}),
+    Field("time", N_("Time"), option="--time", choices={}),
+    Field("rate", N_("Rows a second"), N_("only of a file without times"), "--rate", rule=_RATE),
+    Field("time_unit", N_("Unit of time"), option="--time-unit", choices=_TIME_UNITS),
     Field("table", N_("Gauge 1, table"), choices={}),
     Field("second", N_("Gauge 2"), choices={}),
     Field("measures", N_("Gauge 2 measures"), choices=_MEASURES),
@@ -115,6 +125,13 @@ _LINES = (
     Field("decimal", N_("Decimal sign"), option="--decimal", choices=_DECIMALS),
     Field("header", N_("Names above"), option="--no-header", choices=_HEADERS),
     Field("skip", N_("Lines skipped"), "0", "--skip", rule=_WHOLE),
+    Field("encoding", N_("Encoding"), N_("find out; utf-8, cp1251, ..."), "--encoding"),
+    Field("missing", N_("Absent readings"), N_("marks besides NaN, N/A, -: x; -9999"), "--missing"),
+)
+_DATES = (
+    Field("begun", N_("Begun"), N_("as the file says; 2019-05-04 14:03:00+02:00"), "--begun"),
+    Field("date", N_("Dates"), option="--date", choices={}),
+    Field("date_order", N_("Dates are"), option="--date-order", choices=_DATE_ORDERS),
 )
 _PART = (
     Field("from_s", N_("From, s"), N_("the beginning"), "--from", rule=_ANY),
@@ -131,17 +148,18 @@ _CONDITIONS = (
 GROUPS = {N_("Columns"): _COLUMNS, N_("Test"): _TEST}
 RARE_GROUPS = {
     N_("Calibration and name"): (*_CALIBRATION, _NAME),
+    N_("Date"): _DATES,
     N_("Lines"): _LINES,
     N_("Part"): _PART,
     N_("Conditions"): _CONDITIONS,
 }
 """Groups under a fold."""
 FIELDS = {field.name: field for group in (GROUPS | RARE_GROUPS).values() for field in group}
-COLUMN_FIELDS = ("time", "table", "second")
+COLUMN_FIELDS = ("time", "table", "second", "date")
 """Names of columns, as in `FilePreview.columns`."""
 GAIN_FIELDS = ("gain", "offset", "unit_name")  # fields that hold only where `unit` is `GAIN`
 LINE_FIELDS = tuple(field.name for field in _LINES)
-PER_FILE_FIELDS = ("note", "run_in_number", "name", "delimiter", "decimal", "header")
+PER_FILE_FIELDS = ("note", "run_in_number", "name", "begun", "delimiter", "decimal", "header")
 """Fields that are cleared for the next file."""
 _METADATA_FIELDS = {field.name for field in (*_TEST, _NAME, *_CONDITIONS)}
 
@@ -168,6 +186,14 @@ def parse_pairs(text: str) -> Iterator[tuple[str, str]]:
         yield name.strip(), value.strip()
 
 
+def parse_time(text: str) -> datetime.datetime | None:
+    """Read a date-time, in the zone of this computer unless it has one; None of none. Raises ValueError."""
+    if not text.strip():
+        return None
+    time = datetime.datetime.fromisoformat(text.strip())
+    return time if time.tzinfo else time.astimezone()
+
+
 def _faults(form: Form) -> Iterator[tuple[str, str]]:
     for name, field in FIELDS.items():
         if (fault := field.fault(form)) and (name not in GAIN_FIELDS or form["unit"] == GAIN):
@@ -176,6 +202,16 @@ def _faults(form: Form) -> Iterator[tuple[str, str]]:
     if first_s is not None and last_s is not None and last_s <= first_s:
         text = form["until_s"].strip()
         yield "until_s", gettext("{text} is not after the first second. Write a later one", text=text)
+    try:
+        parse_time(form["begun"])
+    except ValueError:
+        text = form["begun"].strip()
+        yield (
+            "begun",
+            gettext(
+                "{text} is no time. Write it like 2019-05-04 14:03:00, with +02:00 for a zone", text=text
+            ),
+        )
     name = form["name"].strip()
     if name != PurePath(name).name:
         yield "name", gettext("{text} is no name of a file. Leave out / and \\", text=name)

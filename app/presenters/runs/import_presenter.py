@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.presenters.base import EMPTY_CHIP, Chip, Presenter, TaskFailure, Tone
+from analysis.formatting import with_unit
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.import_form import (
     FIELDS,
@@ -16,18 +17,17 @@ from app.presenters.runs.import_form import (
     reads_alike,
     validate,
 )
-from app.presenters.runs.state import ImportPreview, Overlay
+from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
 from app.presenters.worker import LazyModule, Worker
-from messages.i18n import N_, gettext
+from messages.i18n import N_, gettext, ngettext
 from messages.message import Message, message, options_in, replace_options
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
-    from app.runs.exchange.importing import FilePreview
+    from app.runs.exchange.recognition import FilePreview
 else:
     tasks = LazyModule("app.presenters.runs.tasks")
 
-SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 """Width of a column of the first rows, in characters."""
 _OPTIONS = {field.option: field for field in FIELDS.values() if field.option}
@@ -54,6 +54,8 @@ class ImportState:
     busy: str = ""
     """Work in progress."""
     message: Chip = EMPTY_CHIP
+    results: str = ""
+    """A line a file of what "Import all" has done; empty before."""
     can_import: bool = False
     """Whether the file was read with the current form."""
 
@@ -113,6 +115,22 @@ class ImportPresenter(Presenter[ImportState]):
                 self._folder,
                 done=self._on_done,
                 failed=self._on_failed,
+                progress=self._on_progress,
+            )
+
+    def import_all(self) -> None:
+        """Import this file and those that wait with the same columns and conditions."""
+        state = self.state
+        if state.can_import and not state.busy:
+            self._update(busy=gettext("Importing"), message=EMPTY_CHIP, can_import=False)
+            self._worker.submit(
+                tasks.import_files,
+                (state.path, *self._files),
+                state.form,
+                self._folder,
+                done=self._on_all_done,
+                failed=self._on_failed,
+                progress=self._on_progress,
             )
 
     def close(self) -> None:
@@ -147,6 +165,19 @@ class ImportPresenter(Presenter[ImportState]):
         self._on_imported(run)
         self.skip_file()
         self._update(message=Chip(gettext("Imported {name}", name=Path(run).stem), Tone.OK))
+
+    def _on_all_done(self, outcome: ImportOutcome) -> None:
+        for run in outcome.runs:
+            self._on_imported(run)
+        self._files.clear()
+        self.skip_file()
+        text = ngettext("Imported {count} file", "Imported {count} files", len(outcome.runs))
+        tone = Tone.WARN if outcome.faults else Tone.OK
+        self._update(message=Chip(text, tone), results="\n".join([*outcome.rows, *outcome.faults]))
+
+    def _on_progress(self, progress: Progress) -> None:
+        share = with_unit(f"{100.0 * (progress.fraction or 0.0):.0f}", "%")
+        self._update(busy=f"{progress.text}, {share}")
 
     def _on_failed(self, failure: TaskFailure) -> None:
         self._update(busy="", can_import=True)
@@ -186,9 +217,9 @@ class ImportPresenter(Presenter[ImportState]):
     def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; keep those that were chosen if the file has them."""
         form, options = dict(self.state.form), found.options
-        is_known = {form["time"], form["table"], form["second"]} <= {"", *found.columns}
-        if not is_known or not form["time"]:
-            form |= {name: getattr(found, name) for name in ("time", "table", "second", "measures")}
+        is_known = {form["time"], form["table"], form["second"], form["date"]} <= {"", *found.columns}
+        if not is_known or not form["table"]:
+            form |= {name: getattr(found, name) for name in ("time", "table", "second", "date", "measures")}
             form["time_unit"] = found.time_unit or form["time_unit"]
             form["unit"] = found.unit or form["unit"]
         form["delimiter"], form["decimal"] = options.delimiter or "", options.decimal or ""

@@ -114,6 +114,15 @@ class ImportPreview:
 
 
 @dataclass(frozen=True, slots=True)
+class ImportOutcome:
+    """Paths of imported runs, a line of text for each, and a line for each file that failed."""
+
+    runs: tuple[str, ...]
+    rows: tuple[str, ...]
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class BatchOutcome:
     """Paths of the runs that were processed, and a line for each that failed."""
 

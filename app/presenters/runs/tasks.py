@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from msgspec import convert
 
 from analysis.formatting import with_unit
@@ -13,16 +14,25 @@ from analysis.record import AnalysisError
 from app.presenters.base import Progress, ReportProgress, batch_progress
 from app.presenters.conditions import parse_conditions
 from app.presenters.number_text import format_fixed
-from app.presenters.runs.import_form import FIELDS, GAIN, Form, parse_pairs
-from app.presenters.runs.state import ANALYSING, BatchOutcome, ImportPreview, Overlay, RunAnalysed, Trace
+from app.presenters.results import sentence
+from app.presenters.runs.import_form import FIELDS, GAIN, PER_FILE_FIELDS, Form, parse_pairs, parse_time
+from app.presenters.runs.state import (
+    ANALYSING,
+    BatchOutcome,
+    ImportOutcome,
+    ImportPreview,
+    Overlay,
+    RunAnalysed,
+    Trace,
+)
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
-from app.runs.blocks import RunBlock
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields
 from app.runs.errors import RunError
-from app.runs.exchange import importing
+from app.runs.exchange import import_run, importing, recognition
 from app.runs.exchange.exporting import ExportRequest, export_runs
+from app.runs.exchange.reading_process import shared_reading_process
 from app.runs.listing import list_runs
 from app.runs.reader import open_run
 from app.runs.summary import RunSummary
@@ -150,31 +160,45 @@ def _run_trace(overview: DecimatedRun) -> Trace:
 def preview_import(path: str, form: Form) -> ImportPreview:
     """Read a file as it would be imported; `form` is valid, also below."""
     plan = csv_import(form)
-    _, _, block = importing.read_record(Path(path), plan)
-    rate_hz = importing.even_rate_hz(block.time_s)
-    rate = gettext("uneven times") if rate_hz is None else with_unit(f"{rate_hz:.6g}", "Hz")
-    length = with_unit(format_fixed(float(block.time_s[-1]), 3), "s")
-    summary = ngettext("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
     unit, scale = form["unit_name"].strip() or "m", 1.0
     if unit == "m" and form["quantity"] == "displacement":
         unit, scale = "mm", 1e3
-    trace = _imported_trace(Path(path).stem, block, plan.measures, scale)
-    return ImportPreview(Overlay((trace,), gettext("time, s"), unit), summary)
+    with shared_reading_process().read(Path(path), plan) as record:
+        importing.check_length(Path(path), record)
+        trace = _imported_trace(Path(path).stem, record, plan.measures, scale)
+        told = [_record_summary(record), *(sentence(note) for note in record.facts.notes)]
+    return ImportPreview(Overlay((trace,), gettext("time, s"), unit), ". ".join(told))
 
 
-def _imported_trace(name: str, block: RunBlock, measures: str, scale: float) -> Trace:
-    table = scale * block.readings[:, 0]
-    columns = [block.time_s, table]
-    if block.readings.shape[1] > 1:
-        second = scale * block.readings[:, 1]
-        columns.append(second - table if measures == "plate" else second)
-    time_s, *traces = decimate(tuple(columns), _DRAWN_SPANS)
+def _record_summary(record: importing.ForeignRecord) -> str:
+    rate_hz, start = record.facts.rate_hz, record.facts.start
+    rate = gettext("uneven times") if rate_hz is None else with_unit(f"{rate_hz:.6g}", "Hz")
+    length = with_unit(format_fixed(float(record.time_s[-1]), 3), "s")
+    begun = gettext("begun {start}", start=f"{start.astimezone():%Y-%m-%d %H:%M:%S}") if start else ""
+    count = ngettext("{count} sample", "{count} samples", len(record))
+    return ", ".join(filter(None, (count, length, rate, begun or gettext("date not known"))))
+
+
+def _imported_trace(name: str, record: importing.ForeignRecord, measures: str, scale: float) -> Trace:
+    readings = [
+        scale * gauge.gain_m_per_count * (cells - gauge.zero_count)
+        for gauge, cells in zip(record.facts.gauges, record.cells, strict=True)
+    ]
+    if len(readings) > 1 and measures == "plate":
+        readings[1] = readings[1] - readings[0]
+    time_s, *traces = decimate((np.array(record.time_s), *readings), _DRAWN_SPANS)
     return Trace(name, time_s, traces[0], traces[1] if len(traces) > 1 else None)
 
 
-def import_file(path: str, form: Form, folder: str) -> str:
+def import_file(path: str, form: Form, folder: str, report: ReportProgress) -> str:
     """Import a file as a run, under a free name in the folder; its path."""
-    target = _free_path(Path(folder), form["name"].strip().removesuffix(".h5") or Path(path).stem)
+    return _import(path, form, folder, report).run
+
+
+def _import(path: str, form: Form, folder: str, report: ReportProgress) -> import_run.ImportedRun:
+    stem = form["name"].strip().removesuffix(".h5") or Path(path).stem
+    target = import_run.free_path(Path(folder), stem)
+    text = gettext("Importing {name}", name=Path(path).name)
     metadata: dict[str, Any] = {
         "series": form["series"].strip() or None,
         "plate_mass_kg": FIELDS["plate_mass_kg"].parse(form),
@@ -184,29 +208,55 @@ def import_file(path: str, form: Form, folder: str) -> str:
         "conditions": parse_conditions(form, dict(parse_pairs(form["other"]))),
     }
     try:
-        return str(importing.import_csv(Path(path), csv_import(form), target, load_stand(), **metadata).path)
+        return import_run.import_csv(
+            Path(path), csv_import(form), target, load_stand(),
+            report=lambda share: report(Progress(text, share)), **metadata,
+        )  # fmt: skip
     except SeriesError as error:
         raise RunError("{reason}", reason=error, field="series") from None
 
 
-def _free_path(folder: Path, stem: str) -> Path:
-    path, number = folder / f"{stem}.h5", 1
-    while path.exists():
-        number += 1
-        path = folder / f"{stem}-{number}.h5"
-    return path
+def import_files(paths: tuple[str, ...], form: Form, folder: str, report: ReportProgress) -> ImportOutcome:
+    """Import files alike; what is stated of one test alone goes to the first. One that fails is told."""
+    runs: list[import_run.ImportedRun] = []
+    faults: list[str] = []
+    for number, path in enumerate(paths):
+
+        def on_progress(progress: Progress, done: int = number) -> None:
+            report(Progress(progress.text, (done + (progress.fraction or 0.0)) / len(paths)))
+
+        try:
+            runs.append(_import(path, form, folder, on_progress))
+        except (RunError, ConfigError) as error:
+            faults.append(f"{Path(path).name}: {sentence(error.message)}")
+        form = {**form, **dict.fromkeys(PER_FILE_FIELDS, "")}
+    return ImportOutcome(tuple(run.run for run in runs), tuple(map(_result_row, runs)), tuple(faults))
 
 
-def survey_file(path: str, form: Form) -> importing.FilePreview:
+def _result_row(run: import_run.ImportedRun) -> str:
+    """Name, length, rate, range of each gauge, and release of an imported run."""
+    scale, unit = (1e3, "mm") if run.unit == "m" else (1.0, run.unit)
+    ranges = (with_unit(f"{scale * low:.4g} … {scale * high:.4g}", unit) for low, high in run.ranges)
+    release = gettext("no release found")
+    if run.release_s is not None:
+        release = gettext("released at {time}", time=with_unit(format_fixed(run.release_s, 3), "s"))
+    rate = gettext("uneven times") if run.rate_hz is None else with_unit(f"{run.rate_hz:.6g}", "Hz")
+    length = with_unit(format_fixed(run.duration_s, 3), "s")
+    return "   ".join((Path(run.run).stem, length, rate, *ranges, release))
+
+
+def survey_file(path: str, form: Form) -> recognition.FilePreview:
     """Read the columns and first lines of a file."""
     options = {name: form[name] or None for name in ("delimiter", "decimal")}
-    return importing.preview_file(Path(path), convert(options | _lines(form), importing.ParseOptions))
+    options["encoding"] = form["encoding"].strip() or None
+    request = convert(options | _lines(form), recognition.ParseOptions)
+    return shared_reading_process().preview(Path(path), request)
 
 
 def csv_import(form: Form) -> importing.CsvImport:
     """Request for the import, as `slipstand import` makes it."""
     number = {name: field.parse(form) for name, field in FIELDS.items() if field.rule}
-    unit: dict[str, Any] = {"unit": form["unit"]}
+    unit: dict[str, Any] = {"unit": form["unit"] or None}
     if form["unit"] == GAIN:
         unit = {
             "gain": number["gain"] or 1.0,
@@ -219,14 +269,21 @@ def csv_import(form: Form) -> importing.CsvImport:
         "table": form["table"],
         "second": form["second"] or None,
         "delimiter": form["delimiter"] or None,
-        "decimal": form["decimal"] or ".",
+        "decimal": form["decimal"] or None,
         "skip": lines["skip"],
         "header": lines["header"] is not False,
+        "rate_hz": number["rate"],
+        "date": (form["time"] and form["date"]) or None,
+        "date_order": form["date_order"] or None,
+        "encoding": form["encoding"].strip() or None,
+        "missing": tuple(filter(None, map(str.strip, form["missing"].split(";")))),
     }
     request = {
         "layout": layout,
         **unit,
-        **{name: form[name] for name in ("measures", "time_unit", "quantity")},
+        **{name: form[name] for name in ("measures", "quantity")},
+        "time_unit": form["time_unit"] or None,
+        "begun": parse_time(form["begun"]),
         **{name: number[name] for name in ("gain_uncertainty", "from_s", "until_s", "segment")},
     }
     return convert(request, importing.CsvImport)

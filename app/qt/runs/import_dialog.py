@@ -33,12 +33,20 @@ class ImportDialog(QDialog):
         self._fields.changed.connect(presenter.set_form)
         self._preview = RunsPreview(theme)
         self._words = label(wrap=True)
+        self._caption = label(gettext("First lines of the file"), TextRole.LABEL, muted=True)
         self._lines = make_text_view(gettext("First lines of the file"))
         self._lines.setFixedHeight(_LINES_HEIGHT)
         self._message = label(wrap=True)
         self._import = make_primary_button(gettext("Import"))
         self._import.clicked.connect(lambda _checked: self._import_file())
         self._skip = make_button(gettext("Leave out"), presenter.skip_file)
+        self._import_all = make_button(gettext("Import all"), self._import_likewise)
+        bind_button(
+            self._import_all,
+            "Ctrl+Shift+Return",
+            gettext("Make runs of this file and all that wait, alike"),
+            self,
+        )
         bind_button(
             self._import, "Ctrl+Return", gettext("Make a run of the file, and go on with the next"), self
         )
@@ -57,11 +65,15 @@ class ImportDialog(QDialog):
         if state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
         self._words.setText(state.summary)
-        if state.first_rows != old.first_rows:
-            self._lines.setPlainText(state.first_rows)
+        if (state.first_rows, state.results) != (old.first_rows, old.results):
+            self._lines.setPlainText(state.results or state.first_rows)
+            self._caption.setText(
+                gettext("Imported") if state.results else gettext("First lines of the file")
+            )
         show_chip(self._message, Chip(state.busy) if state.busy else state.message)
         self._message.show()  # an empty one still keeps the buttons at the right
         self._import.setEnabled(state.can_import)
+        self._import_all.setEnabled(state.can_import and bool(state.pending))
         self._skip.setEnabled(bool(state.path))
 
     def reject(self) -> None:
@@ -72,15 +84,18 @@ class ImportDialog(QDialog):
         self._fields.fill()  # by its key the button takes no focus from a field
         self._presenter.import_file()
 
+    def _import_likewise(self) -> None:
+        self._fields.fill()
+        self._presenter.import_all()
+
     def _lay_out(self, close: QPushButton) -> None:
         self.setWindowTitle(gettext("Import"))
         self.resize(1000, 660)
         left = make_scroll_area(self._fields, is_column=False)
         left.setFixedWidth(_COLUMN_WIDTH)
-        caption = label(gettext("First lines of the file"), TextRole.LABEL, muted=True)
-        right = make_column((self._preview, 1), self._words, caption, self._lines, spacing=8)
+        right = make_column((self._preview, 1), self._words, self._caption, self._lines, spacing=8)
         buttons = make_row((self._message, 1), spacing=8)
-        for button in (self._import, self._skip, close):
+        for button in (self._import, self._import_all, self._skip, close):
             button.setAutoDefault(False)  # Enter in a field takes the field
             buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignBottom)
         top = make_row((self._title, 1), self._waiting)

@@ -74,8 +74,10 @@ class ImportFields(QWidget):
         for name in import_form.COLUMN_FIELDS:
             box = self._boxes[name]
             box.clear()
-            if name == "second":
+            if name in ("second", "date"):
                 box.addItem(gettext("none"), "")
+            elif name == "time":
+                box.addItem(gettext("by the file or a rate"), "")
             for column, title in zip(state.columns, state.column_labels, strict=True):
                 box.addItem(title, column)
 

@@ -7,7 +7,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QStackedWidget, QWidget
 
-from app.presenters.runs.import_presenter import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
 from app.presenters.runs.state import RunFilter, RunsState, StatusFilter
 from app.qt.runs.preview import RunsPreview
@@ -18,6 +17,7 @@ from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_button, make_ch
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
+from app.runs.exchange.formats import SUFFIXES
 from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:

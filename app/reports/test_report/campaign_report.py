@@ -76,7 +76,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
 def _summary(material: CampaignReportInput) -> blocks.Facts:
     gathered, campaign = material.gathered, material.content.campaign
     facts = [gathered.details[run.name].metadata for run in gathered.runs]
-    days = sorted(one.start_time.date().isoformat() for one in facts)
+    days = sorted(one.format_start("%Y-%m-%d") for one in facts if one.start_time is not None)
     contacts = contact_names(gathered.stands.values())
     codes = dict.fromkeys(row.series.contact for row in campaign.rows)
     counted = sum(len(row.runs) for row in campaign.rows)
@@ -153,7 +153,7 @@ def _runs(material: CampaignReportInput) -> blocks.Grid:
     rows: list[list[Cell]] = []
     for run in material.gathered.runs:
         metadata, found = material.gathered.details[run.name].metadata, run.results.get(_FRICTION)
-        name, begun = _local(run.name, material), metadata.start_time.strftime("%Y-%m-%d %H:%M")
+        name, begun = _local(run.name, material), metadata.format_start("%Y-%m-%d %H:%M") or "not known"
         law = "left out" if run.excluded else _VERDICTS[run.adequate]
         law = "does not fit, f_d holds" if run.friction_holds and not run.excluded else law
         value = "–" if found is None else format_value(found.value, found.standard_uncertainty).in_print

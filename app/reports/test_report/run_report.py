@@ -115,7 +115,7 @@ def _test(analysis: Analysis) -> blocks.Facts:
         ("title", metadata.title),
         ("series", metadata.series or "none"),
         ("contact", metadata.contact),
-        ("begun", metadata.start_time.strftime("%Y-%m-%d %H:%M:%S %z")),
+        ("begun", metadata.format_start("%Y-%m-%d %H:%M:%S %z") or "not known"),
         ("operator", metadata.operator),
         ("nominal pullback", shared.in_unit(metadata.pullback_m, MILLIMETRE, 2)),
         ("table mass m1", f"{metadata.table_mass_kg:g} {KILOGRAM.symbol}"),

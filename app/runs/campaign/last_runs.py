@@ -1,5 +1,6 @@
 """Results of the last runs of a stand, as they are kept in its runs."""
 
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +42,7 @@ def read_last_runs(folder: Path, stand_name: str) -> LastRuns:
         if (details := one.details) and (result := one.result)
         if details.metadata.stand.name == stand_name and not details.metadata.excluded
     ]
-    of_stand.sort(key=lambda one: one[0])
+    of_stand.sort(key=lambda one: one[0].timestamp() if one[0] else -math.inf)
     is_simulated = all(simulated for *_, simulated in of_stand)
     results = tuple(result for _, result, simulated in of_stand if simulated == is_simulated)
     return LastRuns(folder, results, looked_at)

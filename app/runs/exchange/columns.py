@@ -1,7 +1,8 @@
 """Columns of numbers out of a foreign file, of whatever kind it is."""
 
+import datetime
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,31 +12,57 @@ from app.runs.errors import ImportFileError
 from messages.i18n import N_
 from messages.message import Message, message
 
+Floats = NDArray[np.float64]
 
-@dataclass(frozen=True, eq=False, slots=True)
+
+@dataclass(eq=False, slots=True)
 class ForeignColumns:
     """What was asked of a foreign file."""
 
     path: Path
-    values: NDArray[np.float64]
-    """(n, 2 or 3) float64: time, table and perhaps the second gauge, as written; NaN where absent."""
+    time: Floats
+    """(n,) float64: as written, or seconds since the first stamp; NaN where absent."""
+    cells: list[Floats]
+    """One or two of (n,) float64: table and perhaps the second gauge, as written; NaN where absent."""
     names: list[str]
+    """Of time and gauges."""
     row_label: Callable[[int], Message]
-    """Names a row of `values` as the file counts it: `line 4`."""
+    """Names a row as the file counts it: `line 4`."""
+    units: list[str] = field(default_factory=list)
+    """Of time and gauges as the file names them; "" where it does not. The time of stamps is in s."""
+    start: datetime.datetime | None = None
+    """Time of day at the time 0 of `time`, where the file tells it."""
+    is_stamped: bool = False
+    """Whether times are seconds since the first of the file's date-times, or the file's own axis."""
+    is_even: bool = False
+    """Whether the times were made of a rate, and thus are exactly even."""
+    interval_uncertainty: float = 0.0
+    """Relative standard uncertainty of the row interval, where that was worked out from rounded stamps."""
+    notes: list[Message] = field(default_factory=list)
+    """What was concluded or left out."""
+
+    @property
+    def values(self) -> Floats:
+        """(n, 2 or 3) float64: time and gauges."""
+        return np.column_stack([self.time, *self.cells])
+
+    def __len__(self) -> int:
+        return len(self.time)
 
     def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
         return cell_fault(self.path, self.row_label(row), self.names[column], fault)
 
     def check(self) -> None:
         """Refuse what cannot be a record. Raises ImportFileError."""
-        endless = np.argwhere(np.isinf(self.values))
-        if len(endless):
-            row, column = endless[0]
-            fault = message("the number is infinite. Leave the cell empty if there is no reading")
-            raise self.fault(row, column, fault)
-        absent = np.flatnonzero(np.isnan(self.values[:, 0]))
-        if len(absent):
-            raise self.fault(absent[0], 0, message("the time is missing. Give it or delete the line"))
+        fault = message("the number is infinite. Leave the cell empty if there is no reading")
+        for number, values in enumerate([self.time, *self.cells]):
+            endless = np.isinf(values)
+            if endless.any():
+                raise self.fault(int(np.flatnonzero(endless)[0]), number, fault)
+        absent = np.isnan(self.time)
+        if absent.any():
+            fault = message("the time is missing. Give it or delete the line")
+            raise self.fault(int(np.flatnonzero(absent)[0]), 0, fault)
 
 
 def cell_fault(path: Path, row_label: Message, column: str, fault: Message) -> ImportFileError:
@@ -44,16 +71,18 @@ def cell_fault(path: Path, row_label: Message, column: str, fault: Message) -> I
     return ImportFileError(template, path=path, row_label=row_label, names=column, fault=fault)
 
 
-_OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
+TIME, DATE, TABLE, SECOND = (
+    message("the time"), message("the date"), message("gauge 1"), message("gauge 2")
+)  # fmt: skip
 
 
-def find_columns(path: Path, wanted: list[str], names: list[str], width: int) -> list[int]:
-    """Positions of the columns of time, gauge 1 and perhaps gauge 2. Raises ImportFileError."""
+def find_columns(path: Path, wanted: list[tuple[Message, str]], names: list[str], width: int) -> list[int]:
+    """Positions of columns by what they hold and their name or number. Raises ImportFileError."""
     found: list[int] = []
-    for one, name in zip(_OF_TIME_AND_GAUGES, wanted, strict=False):
+    for one, name in wanted:
         at = _find_column(path, name, names, width)
         if at in found:
-            other = _OF_TIME_AND_GAUGES[found.index(at)]
+            other = wanted[found.index(at)][0]
             template = N_("column {name!r} is given for {other} and {one}. Give each its own")
             raise ImportFileError(template, name=name, other=other, one=one)
         found.append(at)

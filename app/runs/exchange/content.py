@@ -69,11 +69,12 @@ def coefficient_rows(runs: Iterable[ExportedRun]) -> Iterator[dict[str, Any]]:
     """A row a quantity, with `COEFFICIENT_COLUMNS`: words stand under `label`; None where absent."""
     for exported in runs:
         metadata, analysis = exported.run.metadata, exported.analysis or {"results": {}}
+        start = metadata.start_time
         for quantity, result in analysis["results"].items():
             numbers, model = result if isinstance(result, dict) else {}, analysis["model"] or {}
             low, high = numbers.get("interval_95") or (None, None)
             row = (
-                exported.name, metadata.series, metadata.start_time.isoformat(), analysis["kind"],
+                exported.name, metadata.series, start and start.isoformat(), analysis["kind"],
                 model.get("name"), model.get("adequate"), quantity,
                 numbers.get("value"), numbers.get("standard_uncertainty"), low, high, numbers.get("unit"),
                 None if numbers else str(result),

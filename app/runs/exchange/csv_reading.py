@@ -1,248 +1,420 @@
-"""Layout of a CSV file: encoding, header and delimiter, detected or given; and its columns of numbers."""
+"""Columns of numbers of a text file, read piece by piece."""
 
-import codecs
 import csv
+import functools
+import importlib
 import io
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
+from app.runs.exchange.columns import DATE, TIME, ForeignColumns, cell_fault, find_columns
+from app.runs.exchange.csv_layout import (
+    MISSING_MARKS,
+    CsvOptions,
+    CsvText,
+    is_data,
+    is_number,
+    survey_csv,
+    to_number,
+)
+from app.runs.exchange.stamps import (
+    NS,
+    StampColumn,
+    StampError,
+    ambiguous_date,
+    date_order,
+    find_form,
+    to_datetime,
+)
+from app.runs.exchange.text_files import PIECE_BYTES, Piece
+from app.runs.exchange.units import unit_in_name
 from messages.i18n import N_
 from messages.message import Message, MessageError, message, option
 
-_SAMPLE_LINES = 20
-_WORDS = {"tab": "\t", "space": " "}
-_CANDIDATES = ("\t", ";", ",", "|", " ")
-_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+_FOOTER_BYTES = 1 << 16
+"""Lines at the end that are no rows are a footer if they are no more than this."""
+_ROOM, _SHARE_MIN = 1.02, 1e-3
+"""Room beyond the rows expected from the share of the file that was read; that share is at least this."""
+_NUMERIC = re.compile(r"\s*[-+.,]*\d")
+_SHOWN = 40  # characters of a footer in a note
+
+ReportShare = Callable[[float], object]
+Values = list[NDArray[Any]]
+"""Of each column (n,): float64, or int64 nanoseconds of stamps."""
 
 
-class CsvOptions(msgspec.Struct, frozen=True):
-    """What the user says of a CSV file. A column is a name, or a number counted from 0."""
+def read_columns(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> ForeignColumns:
+    """Read time and gauges from a text file. Raises ImportFileError, which names line and column.
 
-    time: str
-    table: str
-    second: str | None = None
-    delimiter: str | None = None
-    """A character, `tab` or `space` (any run of blanks); None finds it out."""
-    decimal: Literal[".", ","] = "."
-    skip: int = 0
-    """Lines left out before the header."""
-    header: bool = True
-
-    @property
-    def wanted(self) -> list[str]:
-        return [name for name in (self.time, self.table, self.second) if name is not None]
-
-
-class Line(NamedTuple):
-    """A line of the file: its number counted from 1, its place in the text, and itself."""
-
-    number: int
-    offset: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class CsvText:
-    """A CSV file taken apart as far as its header."""
-
-    path: Path
-    text: str
-    data: Line
-    delimiter: str
-    decimal: Literal[".", ","]
-    names: list[str]
-    """Column names; empty without a header."""
-
-
-def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
-    """Read a CSV file as far as its header. Raises ImportFileError.
-
-    Where no header stands above the numbers, the last `#` line before them is it if it has as many cells.
+    `report` is called with the share of the file that has been read.
     """
-    text = _decoded(path)
-    comment, lines = _head(path, text, layout.skip)
-    delimiter = _delimiter(path, layout, lines)
-    names, data = _header(path, layout, delimiter, comment, lines)
-    return CsvText(path, text, data, delimiter, layout.decimal, names)
-
-
-def split_line(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, without quotes, blanks at their ends, and empty cells at its end."""
-    cells = line.split() if delimiter == " " else line.split(delimiter)
-    cells = [cell.strip().strip('"').strip() for cell in cells]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells
-
-
-def is_number(cell: str, decimal: str) -> bool:
-    """Tell whether a cell is a number."""
-    try:
-        to_number(cell, decimal)
-    except ValueError:
-        return False
-    return True
-
-
-def to_number(cell: str, decimal: str) -> float:
-    """Value of a cell. Raises ValueError."""
-    if "_" in cell or (decimal == "," and "." in cell):
-        raise ValueError(cell)
-    return float(cell.replace(decimal, "."))
-
-
-def is_data(line: str) -> bool:
-    """Tell whether a line counts: neither blank nor a comment."""
-    return bool(line.strip()) and not line.lstrip().startswith("#")
-
-
-def lines_from(text: str, number: int = 1, offset: int = 0) -> Iterator[Line]:
-    """Lines of a text from a place on."""
-    while offset < len(text):
-        end = text.find("\n", offset)
-        end = len(text) if end < 0 else end
-        yield Line(number, offset, text[offset:end])
-        number, offset = number + 1, end + 1
-
-
-def _decoded(path: Path) -> str:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise ImportFileError(
-            "{path}: there is no such file. Give the path of a CSV file", path=path
-        ) from None
-    except OSError as error:
-        template = N_("{path}: cannot be read ({strerror}). Give a readable CSV file")
-        raise ImportFileError(template, path=path, strerror=error.strerror) from None
-    encoding = next((name for bom, name in _BOMS.items() if data.startswith(bom)), "")
-    if not encoding and b"\0" in data[:4096]:
-        raise ImportFileError(
-            "{path} is not a text file. Export it as CSV from the program that wrote it", path=path
-        )
-    try:
-        text = data.decode(encoding or "utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")  # digits are the same in all of them; names of columns may look odd
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
-    """Last comment before the first line that counts, and the first lines that count."""
-    comment, found = "", []
-    for line in lines_from(text):
-        if line.number > skip and is_data(line.text):
-            found.append(line)
-        elif line.number > skip and line.text.strip() and not found:
-            comment = line.text.lstrip().lstrip("#")
-        if len(found) > _SAMPLE_LINES:
-            break
-    if not found:
-        template = N_("{path} holds no line of data. Give a file with numbers, and check {option} {skip}")
-        raise ImportFileError(template, path=path, option=option("--skip"), skip=skip)
-    return comment, found
-
-
-def _delimiter(path: Path, layout: CsvOptions, lines: list[Line]) -> str:
-    if layout.delimiter is not None:
-        told = _WORDS.get(layout.delimiter, layout.delimiter)
-        if len(told) != 1 or told in '\n"' or told == layout.decimal:
-            raise ImportFileError(
-                "{option} {delimiter!r} cannot be. Give tab, space, or a character other"
-                " than the decimal sign {decimal}",
-                option=option("--delimiter"),
-                delimiter=layout.delimiter,
-                decimal=layout.decimal,
-            )
-        return told
-    scores = {c: _score(c, layout, lines) for c in _CANDIDATES if c != layout.decimal}
-    best = max(scores, key=lambda c: scores[c])
-    if scores[best] < 2:
-        raise _no_numbers(path, layout, lines)
-    return best
-
-
-def _no_numbers(path: Path, layout: CsvOptions, lines: list[Line]) -> ImportFileError:
-    if layout.header and len(lines) < 2:
-        return ImportFileError(
-            "{path} holds a header but no line of data. Give a file with numbers", path=path
-        )
-    return ImportFileError(
-        "{path}, line {number}: no columns of numbers are found in {text!r}. Check"
-        " {skip_option}, {delimiter_option} and {decimal_option}",
-        skip_option=option("--skip"),
-        delimiter_option=option("--delimiter"),
-        decimal_option=option("--decimal"),
-        path=path,
-        number=lines[-1].number,
-        text=lines[-1].text[:60],
-    )
-
-
-def _score(delimiter: str, layout: CsvOptions, lines: list[Line]) -> int:
-    """How many cells of the middling sample line are numbers, 0 where the header has fewer cells."""
-    header, *data = [split_line(line.text, delimiter) for line in lines]
-    numbers = sorted(sum(is_number(cell, layout.decimal) for cell in cells) for cells in data or [header])
-    middling = numbers[len(numbers) // 2]
-    return middling if len(header) >= middling else 0
-
-
-def _header(
-    path: Path, layout: CsvOptions, delimiter: str, comment: str, lines: list[Line]
-) -> tuple[list[str], Line]:
-    cells = split_line(lines[0].text, delimiter)
-    if not layout.header:
-        return [], lines[0]
-    if not all(is_number(cell, layout.decimal) for cell in cells):
-        if len(lines) < 2:
-            raise _no_numbers(path, layout, lines)
-        return cells, lines[1]
-    names = split_line(comment, delimiter)
-    if len(names) == len(cells):
-        return names, lines[0]
-    raise ImportFileError(
-        "{path}, line {number}: {text!r} is data, not column names. Add {option} and give columns by number",
-        option=option("--no-header"),
-        path=path,
-        number=lines[0].number,
-        text=lines[0].text[:60],
-    )
-
-
-def read_columns(path: Path, layout: CsvOptions) -> ForeignColumns:
-    """Read time and gauges from a CSV file. Raises ImportFileError, which names line and column."""
     source = survey_csv(path, layout)
-    width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
-    positions = find_columns(path, layout.wanted, source.names, width)
-    names = [repr(source.names[i]) if i < len(source.names) else str(i) for i in positions]
-    values = _quick(source, positions)
-    if values is None:
-        values = _thorough(source, dict(zip(names, positions, strict=True)))
-    columns = ForeignColumns(path, values, names, lambda row: _label(_data_lines(source)[row]))
+    reader = _Reader(source, layout)
+    values = reader.read(report)
+    columns = reader.columns(values)
     columns.check()
     return columns
 
 
-def _quick(source: CsvText, positions: list[int]) -> NDArray[np.float64] | None:
-    """All numbers by numpy's own reader; None where it finds anything but numbers and empty cells."""
-    body = source.text[source.data.offset :]
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """A column that is read."""
+
+    position: int
+    name: str  # as messages call it
+    stamps: StampColumn | None = None
+
+
+class _CellError(MessageError):
+    """A cell that is absent or not a number."""
+
+
+class _Reader:
+    """Reads the wanted columns of one file."""
+
+    def __init__(self, source: CsvText, layout: CsvOptions) -> None:
+        self._source = source
+        self._layout = layout
+        wanted = list(layout.wanted)
+        positions = find_columns(source.path, wanted, source.names, source.width)
+        self._columns = [
+            _Wanted(at, self._name(at), self._stamps(at) if what in (TIME, DATE) else None)
+            for (what, _), at in zip(wanted, positions, strict=True)
+        ]
+        self._has_time = bool(wanted) and wanted[0][0] == TIME
+        self._has_date = len(wanted) > 1 and wanted[1][0] == DATE
+        self._marks = frozenset(mark.lower() for mark in (*MISSING_MARKS, *layout.missing))
+        self._starts: list[tuple[int, int]] = []  # first row of each piece, and its line
+        self._notes: list[Message] = []
+        self._check_stamps()
+
+    def read(self, report: ReportShare) -> Values:
+        """All rows of the wanted columns, in arrays that grow with what is expected to come."""
+        size_bytes = max(self._source.file.size_bytes, 1)
+        kinds = [np.float64 if column.stamps is None else np.int64 for column in self._columns]
+        joined: Values = [np.empty(0, kind) for kind in kinds]
+        rows = 0
+        for piece in self._data_pieces():
+            self._starts.append((rows, piece.line))
+            values = _quick(self._source, piece.data, self._columns, self._marks)
+            ended = False
+            if values is None:
+                values, ended = self._thorough(piece)
+            end, share = rows + len(values[0]), min(piece.end_bytes / size_bytes, 1.0)
+            if end > len(joined[0]):
+                room = int(_ROOM * end / max(share, _SHARE_MIN)) + 1
+                for column in joined:
+                    column.resize(room, refcheck=False)
+            for column, part in zip(joined, values, strict=True):
+                column[rows:end] = part
+            rows = end
+            report(share)
+            if ended:
+                break
+        return [column[:rows] for column in joined]
+
+    def columns(self, values: Values) -> ForeignColumns:
+        """Time and gauges from what was read."""
+        path, start, is_stamped = self._source.path, None, False
+        gauges = self._columns[self._has_time + self._has_date :]
+        cells = values[len(values) - len(gauges) :]
+        time: NDArray[Any]
+        names, units = [column.name for column in gauges], [self._unit(column) for column in gauges]
+        if not self._has_time:
+            time = np.arange(len(cells[0])) / (self._layout.rate_hz or 1.0)
+            names, units = ["time", *names], ["s", *units]
+        else:
+            names, units = [self._columns[0].name, *names], [self._unit(self._columns[0]), *units]
+            time = values[0]
+            stamps = self._columns[0].stamps
+            if stamps is not None:
+                is_stamped, units[0] = True, "s"
+                time = stamps.going_on(time) if not self._has_date else time + values[1]
+                first = int(time[0]) if len(time) else 0
+                if stamps.has_date or self._has_date:
+                    start = to_datetime(first, has_zone=stamps.has_zone)
+                time = (time - first) / NS
+        return ForeignColumns(
+            path, np.asarray(time, np.float64), cells, names, self._label, units, start, is_stamped,
+            not self._has_time, notes=self._notes,
+        )  # fmt: skip
+
+    def _name(self, at: int) -> str:
+        names = self._source.names
+        return repr(names[at]) if at < len(names) and names[at] else str(at)
+
+    def _unit(self, column: _Wanted) -> str:
+        units, names, at = self._source.units, self._source.names, column.position
+        of_row = units[at] if at < len(units) else ""
+        return of_row or (unit_in_name(names[at]) if at < len(names) else "")
+
+    def _stamps(self, at: int) -> StampColumn | None:
+        """What reads the cells of a column of date-times; None of numbers."""
+        cells = [row[at] for row in self._source.sample if at < len(row)]
+        first = next((cell for cell in cells if cell), "")
+        form = None if is_number(first, self._source.decimal) else find_form(first)
+        if form is None:
+            return None
+        order = self._layout.date_order or date_order(cells)
+        if order is None:
+            raise ambiguous_date(self._source.path, first)
+        return StampColumn(form, order)
+
+    def _check_stamps(self) -> None:
+        if not self._has_date:
+            return
+        time, date = self._columns[0], self._columns[1]
+        if time.stamps is None or time.stamps.has_date or date.stamps is None or not date.stamps.has_date:
+            raise ImportFileError(
+                "{path}: {option} takes dates beside times of day such as 14:03:00, and {time} and {date}"
+                " are not that. Leave it out",
+                path=self._source.path,
+                option=option("--date"),
+                time=time.name,
+                date=date.name,
+            )
+
+    def _data_pieces(self) -> Iterator[Piece]:
+        for piece in self._source.file.pieces(PIECE_BYTES):
+            skipped = self._source.data_line - piece.line
+            if skipped <= 0:
+                yield piece
+                continue
+            place = _line_start(piece.data, skipped)
+            if place < len(piece.data):
+                yield Piece(self._source.data_line, piece.data[place:], piece.end_bytes)
+
+    def _thorough(self, piece: Piece) -> tuple[Values, bool]:
+        """All numbers of a piece, cell by cell, and whether a footer follows. Raises ImportFileError."""
+        rows: list[list[float]] = []
+        ended = False
+        for number, text in self._lines(piece):
+            try:
+                rows.append(self._row(text, number))
+            except _RowError as fault:
+                if not fault.is_first or not self._is_footer(number, text):
+                    raise fault.error from None
+                ended = True
+                break
+        columns = zip(*rows, strict=True) if rows else ([] for _ in self._columns)
+        kinds = (np.float64 if column.stamps is None else np.int64 for column in self._columns)
+        return [np.array(values, kind) for values, kind in zip(columns, kinds, strict=True)], ended
+
+    def _row(self, text: str, line: int) -> list[float]:
+        cells = _cells(text, self._source.delimiter)
+        row: list[float] = []
+        for column in self._columns:
+            try:
+                row.append(self._value(cells, column, line))
+            except _CellError as error:
+                fault = cell_fault(self._source.path, _line_label(line), column.name, error.message)
+                is_first = not row and (
+                    len(cells) <= column.position or not _NUMERIC.match(cells[column.position])
+                )
+                raise _RowError(fault, is_first) from None
+        return row
+
+    def _value(self, cells: Sequence[str], column: _Wanted, line: int) -> float:
+        if column.position >= len(cells):
+            raise _CellError("the line has only {cells} cells. Complete it or delete it", cells=len(cells))
+        cell = cells[column.position].strip()
+        if column.stamps is not None:
+            try:
+                return column.stamps.parse(cell)
+            except StampError:
+                template = N_("{cell!r} is no time like those above. Correct it or delete the line")
+                raise _CellError(template, cell=cell[:_SHOWN]) from None
+        try:
+            return math.nan if cell.lower() in self._marks else to_number(cell, self._source.decimal)
+        except ValueError:
+            remedy = message("Correct it, or leave the cell empty if there is no reading")
+        if "," in cell and self._source.decimal == ".":
+            remedy = message("If that is a decimal comma, add {option} ,", option=option("--decimal"))
+        elif line == self._source.data_line:
+            remedy = message(
+                "If the numbers begin below this line, add {header_option} {skip_option} {number}",
+                header_option=option("--no-header"),
+                skip_option=option("--skip"),
+                number=line,
+            )
+        raise _CellError("{cell!r} is not a number. {remedy}", cell=cell[:_SHOWN], remedy=remedy)
+
+    def _is_footer(self, line: int, text: str) -> bool:
+        """Tell whether no row follows from a line to the end; a note says what is left out."""
+        rest = 0
+        for piece in self._data_pieces():
+            for number, other in self._lines(piece):
+                if number < line:
+                    continue
+                rest += len(other)
+                if rest > _FOOTER_BYTES or (number > line and self._is_row(other, number)):
+                    return False
+        note = N_("from line {line} on there are no rows ({text!r}). They are left out")
+        self._notes.append(message(note, line=line, text=text.strip()[:_SHOWN]))
+        return True
+
+    def _is_row(self, text: str, line: int) -> bool:
+        try:
+            row = self._row(text, line)
+        except _RowError:
+            return False
+        return not math.isnan(row[0])
+
+    def _lines(self, piece: Piece) -> Iterator[tuple[int, str]]:
+        """Lines of a piece that count, and their numbers."""
+        blank = "" if self._source.delimiter == " " else self._source.delimiter
+        for number, line in enumerate(self._source.file.decode(piece.data).split("\n")[:-1], piece.line):
+            if is_data(line) and line.strip(f"{blank} \t"):
+                yield number, line
+
+    def _label(self, row: int) -> Message:
+        """Line of a row, found by reading again."""
+        first_row, first_line = max(start for start in self._starts if start[0] <= row)
+        for piece in self._data_pieces():
+            if piece.line == first_line:
+                for count, (number, _) in enumerate(self._lines(piece)):
+                    if count == row - first_row:
+                        return _line_label(number)
+        return message("row {row}", row=row)
+
+
+@dataclass(frozen=True, slots=True)
+class _RowError(Exception):
+    """Fault of a row; `is_first` where its first wanted cell does not even begin as a number."""
+
+    error: ImportFileError
+    is_first: bool
+
+
+def _line_label(line: int) -> Message:
+    return message("line {line}", line=line)
+
+
+def _line_start(data: bytes, lines: int) -> int:
+    """Place behind so many newlines, or the end."""
+    place = 0
+    for _ in range(lines):
+        place = data.find(b"\n", place) + 1
+        if not place:
+            return len(data)
+    return place
+
+
+def _cells(text: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return text.replace('"', "").split()
+    return next(csv.reader([text], delimiter=delimiter)) if '"' in text else text.split(delimiter)
+
+
+def _quick(source: CsvText, data: bytes, columns: Sequence[_Wanted], marks: frozenset[str]) -> Values | None:
+    """All numbers of a piece by a reader for tables; None where it finds anything else."""
+    if b"#" in data:
+        data = re.sub(rb"(?m)^[ \t]*#.*\n", b"", data)
+    delimiter = source.delimiter
+    if delimiter == " ":
+        data = _single_blanks(data)
+    if not data.strip():
+        return None
+    arrow = _arrow()
+    read = _by_numpy if arrow is None else functools.partial(_by_arrow, arrow)
+    values = read(source, data, columns, marks)
+    if values is None or (columns[0].stamps is None and np.isnan(values[0]).any()):
+        return None
+    return values
+
+
+def _single_blanks(data: bytes) -> bytes:
+    data = data.replace(b"\t", b" ")
+    while b"  " in data:
+        data = data.replace(b"  ", b" ")
+    return data.replace(b"\n ", b"\n").replace(b" \n", b"\n").lstrip(b" ")
+
+
+@functools.cache
+def _arrow() -> Any:
+    """The reader of pyarrow, of the extra `exchange`; None where it is not installed."""
+    try:
+        importlib.import_module("pyarrow")
+        return importlib.import_module("pyarrow.csv")
+    except ImportError:
+        return None
+
+
+def _by_arrow(
+    arrow: Any, source: CsvText, data: bytes, columns: Sequence[_Wanted], marks: frozenset[str]
+) -> Values | None:
+    pa = importlib.import_module("pyarrow")
+    first = data[: data.find(b"\n")].decode("latin-1")
+    width = len(_cells(first, source.delimiter))
+    if max(column.position for column in columns) >= width:
+        return None
+    names = [str(number) for number in range(width)]
+    types = {
+        str(column.position): pa.float64() if column.stamps is None else pa.binary() for column in columns
+    }
+    spelt = [form for mark in marks for form in {mark, mark.upper(), mark.capitalize(), mark.title()}]
+    try:
+        table = arrow.read_csv(
+            pa.BufferReader(data),
+            read_options=arrow.ReadOptions(use_threads=False, column_names=names, block_size=len(data) + 1),
+            parse_options=arrow.ParseOptions(delimiter=source.delimiter),
+            convert_options=arrow.ConvertOptions(
+                check_utf8=False,
+                column_types=types,
+                include_columns=list(types),
+                null_values=[*spelt, "NaN"],
+                decimal_point=source.decimal,
+            ),
+        )
+    except (pa.ArrowException, ValueError):
+        return None
+    values = [_of_arrow(table.column(str(column.position)), column.stamps) for column in columns]
+    return (
+        None if any(value is None for value in values) else [value for value in values if value is not None]
+    )
+
+
+def _of_arrow(column: Any, stamps: StampColumn | None) -> NDArray[Any] | None:
+    array = column.combine_chunks()
+    if stamps is None:
+        return np.array(array.to_numpy(zero_copy_only=False), np.float64)
+    _, offsets, text = array.buffers()
+    ends = np.frombuffer(offsets, np.int32)[array.offset : array.offset + len(array) + 1]
+    lengths = np.diff(ends)
+    if len(lengths) and (lengths == lengths[0]).all() and lengths[0]:
+        matrix = np.frombuffer(text, np.uint8)[ends[0] : ends[-1]].reshape(len(array), lengths[0])
+        if (found := stamps.parse_matrix(matrix)) is not None:
+            return found
+    try:
+        return stamps.parse_all(array.to_pylist())
+    except StampError:
+        return None
+
+
+def _by_numpy(
+    source: CsvText, data: bytes, columns: Sequence[_Wanted], _marks: frozenset[str]
+) -> Values | None:
+    """Numbers by numpy's own reader, empty cells as NaN."""
+    if any(column.stamps is not None for column in columns):
+        return None
+    body = data.decode("latin-1")
     if source.decimal == ",":
         if "." in body:
             return None
         body = body.replace(",", ".")
+    positions = [column.position for column in columns]
     values = _load(body, source.delimiter, positions)
     if values is None and source.delimiter != " ":
         values = _load(_with_nan(body, source.delimiter), source.delimiter, positions)
-    return None if values is None or np.isnan(values[:, 0]).any() else values
+    return None if values is None else list(np.ascontiguousarray(values.T))
 
 
 def _load(body: str, delimiter: str, positions: list[int]) -> NDArray[np.float64] | None:
@@ -265,58 +437,3 @@ def _with_nan(body: str, delimiter: str) -> str:
     return f"{body}\n".replace(f"{delimiter}\n", f"{delimiter}nan\n").replace(
         f"\n{delimiter}", f"\nnan{delimiter}"
     )
-
-
-class _CellError(MessageError):
-    """A cell that is absent or not a number."""
-
-
-def _thorough(source: CsvText, positions: dict[str, int]) -> NDArray[np.float64]:
-    """All numbers, cell by cell, of columns given by name. Raises ImportFileError."""
-    rows: list[list[float]] = []
-    for line in _data_lines(source):
-        cells = _cells(line.text, source.delimiter)
-        row: list[float] = []
-        rows.append(row)
-        for name, position in positions.items():
-            try:
-                row.append(_value(source, line, cells, position))
-            except _CellError as error:
-                raise cell_fault(source.path, _label(line), name, error.message) from None
-    return np.array(rows, dtype=np.float64)
-
-
-def _label(line: Line) -> Message:
-    return message("line {line}", line=line.number)
-
-
-def _data_lines(source: CsvText) -> list[Line]:
-    lines = lines_from(source.text, source.data.number, source.data.offset)
-    blank = "" if source.delimiter == " " else source.delimiter
-    return [line for line in lines if is_data(line.text) and line.text.strip(f"{blank} \t")]
-
-
-def _cells(text: str, delimiter: str) -> list[str]:
-    if delimiter == " ":
-        return text.split()
-    return next(csv.reader([text], delimiter=delimiter)) if '"' in text else text.split(delimiter)
-
-
-def _value(source: CsvText, line: Line, cells: list[str], position: int) -> float:
-    if position >= len(cells):
-        raise _CellError("the line has only {cells} cells. Complete it or delete it", cells=len(cells))
-    cell = cells[position].strip()
-    try:
-        return to_number(cell, source.decimal) if cell else math.nan
-    except ValueError:
-        remedy = message("Correct it, or leave the cell empty if there is no reading")
-    if "," in cell and source.decimal == ".":
-        remedy = message("If that is a decimal comma, add {option} ,", option=option("--decimal"))
-    elif line.number == source.data.number:
-        remedy = message(
-            "If the numbers begin below this line, add {header_option} {skip_option} {number}",
-            header_option=option("--no-header"),
-            skip_option=option("--skip"),
-            number=line.number,
-        )
-    raise _CellError("{cell!r} is not a number. {remedy}", cell=cell, remedy=remedy)

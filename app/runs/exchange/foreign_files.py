@@ -1,70 +1,79 @@
-"""Reads time and gauges from files that are no CSV: MATLAB, Excel, Parquet."""
+"""Reads time and gauges from files of other programs; the format is told by the content, else by the name."""
 
 import contextlib
-import math
-import zipfile
+import importlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.errors import ExtraMissingError, ImportFileError, one_line
-from app.runs.exchange.columns import ForeignColumns, cell_fault, find_columns
-from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_reading import CsvOptions, read_columns
+from app.runs.errors import ImportFileError, RunError, one_line
+from app.runs.exchange.columns import DATE, TIME, ForeignColumns, find_columns
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_reading import read_columns
+from app.runs.exchange.formats import FORMATS, Format
+from app.runs.exchange.stamps import to_datetime
+from app.runs.exchange.tables import Table, TimeAxis
 from messages.i18n import N_
-from messages.message import Message, message, option
+from messages.message import option
 
-_LARGEST_BYTES = 4 << 30  # a file that unpacks to more than this is refused before it is unpacked
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """A file that is open."""
-
-    names: list[str]  # of all columns; "" where a column has none
-    column: Callable[[int], NDArray[np.float64]]  # reads a column by its number. Raises ImportFileError.
-    row_label: Callable[[int], Message] = lambda row: message("row {row}", row=row)
+ReportShare = Callable[[float], object]
 
 
-def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
-    """Read columns from a .mat, .xlsx or .parquet file, any other as CSV. Raises RunError."""
-    if is_csv(path):
-        return read_columns(path, layout)
-    _check_layout(path, layout)
-    with _faults_named(path):
-        table = _OPENERS[path.suffix.lower()](path, layout)
-        positions = find_columns(path, layout.wanted, table.names, len(table.names))
-        columns = {table.names[at] or str(at): table.column(at) for at in positions}
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        template = N_("{path}: the columns differ in length ({told}). Choose columns of one record")
-        raise ImportFileError(template, path=path, told=told)
-    if not any(lengths.values()):
-        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
-    values = np.column_stack(list(columns.values()))
-    found = ForeignColumns(path, values, list(columns), table.row_label)
-    found.check()
-    return found
+def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> ForeignColumns:
+    """Read columns of a file. Raises RunError. `report` gets the share that is done."""
+    found = find_format(path)
+    if found is None:
+        return read_columns(path, layout, report)
+    _check_layout(path, found, layout)
+    with _faults_named(path, found):
+        table = _open(found, path, layout)
+        columns = _read(path, table, layout, report)
+    columns.check()
+    return columns
 
 
-def list_columns(path: Path, layout: CsvOptions) -> list[str]:
-    """Names of the columns of a .mat, .xlsx or .parquet file, "" where one has none. Raises RunError."""
-    with _faults_named(path):
-        return _OPENERS[path.suffix.lower()](path, layout).names
+def list_columns(path: Path, layout: CsvOptions) -> Table:
+    """Open a file that is no plain text for the names of its columns. Raises RunError."""
+    found = find_format(path)
+    if found is None:
+        raise ImportFileError("{path} is plain text", path=path)
+    with _faults_named(path, found):
+        return _open(found, path, layout)
 
 
 def is_csv(path: Path) -> bool:
-    """Tell whether `read_foreign` reads a file as CSV."""
-    return path.suffix.lower() not in _OPENERS
+    """Tell whether `read_foreign` reads a file as plain text."""
+    return find_format(path) is None
+
+
+def has_own_time(path: Path) -> bool:
+    """Tell whether a file is of a format that keeps times beside its columns."""
+    found = find_format(path)
+    return found is not None and found.has_own_time
+
+
+def find_format(path: Path) -> Format | None:
+    """Format of a file by its first bytes, else by its name; None of plain text."""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        head = file.read(64)
+        for one in FORMATS:
+            if one.magic and head.startswith(one.magic):
+                return one
+    suffix = path.suffix.lower()
+    return next((one for one in FORMATS if suffix in one.suffixes), None)
+
+
+def _open(found: Format, path: Path, layout: CsvOptions) -> Table:
+    module: Any = importlib.import_module(f"app.runs.exchange.formats.{found.module}")
+    table: Table = module.open_table(path, layout)
+    return table
 
 
 @contextlib.contextmanager
-def _faults_named(path: Path) -> Iterator[None]:
+def _faults_named(path: Path, found: Format) -> Iterator[None]:
     """Put into words whatever these libraries raise on a damaged file. Raises ImportFileError."""
     if not path.is_file():
         raise ImportFileError(
@@ -72,26 +81,28 @@ def _faults_named(path: Path) -> Iterator[None]:
         )
     try:
         yield
-    except (ImportFileError, ExtraMissingError):
+    except RunError:
         raise
+    except MemoryError:
+        raise ImportFileError("{path} needs too much memory. Export a part of it", path=path) from None
     except Exception as error:
         raise ImportFileError(
             "{path} cannot be read as {suffix} ({fault}). Export it again",
             path=path,
-            suffix=path.suffix,
+            suffix=found.name,
             fault=one_line(error)[:120] or type(error).__name__,
         ) from error
 
 
-def _check_layout(path: Path, layout: CsvOptions) -> None:
-    if layout.delimiter is not None or layout.decimal != ".":
+def _check_layout(path: Path, found: Format, layout: CsvOptions) -> None:
+    if layout.delimiter is not None or layout.decimal is not None:
         raise ImportFileError(
             "{name} is no text: leave out {delimiter_option} and {decimal_option}",
             name=path.name,
             delimiter_option=option("--delimiter"),
             decimal_option=option("--decimal"),
         )
-    if path.suffix.lower() != ".xlsx" and (layout.skip or not layout.header):
+    if not found.has_rows and (layout.skip or not layout.header):
         raise ImportFileError(
             "{name} has no lines: leave out {skip_option} and {header_option}",
             name=path.name,
@@ -100,103 +111,75 @@ def _check_layout(path: Path, layout: CsvOptions) -> None:
         )
 
 
-def _open_parquet(path: Path, layout: CsvOptions) -> _Table:
-    file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
-    names = list(file.schema_arrow.names)
-    rows = file.metadata.num_rows
-    if rows * 8 * len(layout.wanted) > _LARGEST_BYTES:
+def _read(path: Path, table: Table, layout: CsvOptions, report: ReportShare) -> ForeignColumns:
+    wanted = [(what, name) for what, name in layout.wanted if what != DATE]
+    names = list(table.names)
+    positions = find_columns(path, wanted, names, len(names))
+    columns: list[NDArray[Any]] = []
+    for number, at in enumerate(positions, start=1):
+        columns.append(table.column(at))
+        report(number / (len(positions) + 1))
+    shown = [names[at] or str(at) for at in positions]
+    units = [table.units[at] if at < len(table.units) else "" for at in positions]
+    if wanted[0][0] == TIME:
+        axis = _stamped(columns[0], has_zone=table.has_zone)
+        is_own = columns[0].dtype.kind in "mM"
+        columns = columns[1:]
+    else:
+        axis = _own_axis(path, table, layout, positions, len(columns[0]))
+        shown, units, is_own = ["time", *shown], ["s", *units], True
+    _check_lengths(path, dict(zip(shown, [axis.time_s, *columns], strict=True)))
+    for name, column in zip(shown[1:], columns, strict=True):
+        if column.dtype.kind not in "iuf":
+            raise ImportFileError("{path}, column {name}: it holds no numbers", path=path, name=name)
+    cells = [np.asarray(column, np.float64) for column in columns]
+    return ForeignColumns(
+        path, axis.time_s, cells, shown, table.row_label, units, axis.start, is_own, axis.is_even
+    )
+
+
+def _stamped(column: NDArray[Any], *, has_zone: bool) -> TimeAxis:
+    """Times of a column of numbers, of date-times (since the first), or of times of day."""
+    if column.dtype.kind not in "mM":
+        return TimeAxis(np.array(column, np.float64))
+    stamps = column.astype("M8[ns]" if column.dtype.kind == "M" else "m8[ns]")
+    absent, stamps_ns = np.isnat(stamps), stamps.astype(np.int64)
+    first_ns = int(stamps_ns[~absent][0]) if not absent.all() else 0
+    time_s = np.where(absent, np.nan, (stamps_ns - first_ns) / 1e9)
+    start = to_datetime(first_ns, has_zone=has_zone) if column.dtype.kind == "M" else None
+    return TimeAxis(time_s, start)
+
+
+def _own_axis(path: Path, table: Table, layout: CsvOptions, positions: list[int], rows: int) -> TimeAxis:
+    """Times of rows of the rate that is given, or those that the format keeps. Raises ImportFileError."""
+    if layout.rate_hz is not None:
+        return TimeAxis(np.arange(rows) / layout.rate_hz, is_even=True)
+    axes = [table.axis(at) for at in positions]
+    if axes[0] is None:
         raise ImportFileError(
-            "{path} holds {num_rows} rows, too many to load. Export a part", path=path, num_rows=rows
+            "{path}: column {name} has no times of its own. Add {time_option} COL, or {rate_option} HZ",
+            path=path,
+            name=table.names[positions[0]],
+            time_option=option("--time"),
+            rate_option=option("--rate"),
         )
-
-    def column(at: int) -> NDArray[np.float64]:
-        stored = file.read(columns=[names[at]]).column(names[at])
-        values = stored.to_numpy()
-        if values.dtype.kind not in "iuf":
-            template = N_(
-                "{path}, column {name}: {type} is no number. Export plain numbers, times in seconds"
+    for at, other in zip(positions[1:], axes[1:], strict=True):
+        if other is None or not np.array_equal(other.time_s, axes[0].time_s):
+            raise ImportFileError(
+                "{path}: {name} and {other} were not read at the same times. Resample one of them in the"
+                " program that recorded them",
+                path=path,
+                name=table.names[positions[0]],
+                other=table.names[at],
             )
-            raise ImportFileError(template, path=path, name=names[at], type=stored.type)
-        return np.asarray(values, dtype=np.float64)
-
-    return _Table(names, column)
+    return axes[0]
 
 
-def _open_mat(path: Path, _layout: CsvOptions) -> _Table:
-    """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
-    from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
-
-    with path.open("rb") as file:
-        if file.read(128)[124:128] in (b"\x00\x02IM", b"\x02\x00MI"):
-            raise ImportFileError("{path} is a version 7.3 MAT file. Save it with -v7 in MATLAB", path=path)
-    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > _LARGEST_BYTES:
-        raise ImportFileError("{path} holds more numbers than can be loaded. Save a part of them", path=path)
-    content = loadmat(path, simplify_cells=True)
-    vectors = dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
-    values = list(vectors.values())
-    return _Table(list(vectors), values.__getitem__)
-
-
-def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _vectors(f"{name}.{key}" if name else str(key), item)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim in (1, 2):
-        if value.ndim == 1 or 1 in value.shape:
-            yield name, value.ravel().astype(np.float64)
-        else:
-            yield from ((f"{name}:{i}", value[:, i].astype(np.float64)) for i in range(value.shape[1]))
-
-
-def _open_xlsx(path: Path, layout: CsvOptions) -> _Table:
-    with zipfile.ZipFile(path) as archive:
-        if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
-            raise ImportFileError("{path} unpacks to more than can be loaded. Export it as CSV", path=path)
-    book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
-    with contextlib.closing(book):
-        sheet, header, rows = _sheet(path, book, layout)
-    width = max(len(header), *(len(row) for row in rows))
-    names = [*header, *[""] * (width - len(header))]
-    first = layout.skip + (2 if layout.header else 1)
-
-    def row_label(row: int) -> Message:
-        return message("sheet {sheet}, row {row}", sheet=sheet, row=first + row)
-
-    def number(row: int, at: int) -> float:
-        cell = rows[row][at] if at < len(rows[row]) else None
-        if cell is None:
-            return math.nan
-        if isinstance(cell, bool) or not isinstance(cell, int | float):
-            remedy = message("Correct it, or leave the cell empty if there is no reading")
-            fault = message("{cell!r} is not a number. {remedy}", cell=str(cell)[:40], remedy=remedy)
-            raise cell_fault(path, row_label(row), names[at] or str(at), fault)
-        return float(cell)
-
-    return _Table(names, lambda at: np.array([number(row, at) for row in range(len(rows))]), row_label)
-
-
-def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], list[tuple[Any, ...]]]:
-    """Name, header and rows of the first sheet that has the columns, or of the first one."""
-    found = []
-    for sheet in book.worksheets:
-        rows = list(sheet.iter_rows(min_row=layout.skip + 1, values_only=True))
-        head = rows[0] if layout.header and rows else ()
-        header = ["" if cell is None else str(cell).strip() for cell in head]
-        rows = rows[1:] if layout.header else rows
-        while rows and all(cell is None for cell in rows[-1]):
-            rows.pop()
-        if rows:
-            found.append((str(sheet.title), header, rows))
-        if rows and all(name.strip() in header for name in layout.wanted):
-            return found[-1]
-    if not found:
-        template = N_("{path} holds no rows. Give a workbook with numbers, and check {option}")
-        raise ImportFileError(template, path=path, option=option("--skip"))
-    return found[0]
-
-
-_OPENERS: dict[str, Callable[[Path, CsvOptions], _Table]] = {
-    ".parquet": _open_parquet,
-    ".mat": _open_mat,
-    ".xlsx": _open_xlsx,
-}
+def _check_lengths(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        template = N_("{path}: the columns differ in length ({told}). Choose columns of one record")
+        raise ImportFileError(template, path=path, told=told)
+    if not any(lengths.values()):
+        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)

@@ -1,11 +1,10 @@
 """Foreign records into run files."""
 
 import datetime
+import hashlib
 import math
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,37 +12,55 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.preparation.channels import SAMPLES_MIN
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
-from app.runs.exchange import csv_reading
 from app.runs.exchange.columns import ForeignColumns
-from app.runs.exchange.csv_reading import CsvOptions, CsvText
-from app.runs.exchange.foreign_files import is_csv, list_columns, read_foreign
-from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_metadata
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.foreign_files import has_own_time, read_foreign
+from app.runs.exchange.recognition import ParseOptions, preview_file
+from app.runs.exchange.rounded_times import even_times
+from app.runs.exchange.units import parse_unit
+from app.runs.metadata import (
+    IMPORT_PROTOCOL,
+    QUANTITY_UNITS,
+    EndMetadata,
+    Quantity,
+    RunMetadata,
+    SourceFile,
+    create_metadata,
+)
 from app.runs.writer import write_run
 from config.schema import Gauge, Gauges, Stand
+from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
 from messages.i18n import N_
-from messages.message import message, option
+from messages.message import Message, message, option
 
 Floats = NDArray[np.float64]
+ReportShare = Callable[[float], object]
 _TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _LENGTH_UNITS_M = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _EVEN = 0.01
 """Relative spread of the time steps up to which a record has a rate."""
 
 _LONGEST_S = 1e9
+_UNIX_S = (datetime.datetime(2001, 1, 1, tzinfo=datetime.UTC).timestamp(), 4102444800.0)
+"""Times (s) between these, 2001 and 2100, count from 1970: no clock that starts with a record gets there."""
+_BLOCK_ROWS = 1 << 19
+_HASHED_BYTES = 1 << 22
 
 
 class CsvImport(msgspec.Struct, frozen=True):
-    """Which columns of a CSV file are what, and in which unit. A reading is `gain * cell + offset`."""
+    """Which columns of a foreign file are what, and in which unit. A reading is `gain * cell + offset`."""
 
     layout: CsvOptions
     measures: Literal["relative", "plate"] = "relative"
     """What the second column is: plate against table, or plate against base."""
-    time_unit: Literal["s", "ms", "us"] = "s"
+    time_unit: Literal["s", "ms", "us"] | None = None
+    """None takes what the file names, else s."""
     unit: Literal["m", "mm", "um"] | None = None
-    """Of the cells: this length, or this length per s or s^2; None means m."""
+    """Of the cells: this length, or this length per s or s^2; None takes what the file names, else m."""
     gain: float | None = None
     offset: float = 0.0
     unit_name: str | None = None
@@ -52,67 +69,249 @@ class CsvImport(msgspec.Struct, frozen=True):
     quantity: Quantity = "displacement"
     from_s: float | None = None
     until_s: float | None = None
-    """Kept stretch, on the file's own time axis in seconds, ends included."""
+    """Kept stretch, on the file's own time axis in seconds, ends included; from the first stamp on."""
     segment: int | None = None  # which of the stretches between times that go back, counted from 0
+    begun: datetime.datetime | None = None
+    """Time of the file's first row; None takes what the file tells."""
 
 
-def import_csv(
-    path: Path, plan: CsvImport, output: Path, stand: Stand, *, replace: bool = False, **facts: Any
-) -> StoredRun:
-    """Make a run of a foreign file. Raises RunError, ConfigError.
+class RecordFacts(msgspec.Struct, frozen=True):
+    """What a foreign file tells besides its numbers."""
+
+    gauges: tuple[Gauge, ...]
+    """Calibrations that turn the cells of each column into readings."""
+    first_s: float
+    """The file's time of the first row that is kept."""
+    start: datetime.datetime | None
+    """When the first row that is kept was recorded; None where neither file nor user says it."""
+    rate_hz: float | None
+    source: SourceFile
+    interval_uncertainty: float = 0.0
+    """Relative standard uncertainty of the rate of stamps that the logger rounded."""
+    notes: tuple[Message, ...] = ()
+    """What was concluded or left out."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ForeignRecord:
+    """A foreign file as it would be imported."""
+
+    facts: RecordFacts
+    time_s: Floats
+    """(n,) float64: since the first row."""
+    cells: tuple[Floats, ...]
+    """One or two of (n,) float64: as written, NaN where absent."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def block(self) -> RunBlock:
+        """The whole record."""
+        return self._block(slice(None))
+
+    def blocks(self) -> Iterator[RunBlock]:
+        """The record in parts, so that its memory stays bounded."""
+        for first in range(0, len(self), _BLOCK_ROWS):
+            yield self._block(slice(first, first + _BLOCK_ROWS))
+
+    def _block(self, rows: slice) -> RunBlock:
+        cells = np.column_stack([column[rows] for column in self.cells])
+        gains = np.array([gauge.gain_m_per_count for gauge in self.facts.gauges])
+        zeros = np.array([gauge.zero_count for gauge in self.facts.gauges])
+        with np.errstate(over="ignore"):  # what is too large is refused
+            readings = gains * (cells - zeros)
+        absent = np.isnan(cells).all(axis=1)
+        status = np.where(absent, SampleStatus.MISSING, SampleStatus.GOOD).astype(np.uint8)
+        return RunBlock(np.asarray(self.time_s[rows]), readings, status, cells)
+
+
+def store_record(
+    path: Path,
+    record: ForeignRecord,
+    plan: CsvImport,
+    output: Path,
+    stand: Stand,
+    *,
+    replace: bool = False,
+    report: ReportShare = lambda _: None,
+    **facts: Any,
+) -> tuple[StoredRun, RunMetadata]:
+    """Make a run of a foreign record. Raises RunError, ConfigError.
 
     `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
     """
-    gauge, start_s, block = read_record(path, plan)
-    # The nearest to the time of the test that a foreign file tells.
-    changed = datetime.datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+    check_length(path, record)
+    told, length_s = record.facts, float(record.time_s[-1])
+    table = told.gauges[0]
     metadata = create_metadata(
         stand,
-        Gauges(table=gauge, relative=gauge.replace(measures=plan.measures)),
-        changed,
-        device=DeviceIdentity(protocol="import", name=path.name),
-        rate_hz=even_rate_hz(block.time_s),
+        Gauges(table=table, relative=told.gauges[-1].replace(measures=plan.measures)),
+        told.start,
+        device=DeviceIdentity(protocol=IMPORT_PROTOCOL, name=path.name),
+        rate_hz=told.rate_hz,
         quantity=plan.quantity,
         unit=plan.unit_name or QUANTITY_UNITS[plan.quantity],
-        source=f"imported from {path.name}, time 0 is its {start_s!r} s",
+        source=f"imported from {path.name}, time 0 is its {told.first_s!r} s",
+        source_file=told.source,
         **facts,
     )
+    missing = int(np.count_nonzero(np.isnan(record.cells[0]) & np.isnan(record.cells[-1])))
     ending = EndMetadata(
         ended="imported",
-        end_time=changed + datetime.timedelta(seconds=float(block.time_s[-1])),
-        losses=Losses(samples=len(block), missing=int(np.count_nonzero(block.status))),
+        end_time=told.start and told.start + datetime.timedelta(seconds=length_s),
+        losses=Losses(samples=len(record), missing=missing),
+        time_base=TimeBase(scale_standard_uncertainty=told.interval_uncertainty),
     )
-    return write_run(output, metadata, block, ending, replace=replace)
+    return write_run(output, metadata, _reported(record, report), ending, replace=replace), metadata
 
 
-def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
-    """Read a foreign file as it would be imported: calibration, its time of the first row (s), samples."""
-    gauge = _gauge(plan)
-    columns = read_foreign(path, plan.layout)
-    with np.errstate(over="ignore"):  # what is too large is refused
-        values = columns.values[_kept(columns, plan)]
-        time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
-        block = _block(time_s - time_s[0], values[:, 1:], gauge)
-    if block.time_s[-1] > _LONGEST_S:
+def check_length(path: Path, record: ForeignRecord) -> None:
+    """Refuse what is too short to be a record. Raises ImportFileError."""
+    present = int(np.count_nonzero(~np.isnan(record.cells[0])))
+    if present < SAMPLES_MIN:
         raise ImportFileError(
-            "{path}: its times go from {time_s:g} s to {time_s_2:g} s, too long for a record."
-            " Check {time_option} {time} and {unit_option} {time_unit}",
-            time_option=option("--time"),
-            unit_option=option("--time-unit"),
+            "{path} holds {count} readings of gauge 1, too few for a record: {least} at least. Give the whole"
+            " test",
             path=path,
-            time_s=time_s[0],
-            time_s_2=time_s[-1],
-            time=plan.layout.time,
-            time_unit=plan.time_unit,
+            count=present,
+            least=SAMPLES_MIN,
         )
-    if np.isinf(block.readings).any():
-        template = N_("{path}: with {option} {value:g} its readings are too large. Check both")
-        raise ImportFileError(template, path=path, option=option("--gain"), value=plan.gain or 1.0)
-    return gauge, float(time_s[0]), block
 
 
-def _gauge(plan: CsvImport) -> Gauge:
-    """Calibration that turns cells into readings. Raises ImportFileError."""
+def read_record(path: Path, plan: CsvImport, report: ReportShare = lambda _: None) -> ForeignRecord:
+    """Read a foreign file as it would be imported. Raises RunError.
+
+    `report` is called with the share that is done. `app.runs.exchange.reading_process` does it in a process
+    with limits.
+    """
+    check_plan(plan)
+    plan = _with_time(path, plan)
+    columns = read_foreign(path, plan.layout, report)
+    if not len(columns):
+        raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
+    unit_s = _time_unit_s(path, plan, columns)
+    columns.time *= unit_s
+    start = _start(plan, columns)
+    _even_out(columns, plan)
+    kept = _kept(columns, plan)
+    time_s = columns.time[kept]
+    _check_span(path, plan, time_s)
+    first_s = float(time_s[0])
+    if start is not None:
+        start += datetime.timedelta(seconds=first_s - float(columns.time[0]))
+    time_s -= first_s
+    uncertainty = columns.interval_uncertainty
+    rate_hz = plan.layout.rate_hz or even_rate_hz(time_s)
+    gauges = tuple(_gauge(path, plan, columns, number) for number in range(len(columns.cells)))
+    facts = RecordFacts(
+        gauges, first_s, start, rate_hz, _source(path, report), uncertainty, tuple(columns.notes)
+    )
+    record = ForeignRecord(facts, time_s, tuple(cells[kept] for cells in columns.cells))
+    _check_size(path, plan, record)
+    return record
+
+
+def even_rate_hz(time_s: Floats) -> float | None:
+    """Samples a second of an even record, None of an uneven one."""
+    steps = np.diff(time_s)
+    if not len(steps):
+        return None
+    lowest, highest = float(steps.min()), float(steps.max())
+    middling = float(np.median(steps, overwrite_input=True))
+    is_even = max(highest - middling, middling - lowest) <= _EVEN * middling
+    return 1.0 / middling if is_even else None
+
+
+def _reported(record: ForeignRecord, report: ReportShare) -> Iterator[RunBlock]:
+    done = 0
+    for block in record.blocks():
+        yield block
+        done += len(block)
+        report(done / len(record))
+
+
+def _source(path: Path, report: ReportShare) -> SourceFile:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while data := file.read(_HASHED_BYTES):
+            digest.update(data)
+            report(1.0)
+        return SourceFile(name=path.name, sha256=digest.hexdigest(), size_bytes=file.tell())
+
+
+def _with_time(path: Path, plan: CsvImport) -> CsvImport:
+    """Plan with the time column that the names tell, where none is given. Raises ImportFileError."""
+    layout = plan.layout
+    if layout.rate_hz is not None or layout.time or has_own_time(path):
+        return plan
+    lines = ParseOptions(layout.delimiter, layout.decimal, layout.skip, layout.header, layout.encoding)
+    found = preview_file(path, lines)
+    if not found.time or (not layout.header and found.time == layout.table):
+        raise ImportFileError(
+            "{path}: no column of times is found. Add {time_option} COL, or {rate_option} HZ",
+            path=path,
+            time_option=option("--time"),
+            rate_option=option("--rate"),
+        )
+    layout = msgspec.structs.replace(layout, time=found.time, date=layout.date or found.date or None)
+    return msgspec.structs.replace(plan, layout=layout)
+
+
+def _time_unit_s(path: Path, plan: CsvImport, columns: ForeignColumns) -> float:
+    if columns.is_stamped or columns.is_even:
+        return 1.0
+    if plan.time_unit is not None:
+        return _TIME_UNITS_S[plan.time_unit]
+    named = columns.units[0]
+    unit = parse_unit(named) if named else None
+    if unit is not None and not unit.is_time:
+        raise ImportFileError(
+            "{path}, column {name}: {unit} is no unit of time. Check {time_option}, or add {option} s, ms"
+            " or us",
+            path=path,
+            name=columns.names[0],
+            unit=named,
+            time_option=option("--time"),
+            option=option("--time-unit"),
+        )
+    if unit is not None and unit.scale != 1.0:
+        columns.notes.append(
+            message("times are in {unit}, as {name} says", unit=named, name=columns.names[0])
+        )
+    return 1.0 if unit is None else unit.scale
+
+
+def _start(plan: CsvImport, columns: ForeignColumns) -> datetime.datetime | None:
+    """Time of the file's first row."""
+    if plan.begun is not None:
+        return plan.begun if plan.begun.tzinfo else plan.begun.astimezone()
+    if columns.start is not None:
+        return columns.start + datetime.timedelta(seconds=float(columns.time[0]))
+    first_s = float(columns.time[0])
+    if not columns.is_even and _UNIX_S[0] <= first_s <= _UNIX_S[1]:
+        return datetime.datetime.fromtimestamp(first_s, datetime.UTC)
+    return None
+
+
+def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
+    """Replace stamps that a logger has rounded, so that some repeat, by even ones."""
+    if columns.is_even or plan.segment is not None:
+        return
+    steps = np.diff(columns.time)
+    if not len(steps) or steps.min() != 0.0:
+        return
+    even = even_times(columns.time)
+    if even is None:
+        return
+    columns.time = even.time - even.time[0] + columns.time[0]
+    columns.interval_uncertainty = even.interval_relative_uncertainty
+    note = N_("times repeat, rounded to {resolution:g} s: rows are taken as even, {rate:.6g} Hz")
+    columns.notes.append(message(note, resolution=even.resolution, rate=1.0 / even.interval))
+
+
+def check_plan(plan: CsvImport) -> None:
+    """Refuse options that do not fit together. Raises ImportFileError."""
     if plan.gain is not None and plan.unit is not None:
         template = N_(
             "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them"
@@ -125,7 +324,14 @@ def _gauge(plan: CsvImport) -> Gauge:
             gain_option=option("--gain"),
             unit_name=plan.unit_name,
         )
-    gain = _LENGTH_UNITS_M[plan.unit or "m"] if plan.gain is None else plan.gain
+    rate_hz = plan.layout.rate_hz
+    if rate_hz is not None and plan.layout.time:
+        template = N_("{time_option} and {rate_option} exclude each other. Give one of them")
+        raise ImportFileError(template, time_option=option("--time"), rate_option=option("--rate"))
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        template = N_("{option} {value:g} cannot be. Give samples a second, above 0")
+        raise ImportFileError(template, option=option("--rate"), value=rate_hz)
+    gain = 1.0 if plan.gain is None else plan.gain
     if not math.isfinite(gain) or gain == 0.0:
         template = N_(
             "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
@@ -134,29 +340,91 @@ def _gauge(plan: CsvImport) -> Gauge:
     if not math.isfinite(plan.offset / gain):
         template = N_("{option} {value:g} cannot be. Give a finite number")
         raise ImportFileError(template, option=option("--offset"), value=plan.offset)
-    try:
-        return Gauge(
-            gain_m_per_count=gain,
-            zero_count=-plan.offset / gain if plan.offset else 0.0,
-            gain_relative_standard_uncertainty=plan.gain_uncertainty,
-        )
-    except ValueError:
+    share = plan.gain_uncertainty
+    if share is not None and not (math.isfinite(share) and share >= 0.0):
         template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
-        value = plan.gain_uncertainty
-        raise ImportFileError(template, option=option("--gain-uncertainty"), value=value) from None
+        raise ImportFileError(template, option=option("--gain-uncertainty"), value=share)
+
+
+def _gauge(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) -> Gauge:
+    """Calibration that turns cells of a column into readings. Raises ImportFileError."""
+    gain = plan.gain
+    if gain is None:
+        gain = _LENGTH_UNITS_M[plan.unit] if plan.unit else _named_gain(path, plan, columns, number)
+    return Gauge(
+        gain_m_per_count=gain,
+        zero_count=-plan.offset / gain if plan.offset else 0.0,
+        gain_relative_standard_uncertainty=plan.gain_uncertainty,
+    )
+
+
+def _named_gain(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) -> float:
+    """Gain by the unit that the file names. Raises ImportFileError for one of something else."""
+    name, named = columns.names[1 + number], columns.units[1 + number]
+    unit = parse_unit(named) if named else None
+    if unit is None:
+        return 1.0
+    if unit.quantity is None:
+        raise ImportFileError(
+            "{path}, column {name}: what one {unit} means is not known. Add {gain_option}, metres of one"
+            " {unit}, or {unit_option}",
+            path=path,
+            name=name,
+            unit=named,
+            gain_option=option("--gain"),
+            unit_option=option("--unit"),
+        )
+    # A length is taken for the quantity that is stated: names leave out "per second" often enough.
+    if unit.quantity not in ("displacement", plan.quantity):
+        raise ImportFileError(
+            "{path}, column {name}: {unit} is a unit of {quantity}. Add {option} {quantity}, or choose"
+            " another column",
+            path=path,
+            name=name,
+            unit=named,
+            quantity=unit.quantity,
+            option=option("--quantity"),
+        )
+    columns.notes.append(message("{name} is in {unit}, as the file says", name=name, unit=named))
+    return unit.scale
+
+
+def _check_span(path: Path, plan: CsvImport, time_s: Floats) -> None:
+    with np.errstate(over="ignore"):
+        is_too_long = not float(time_s[-1]) - float(time_s[0]) <= _LONGEST_S
+    if is_too_long:
+        raise ImportFileError(
+            "{path}: its times go from {time_s:g} s to {time_s_2:g} s, too long for a record."
+            " Check {time_option} {time} and {unit_option} {time_unit}",
+            time_option=option("--time"),
+            unit_option=option("--time-unit"),
+            path=path,
+            time_s=time_s[0],
+            time_s_2=time_s[-1],
+            time=plan.layout.time,
+            time_unit=plan.time_unit or "s",
+        )
+
+
+def _check_size(path: Path, plan: CsvImport, record: ForeignRecord) -> None:
+    for gauge, cells in zip(record.facts.gauges, record.cells, strict=True):
+        low, high = float(np.fmin.reduce(cells)), float(np.fmax.reduce(cells))
+        if any(math.isinf(gauge.gain_m_per_count * (cell - gauge.zero_count)) for cell in (low, high)):
+            template = N_("{path}: with {option} {value:g} its readings are too large. Check both")
+            raise ImportFileError(template, path=path, option=option("--gain"), value=plan.gain or 1.0)
 
 
 def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
     """Rows of the segment and stretch that were asked for, their times rising. Raises ImportFileError."""
-    time = columns.values[:, 0]
+    time = columns.time
     segment = _segment(columns, plan.segment)
     _check_rising(columns, segment)
-    scale = _TIME_UNITS_S[plan.time_unit]
     first = -math.inf if plan.from_s is None else plan.from_s
     last = math.inf if plan.until_s is None else plan.until_s
-    inside = np.flatnonzero((time[segment] * scale >= first) & (time[segment] * scale <= last))
-    if not len(inside):
-        low, high = time[segment][0] * scale, time[segment][-1] * scale
+    start = segment.start + int(np.searchsorted(time[segment], first))
+    end = segment.start + int(np.searchsorted(time[segment], last, "right"))
+    if start >= end:
+        low, high = time[segment][0], time[segment][-1]
         raise ImportFileError(
             "{path}: no row lies between {first:g} s and {last:g} s. Its times go from {low:g}"
             " s to {high:g} s: change {from_option} and {until_option}",
@@ -168,11 +436,11 @@ def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
             low=low,
             high=high,
         )
-    return slice(segment.start + int(inside[0]), segment.start + int(inside[-1]) + 1)
+    return slice(start, end)
 
 
 def _segment(columns: ForeignColumns, number: int | None) -> slice:
-    time = columns.values[:, 0]
+    time = columns.time
     if number is None:
         return slice(0, len(time))
     bounds = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), len(time)]
@@ -186,12 +454,11 @@ def _segment(columns: ForeignColumns, number: int | None) -> slice:
 
 
 def _check_rising(columns: ForeignColumns, rows: slice) -> None:
-    time = columns.values[rows, 0]
-    wrong = np.flatnonzero(np.diff(time) <= 0.0)
-    if not len(wrong):
+    is_wrong = np.diff(columns.time[rows]) <= 0.0
+    if not is_wrong.any():
         return
-    row = rows.start + int(wrong[0]) + 1
-    before, now = columns.values[row - 1 : row + 1, 0]
+    row = rows.start + int(np.flatnonzero(is_wrong)[0]) + 1
+    before, now = columns.time[row - 1 : row + 1]
     if now < before:
         fault = message(
             "time goes back from {before} to {now}. Pick one stretch with {option} N, from 0",
@@ -201,158 +468,9 @@ def _check_rising(columns: ForeignColumns, rows: slice) -> None:
         )
     else:
         fault = message(
-            "time {now} comes twice. Export the times with more digits, or delete the line", now=str(now)
+            "time {now} comes twice, and the rows are not even. Export the times with more digits, delete the"
+            " line, or give {option} HZ",
+            now=str(now),
+            option=option("--rate"),
         )
     raise columns.fault(row, 0, fault)
-
-
-def _block(time_s: Floats, cells: Floats, gauge: Gauge) -> RunBlock:
-    readings = gauge.gain_m_per_count * (cells - gauge.zero_count)
-    absent = np.isnan(cells).all(axis=1)
-    status = np.where(absent, SampleStatus.MISSING, SampleStatus.GOOD).astype(np.uint8)
-    return RunBlock(time_s, readings, status, np.ascontiguousarray(cells))
-
-
-def even_rate_hz(time_s: Floats) -> float | None:
-    """Samples a second of an even record, None of an uneven one."""
-    steps = np.diff(time_s)
-    if not len(steps):
-        return None
-    middling = float(np.median(steps))
-    return 1.0 / middling if np.all(np.abs(steps - middling) <= _EVEN * middling) else None
-
-
-_LINES = 8
-_DECIMALS: tuple[Literal[".", ","], ...] = (".", ",")
-_TIME = re.compile(r"^(t|time|times|zeit|temps|время|sekunden|seconds?)\b|^time|^t_", re.IGNORECASE)
-_PLATE = re.compile(r"\bu_?2\b|plate|gauge.?2|ch(annel)?.?2", re.IGNORECASE)
-_RELATIVE = re.compile(r"rel|u_?2\s*[-−–]\s*u_?1", re.IGNORECASE)
-_TABLE = re.compile(r"\bu_?1\b|table|gauge.?1|ch(annel)?.?1|displacement|weg|перемещ", re.IGNORECASE)
-_UNIT = re.compile(r"(?:^|[\s,_(\[/])(us|µs|μs|ms|s|um|µm|μm|mm|m)[\])]?$")
-_PLAIN = {"µs": "us", "μs": "us", "µm": "um", "μm": "um"}
-_TIMES, _LENGTHS = {"s", "ms", "us"}, {"m", "mm", "um"}
-
-
-class ParseOptions(msgspec.Struct, frozen=True):
-    """What the user says of the lines of a file; None finds it out."""
-
-    delimiter: str | None = None
-    decimal: Literal[".", ","] | None = None
-    skip: int = 0
-    header: bool | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class FilePreview:
-    """What is in a file."""
-
-    columns: tuple[str, ...]
-    """As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice."""
-    titles: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    """Cells of the first lines of a text; none of other files."""
-    options: ParseOptions
-    time: str = ""
-    """Which columns they are likely to be; `second` is empty where there is none."""
-    table: str = ""
-    second: str = ""
-    measures: str = "relative"
-    """What `second` is likely to be: `relative` or `plate`."""
-    time_unit: str = ""
-    unit: str = ""
-
-
-def preview_file(path: Path, given: ParseOptions | None = None) -> FilePreview:
-    """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
-    given = given or ParseOptions()
-    if is_csv(path):
-        return _survey_text(path, given)
-    has_header = given.header is not False
-    names = list_columns(path, CsvOptions("", "", skip=given.skip, header=has_header))
-    return _recognise(names, (), ParseOptions(skip=given.skip, header=has_header))
-
-
-def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
-    """Read with the given options, and else in the usual way that makes the most of the cells numbers."""
-    found: list[tuple[float, CsvText]] = []
-    faults = []
-    for header in (True, False) if given.header is None else (given.header,):
-        for decimal in _DECIMALS if given.decimal is None else (given.decimal,):
-            try:
-                source = csv_reading.survey_csv(
-                    path, CsvOptions("", "", None, given.delimiter, decimal, given.skip, header)
-                )
-                found.append((_numeric_share(source), source))
-            except ImportFileError as error:
-                faults.append(error)
-    if not found:
-        raise faults[0]
-    share, source = max(found, key=lambda pair: pair[0])
-    if not share:
-        raise ImportFileError(
-            "{path}: no columns of numbers. Check {skip_option}, {delimiter_option} and {decimal_option}",
-            path=path,
-            skip_option=option("--skip"),
-            delimiter_option=option("--delimiter"),
-            decimal_option=option("--decimal"),
-        )
-    rows = _first_rows(source)
-    width = max(len(source.names), *(len(row) for row in rows))
-    names = [*source.names, *[""] * (width - len(source.names))]
-    return _recognise(
-        names, rows, ParseOptions(source.delimiter, source.decimal, given.skip, bool(source.names))
-    )
-
-
-def _numeric_share(source: CsvText) -> float:
-    cells = [csv_reading.is_number(cell, source.decimal) for row in _first_rows(source) for cell in row]
-    return sum(cells) / max(len(cells), 1)
-
-
-def _first_rows(source: CsvText) -> tuple[tuple[str, ...], ...]:
-    lines = (
-        line.text for line in csv_reading.lines_from(source.text, source.data.number, source.data.offset)
-    )
-    return tuple(
-        tuple(csv_reading.split_line(text, source.delimiter))
-        for text in islice(filter(csv_reading.is_data, lines), _LINES)
-    )
-
-
-def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], given: ParseOptions) -> FilePreview:
-    """Say which column is likely what; a file without names has time first, then table, then relative."""
-    columns = tuple(
-        name if name and names.count(name) == 1 else str(number) for number, name in enumerate(names)
-    )
-    titles = tuple(name or f"column {number}" for number, name in enumerate(names))
-    time = _first(names, _TIME, ()) if any(names) else None
-    time = 0 if time is None and names else time
-    relative = _first(names, _RELATIVE, (time,))
-    plate = _first(names, _PLATE, (time, relative)) if relative is None else None
-    second = relative if plate is None else plate
-    table = _first(names, _TABLE, (time, second))
-    rest = [number for number in range(len(names)) if number not in (time, table, second)]
-    if table is None and rest:
-        table = rest.pop(0)
-    if second is None and rest and not any(names):
-        second = rest[0]
-    return FilePreview(
-        columns, titles, rows, given,
-        time=_at(columns, time), table=_at(columns, table), second=_at(columns, second),
-        measures="relative" if plate is None else "plate",
-        time_unit=_unit(names, time, _TIMES), unit=_unit(names, table, _LENGTHS),
-    )  # fmt: skip
-
-
-def _first(names: Sequence[str], pattern: re.Pattern[str], taken: tuple[int | None, ...]) -> int | None:
-    return next((i for i, name in enumerate(names) if i not in taken and pattern.search(name)), None)
-
-
-def _at(columns: tuple[str, ...], number: int | None) -> str:
-    return "" if number is None or number >= len(columns) else columns[number]
-
-
-def _unit(names: Sequence[str], number: int | None, known: set[str]) -> str:
-    found = _UNIT.search(names[number].strip()) if number is not None and number < len(names) else None
-    unit = _PLAIN.get(found[1], found[1]) if found else ""
-    return unit if unit in known else ""

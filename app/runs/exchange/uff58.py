@@ -61,7 +61,7 @@ def _identification(exported: ExportedRun, channel: SampleColumn) -> tuple[str, 
     return (
         metadata.title,
         channel.name,
-        metadata.start_time.strftime("%d-%b-%y    %H:%M:%S"),
+        metadata.format_start("%d-%b-%y    %H:%M:%S") or "NONE",
         f"{exported.name} {metadata.series or ''}".strip(),
         friction,
     )

@@ -14,7 +14,7 @@ from app.runs.exchange.exporting import write_exported_run
 from app.runs.reader import open_run
 from config.files import published_row
 
-GOOD = "t,u1,rel\n0.0,1,2\n0.1,1,2\n0.2,1,2\n"
+GOOD = "t,u1,rel\n" + "".join(f"{n / 100},1,2\n" for n in range(60))
 COLUMNS = ["--time", "t", "--table", "u1", "--relative", "rel"]
 
 

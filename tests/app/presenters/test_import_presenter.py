@@ -13,7 +13,7 @@ from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportPreview, Overlay
 from app.presenters.runs.tasks import csv_import, import_file, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
-from app.runs.exchange.importing import FilePreview, ParseOptions
+from app.runs.exchange.recognition import FilePreview, ParseOptions
 from app.runs.reader import open_run
 from messages.message import Message, message, option
 
@@ -147,7 +147,7 @@ def test_a_run_that_cannot_be_stored_can_be_tried_again() -> None:
 
 # --- the work itself ---
 
-LINES = "t (ms);u1 (mm);u2 (mm)\n" + "".join(f"{n};{12 - n},5;{n},25\n" for n in range(10))
+LINES = "t (ms);u1 (mm);u2 (mm)\n" + "".join(f"{n};{60 - n},5;{n},25\n" for n in range(60))
 
 
 @pytest.fixture
@@ -166,30 +166,30 @@ def filled(path: Path, **changes: str) -> Form:
 def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     form = filled(path, series="1FFM0", plate_mass_kg="23,5", note="from the logger")
     preview = preview_import(str(path), form)
-    assert preview.summary == "10 samples, 0.009\u202fs, 1000\u202fHz"
+    assert preview.summary == "60 samples, 0.059\u202fs, 1000\u202fHz, date not known"
     (trace,) = preview.overlay.traces
-    assert trace.table == pytest.approx(12.5 - np.arange(10))
-    assert trace.relative == pytest.approx(np.arange(10) + 0.25 - trace.table), "plate against table"
+    assert trace.table == pytest.approx(60.5 - np.arange(60))
+    assert trace.relative == pytest.approx(np.arange(60) + 0.25 - trace.table), "plate against table"
     folder = str(path.parent)
-    stored = [import_file(str(path), form, folder) for _ in range(2)]
+    stored = [import_file(str(path), form, folder, lambda _: None) for _ in range(2)]
     assert [Path(run).name for run in stored] == ["logger.h5", "logger-2.h5"]
     run = open_run(stored[0], trusted=True)
-    assert run.table_reading == pytest.approx((12.5 - np.arange(10)) * 1e-3)
+    assert run.table_reading == pytest.approx((60.5 - np.arange(60)) * 1e-3)
     assert (run.metadata.series, run.metadata.plate_mass_kg) == ("1FFM0", 23.5)
     assert (run.metadata.operator, run.metadata.note) == ("Anna", "from the logger")
 
 
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:
-    form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.004")
+    form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.055")
     preview = preview_import(str(path), form)
     assert preview.overlay.unit == "V"
-    assert preview.overlay.traces[0].table == pytest.approx(2.0 * (12.5 - np.arange(2, 5)) + 0.5)
+    assert preview.overlay.traces[0].table == pytest.approx(2.0 * (60.5 - np.arange(2, 56)) + 0.5)
 
 
 def test_all_that_the_command_line_can_is_in_the_form() -> None:
     entry = next(entry for entry in SlipstandGroup.entries if entry.name == "import")
     options = {parameter.name for parameter in entry.load().params}
-    elsewhere = {"file", "output", "force", "as_json"}  # the dialog's own file, a free name in the folder
+    elsewhere = {"files", "output", "force", "as_json"}  # the dialog's own file, a free name in the folder
     renamed = {
         "relative": "second", "plate": "second", "no_header": "header", "plate_mass": "plate_mass_kg",
         "table_mass": "table_mass_kg", "temperature": "temperature_c", "humidity": "humidity_percent",
@@ -205,7 +205,7 @@ def test_the_facts_of_a_test_are_stored_as_by_the_command_line(path: Path) -> No
         table_mass_kg="130", name="old test",
     )  # fmt: skip
     assert validate(form) == {}
-    stored = import_file(str(path), form, str(path.parent))
+    stored = import_file(str(path), form, str(path.parent), lambda _: None)
     assert Path(stored).name == "old test.h5"
     metadata = open_run(stored, trusted=True).metadata
     assert metadata.gauges.table.gain_relative_standard_uncertainty == 0.003
@@ -329,10 +329,10 @@ def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
     ("changes", "said"),
     [
         ({"table": "nothing"}, "has no column 'nothing'"),
-        ({"time": ""}, "has no column ''"),
+        ({"table": ""}, "has no column ''"),
         ({"series": "9X"}, "series '9X' is not one of this stand"),
     ],
 )
 def test_what_the_file_or_the_stand_lacks_is_said(path: Path, changes: dict[str, str], said: str) -> None:
     with pytest.raises((RunError, ImportFileError, ValueError), match=said):
-        import_file(str(path), filled(path, **changes), str(path.parent))
+        import_file(str(path), filled(path, **changes), str(path.parent), lambda _: None)

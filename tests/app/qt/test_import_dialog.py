@@ -14,7 +14,7 @@ from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportPreview, Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
-from app.runs.exchange.importing import FilePreview, ParseOptions
+from app.runs.exchange.recognition import FilePreview, ParseOptions
 
 FOUND = FilePreview(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",

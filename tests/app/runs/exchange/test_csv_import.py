@@ -4,12 +4,14 @@ from runs_kit import text_file
 
 from app.runs.analysis_input import to_record
 from app.runs.errors import ImportFileError, RunExistsError
-from app.runs.exchange.csv_reading import CsvOptions
-from app.runs.exchange.importing import CsvImport, import_csv
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.import_run import import_csv
+from app.runs.exchange.importing import CsvImport
 from app.runs.reader import load_counts, open_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 
+pytestmark = pytest.mark.usefixtures("short_records")
 BASIC = CsvOptions("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
 PLAIN = "time,table,rel\n0,1.5,-2\n0.5,2.5,-3\n1.0,3.5,-4\n"

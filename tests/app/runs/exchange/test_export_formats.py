@@ -19,10 +19,11 @@ from app.runs.analysis_input import to_record
 from app.runs.blocks import BlockLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.csv_reading import CsvOptions
+from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.export_formats import FORMATS, csv_cell
 from app.runs.exchange.exporting import ExportRequest, export_runs, write_exported_run
-from app.runs.exchange.importing import CsvImport, import_csv
+from app.runs.exchange.import_run import import_csv
+from app.runs.exchange.importing import CsvImport
 from app.runs.reader import open_run
 from app.runs.saved_analyses import inputs_hash, save_analysis
 from app.runs.writer import write_run

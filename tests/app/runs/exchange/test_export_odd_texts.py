@@ -8,13 +8,16 @@ import pyuff
 from runs_kit import text_file
 
 from app.runs.edits import edit_run
-from app.runs.exchange.csv_reading import CsvOptions
+from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.exporting import ExportRequest, export_runs
-from app.runs.exchange.importing import CsvImport, import_csv
+from app.runs.exchange.import_run import import_csv
+from app.runs.exchange.importing import CsvImport
 from config.files import load_stand
 
 FORMATS = ("csv", "json", "parquet", "mat", "uff58", "xlsx")
 TITLE = "first\nsecond\x0b\ufffe\uffff"
+
+pytestmark = pytest.mark.usefixtures("short_records")
 
 
 def _imported(folder, unit_name="m"):

@@ -5,9 +5,10 @@ from runs_kit import ENDING, block
 from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.csv_reading import CsvOptions
+from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.exporting import write_exported_run
-from app.runs.exchange.importing import CsvImport, import_csv
+from app.runs.exchange.import_run import import_csv
+from app.runs.exchange.importing import CsvImport
 from app.runs.reader import open_run
 from app.runs.writer import write_run
 from config.files import load_stand

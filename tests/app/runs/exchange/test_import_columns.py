@@ -9,7 +9,8 @@ from runs_kit import text_file
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange import csv_reading
-from app.runs.exchange.csv_reading import CsvOptions, read_columns
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_reading import read_columns
 
 BASIC = CsvOptions("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
@@ -51,6 +52,13 @@ FORMS = {
     "blank lines": (PLAIN.replace("\n", "\n\n") + "\n \n", BASIC),
     "rows of delimiters": (PLAIN + ",,\n,,,\n", BASIC),
     "comments": ("# a\n#b\n" + PLAIN.replace("\n0.5", "\n# c\n0.5"), BASIC),
+    "units below the header": (PLAIN.replace("rel\n", "rel\ns,mm,mm\n"), BASIC),
+    "lines above the header": ("Logger 7;;\n\nStart;14:03:00;\nRate;2;\n" + PLAIN.replace(",", ";"), BASIC),
+    "sep=": ("sep=;\n" + PLAIN.replace(",", ";"), BASIC),
+    "decimal comma, not told": (PLAIN.replace(",", ";").replace(".", ","), BASIC),
+    "blanks, decimal comma, not told": (PLAIN.replace(",", "  ").replace(".", ","), BASIC),
+    "a footer": (PLAIN + "Mean,2.5,-3\n\nend of file\n", BASIC),
+    "utf-16 without a mark": (PLAIN.encode("utf-16-be"), BASIC),
     "numpy.savetxt": ("# from 3 gauges\n# time,table,rel\n" + NO_HEADER, BASIC),
     "exponents and signs": ("time,table,rel\n0,+15e-1,-.2E1\n5.e-1,2.5,-3\n1,3.5,-4\n", BASIC),
 }  # fmt: skip
@@ -71,12 +79,8 @@ FAULTS = {
     "column twice": ("time,a,a\n0,1,2\n1,1,2\n", CsvOptions("time", "a"), ["2 columns named 'a'"]),
     "text in a cell": (PLAIN.replace("2.5", "x"), BASIC, ["line 3", "column 'table'", "'x' is not a number"]),
     "decimal comma": (
-        "time;table;rel\n0;1;2\n0,5;1;2\n", BASIC, ["line 3", "column 'time'", "'0,5'", "--decimal ,"],
-    ),
-    "units below the header": (
-        PLAIN.replace("rel\n", "rel\ns,mm,mm\n"),
-        BASIC,
-        ["line 2", "'s' is not a number", "--no-header --skip 2"],
+        "time;table;rel\n0;1;2\n0,5;1;2\n", CsvOptions("time", "table", "rel", decimal="."),
+        ["line 3", "column 'time'", "'0,5'", "--decimal ,"],
     ),
     "infinite": (PLAIN.replace("2.5", "-inf"), BASIC, ["line 3", "column 'table'", "infinite"]),
     "no time": (PLAIN.replace("0.5,", ","), BASIC, ["line 3", "column 'time'", "time is missing"]),

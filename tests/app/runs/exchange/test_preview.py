@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.importing import CsvImport, FilePreview, ParseOptions, preview_file, read_record
+from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 
 
 def written(folder: Path, text: str, name: str = "record.csv") -> Path:
@@ -28,7 +29,7 @@ def roles(found: FilePreview) -> tuple[str, ...]:
         ),
         ("Zeit (ms);u1 (mm);u2 (mm);Note", ("Zeit (ms)", "u1 (mm)", "u2 (mm)", "plate", "ms", "mm")),
         ("t,u2-u1,u1", ("t", "u1", "u2-u1", "relative", "", "")),
-        ("Время, с\tСтол, мм\tx", ("Время, с", "Стол, мм", "", "relative", "", "")),
+        ("Время, с\tСтол, мм\tx", ("Время, с", "Стол, мм", "", "relative", "s", "mm")),
         (
             "Time [s];Gauge 1 [µm];Gauge 2 [µm]",
             ("Time [s]", "Gauge 1 [µm]", "Gauge 2 [µm]", "plate", "s", "um"),
@@ -83,9 +84,9 @@ def test_other_files_tell_their_columns_and_are_read_by_them(tmp_path: Path, suf
     assert found.columns == ("time", "u1", "u2")
     assert roles(found)[:4] == ("time", "u1", "u2", "plate")
     plan = CsvImport(_layout(found))
-    _, start_s, block = read_record(path, plan)
-    assert start_s == 0.0
-    assert list(block.readings[:, 0]) == [1.0, 2.0, 3.0, 4.0]
+    record = read_record(path, plan)
+    assert record.facts.first_s == 0.0
+    assert list(record.block.readings[:, 0]) == [1.0, 2.0, 3.0, 4.0]
 
 
 @pytest.mark.parametrize("suffix", [".mat", ".xlsx", ".parquet"])
@@ -99,7 +100,7 @@ def test_damaged_and_missing_files_are_said(tmp_path: Path, suffix: str) -> None
 
 
 def _layout(found: FilePreview) -> object:
-    from app.runs.exchange.csv_reading import CsvOptions
+    from app.runs.exchange.csv_layout import CsvOptions
 
     return CsvOptions(found.time, found.table, found.second or None)
 

@@ -1,0 +1,347 @@
+"""Layout of a text file with columns of numbers: delimiter, decimal sign, header, units; found or given."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import DATE, SECOND, TABLE, TIME
+from app.runs.exchange.stamps import DateOrder, find_form
+from app.runs.exchange.text_files import HEAD_BYTES, TextFile, open_text
+from app.runs.exchange.units import parse_unit
+from messages.i18n import N_
+from messages.message import Message, option
+
+Decimal = Literal[".", ","]
+MISSING_MARKS = (
+    "", "nan", "-nan", "+nan", "na", "n/a", "#n/a", "#na", "null", "none", "nil", "missing", "-", "--", "---",
+    "*", "**", "***", "1.#qnan", "-1.#ind", "1.#ind", "-1.#qnan", "#num!", "#value!", "#div/0!", "#ref!",
+)  # fmt: skip
+"""Cells of an absent reading, in small letters: of pandas, MATLAB, Excel, the C library of Windows."""
+
+_WORDS = {"tab": "\t", "space": " "}
+_CANDIDATES = ("\t", ";", ",", "|", " ")
+_DECIMALS: tuple[Decimal, ...] = (".", ",")
+_SAMPLE_LINES = 40  # of the head, the middle and the end each
+_HEAD_LINES = 1000
+_FIRST_ROWS = 8
+_SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
+
+
+class CsvOptions(msgspec.Struct, frozen=True):
+    """What the user says of a file. A column is a name, or a number counted from 0."""
+
+    time: str
+    """Empty where `rate_hz` is given, or where the file has a time axis of its own."""
+    table: str
+    second: str | None = None
+    delimiter: str | None = None
+    """A character, `tab` or `space` (any run of blanks); None finds it out."""
+    decimal: Decimal | None = None
+    skip: int = 0
+    """Lines left out before the header."""
+    header: bool = True
+    rate_hz: float | None = None
+    """Rows a second, of a file without times."""
+    date: str | None = None
+    """Column of dates, beside times of day."""
+    date_order: DateOrder | None = None
+    missing: tuple[str, ...] = ()
+    """Cells of an absent reading besides `MISSING_MARKS`."""
+    encoding: str | None = None
+
+    @property
+    def wanted(self) -> Iterator[tuple[Message, str]]:
+        """What is read from which column."""
+        if self.time:
+            yield TIME, self.time
+            if self.date:
+                yield DATE, self.date
+        yield TABLE, self.table
+        if self.second is not None:
+            yield SECOND, self.second
+
+    @property
+    def least_numbers(self) -> int:
+        """Numbers that a row has at least."""
+        return 1 if self.rate_hz is not None else 2
+
+
+class Line(NamedTuple):
+    """A line of the file: its number counted from 1, and itself."""
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CsvText:
+    """A text file taken apart as far as its first row."""
+
+    file: TextFile
+    data_line: int
+    """Number of the first row's line, from 1."""
+    delimiter: str
+    decimal: Decimal
+    names: list[str]
+    """Column names; empty without a header."""
+    units: list[str]
+    """Of the columns, from rows below the names; empty without them."""
+    sample: list[list[str]]
+    """Cells of the first rows, and of some from the middle and the end."""
+
+    @property
+    def path(self) -> Path:
+        return self.file.path
+
+    @property
+    def first_rows(self) -> tuple[tuple[str, ...], ...]:
+        return tuple(map(tuple, self.sample[:_FIRST_ROWS]))
+
+    @property
+    def width(self) -> int:
+        return max(len(self.names), *(len(row) for row in self.sample[:_FIRST_ROWS]))
+
+
+class _Format(NamedTuple):
+    delimiter: str
+    decimal: Decimal
+
+    def cells(self, line: str) -> list[str]:
+        return split_line(line, self.delimiter)
+
+    def kinds(self, line: str) -> str:
+        """A letter for each cell: n number, s date or time, e empty, x text."""
+        return "".join(_kind(cell, self.decimal) for cell in self.cells(line))
+
+
+def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
+    """Read a text file as far as its first row. Raises ImportFileError.
+
+    Lines above the names are left out. Where no names stand above the numbers, the last `#` line before them
+    is it if it has as many cells.
+    """
+    file = open_text(path, layout.encoding)
+    lines, comments, separator = _head(file, layout)
+    given = layout.delimiter or separator
+    more = [line for place in (0.5, 0.9) for line in file.tail_lines(place, _SAMPLE_LINES) if is_data(line)]
+    sample = [*(line.text for line in lines[-_SAMPLE_LINES:]), *more]
+    made = _format(path, layout, given, lines, sample)
+    pattern = _pattern(made, sample, layout)
+    first = _first_row(path, layout, made, lines, pattern)
+    names, units = _names(path, layout, made, lines, first, pattern, comments)
+    rows = [
+        made.cells(line) for line in (*(line.text for line in lines[first : first + _SAMPLE_LINES]), *more)
+    ]
+    return CsvText(file, lines[first].number, made.delimiter, made.decimal, names, units, rows)
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """Cells of a line, without quotes, blanks at their ends, and empty cells at its end."""
+    cells = line.split() if delimiter == " " else line.split(delimiter)
+    cells = [cell.strip().strip('"').strip() for cell in cells]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Tell whether a cell is a number."""
+    try:
+        to_number(cell, decimal)
+    except ValueError:
+        return False
+    return True
+
+
+def to_number(cell: str, decimal: str) -> float:
+    """Value of a cell. Raises ValueError."""
+    if "_" in cell or (decimal == "," and "." in cell):
+        raise ValueError(cell)
+    return float(cell.replace(decimal, ".").replace("\u2212", "-"))
+
+
+def is_data(line: str) -> bool:
+    """Tell whether a line counts: neither blank nor a comment."""
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _kind(cell: str, decimal: str) -> str:
+    if cell.lower() in MISSING_MARKS:
+        return "e"
+    if is_number(cell, decimal):
+        return "n"
+    return "s" if find_form(cell) else "x"
+
+
+def _head(file: TextFile, layout: CsvOptions) -> tuple[list[Line], list[Line], str]:
+    """First lines that count, comments among them, and the delimiter that a `sep=` line names."""
+    lines: list[Line] = []
+    comments: list[Line] = []
+    separator = ""
+    for piece in file.pieces():
+        for number, text in enumerate(file.decode(piece.data).split("\n")[:-1], piece.line):
+            named = _SEPARATOR.fullmatch(text) if not lines else None
+            if named:
+                separator = named[1]
+            elif number > layout.skip and is_data(text):
+                lines.append(Line(number, text))
+            elif number > layout.skip and text.strip():
+                comments.append(Line(number, text.lstrip().lstrip("#")))
+            if len(lines) >= _HEAD_LINES:
+                break
+        if lines and (len(lines) >= _HEAD_LINES or piece.end_bytes >= HEAD_BYTES):
+            break
+    if not lines:
+        template = N_("{path} holds no line of data. Give a file with numbers, and check {option} {skip}")
+        raise ImportFileError(template, path=file.path, option=option("--skip"), skip=layout.skip)
+    return lines, comments, separator
+
+
+def _format(
+    path: Path, layout: CsvOptions, given: str | None, lines: Sequence[Line], sample: Sequence[str]
+) -> _Format:
+    """Delimiter and decimal sign that make most cells of most lines numbers."""
+    decimals = _DECIMALS if layout.decimal is None else (layout.decimal,)
+    delimiters: Sequence[str] = _CANDIDATES
+    if given:
+        told = _WORDS.get(given, given)
+        decimals = tuple(sign for sign in decimals if sign != told)
+        if len(told) != 1 or told in '\n"' or not decimals:
+            raise ImportFileError(
+                "{option} {delimiter!r} cannot be. Give tab, space, or a character other"
+                " than the decimal sign {decimal}",
+                option=option("--delimiter"),
+                delimiter=given,
+                decimal=layout.decimal or ".",
+            )
+        delimiters = (told,)
+    formats = [_Format(d, s) for s in decimals for d in delimiters if d != s]
+    scores = {made: _score(made, sample, layout.least_numbers) for made in formats}
+    best = max(formats, key=lambda made: scores[made])
+    if not scores[best] and (not given or layout.decimal is None):
+        raise _no_numbers(path, layout, lines)
+    return best
+
+
+def _score(made: _Format, sample: Sequence[str], least: int) -> int:
+    score = 0
+    for line in sample:
+        kinds = made.kinds(line)
+        numbers = kinds.count("n") + kinds.count("s")
+        if numbers >= least:
+            score += max(numbers - kinds.count("x"), 1)
+    return score
+
+
+def _no_numbers(path: Path, layout: CsvOptions, lines: Sequence[Line]) -> ImportFileError:
+    if layout.header and len(lines) < 2:
+        return ImportFileError(
+            "{path} holds a header but no line of data. Give a file with numbers", path=path
+        )
+    return ImportFileError(
+        "{path}, line {number}: no columns of numbers are found in {text!r}. Check"
+        " {skip_option}, {delimiter_option} and {decimal_option}",
+        skip_option=option("--skip"),
+        delimiter_option=option("--delimiter"),
+        decimal_option=option("--decimal"),
+        path=path,
+        number=lines[-1].number,
+        text=lines[-1].text[:60],
+    )
+
+
+def _pattern(made: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
+    """Kinds of the cells of a row, as in most of the lines that have numbers."""
+    rows = [made.kinds(line) for line in sample]
+    rows = [kinds for kinds in rows if kinds.count("n") + kinds.count("s") >= layout.least_numbers]
+    width = max(map(len, rows), default=0)
+    return "".join(
+        Counter(kinds[at] for kinds in rows if at < len(kinds)).most_common(1)[0][0] for at in range(width)
+    )
+
+
+def _first_row(path: Path, layout: CsvOptions, made: _Format, lines: Sequence[Line], pattern: str) -> int:
+    """Index of the first line whose cells are those of rows."""
+    numeric = [at for at, kind in enumerate(pattern) if kind in "ns"]
+    if not layout.header:
+        return 0
+    for index, line in enumerate(lines):
+        kinds = made.kinds(line.text)
+        alike = [at for at in numeric if at < len(kinds) and kinds[at] == pattern[at]]
+        if (
+            alike
+            and alike[0] == numeric[0]
+            and (
+                len(alike) >= layout.least_numbers or _width(made, line.text) == _width(made, lines[-1].text)
+            )
+        ):
+            # A row with a fault right below the names is a row all the same: the fault is to be named.
+            above = made.kinds(lines[index - 1].text) if index > 1 else ""
+            wrong = [at for at in numeric if at < len(above) and above[at] == pattern[at]]
+            return (
+                index - 1
+                if wrong and _width(made, lines[index - 1].text) == _width(made, line.text)
+                else index
+            )
+    raise _no_numbers(path, layout, lines)
+
+
+def _width(made: _Format, line: str) -> int:
+    return len(line.split()) if made.delimiter == " " else line.count(made.delimiter)
+
+
+def _names(
+    path: Path,
+    layout: CsvOptions,
+    made: _Format,
+    lines: Sequence[Line],
+    first: int,
+    pattern: str,
+    comments: Sequence[Line],
+) -> tuple[list[str], list[str]]:
+    """Names and units above the first row."""
+    if not layout.header:
+        return [], []
+    block: list[list[str]] = []
+    least = min(len(pattern), max(2, sum(kind in "ns" for kind in pattern)))
+    for line in reversed(lines[:first]):
+        cells = made.cells(line.text)
+        if len(cells) < least:
+            break
+        block.insert(0, cells)
+    if not block:
+        above = [line for line in comments if line.number < lines[first].number]
+        names = made.cells(above[-1].text) if above else []
+        if len(names) == len(made.cells(lines[first].text)):
+            return names, []
+        raise ImportFileError(
+            "{path}, line {number}: {text!r} is data, not column names. Add {option} and give columns by"
+            " number",
+            option=option("--no-header"),
+            path=path,
+            number=lines[first].number,
+            text=lines[first].text[:60],
+        )
+    place = _names_row(block, [name for _, name in layout.wanted])
+    units = next((row for row in block[place + 1 :] if _is_unit_row(row)), [])
+    return block[place], [unit.strip("[](){}<> ") if parse_unit(unit) else "" for unit in units]
+
+
+def _names_row(block: Sequence[Sequence[str]], wanted: Sequence[str]) -> int:
+    """Which row has the names: the one with those asked for, else that above the units, else the last."""
+    named = [name.strip() for name in wanted if name and not name.strip().isdecimal()]
+    for index, row in enumerate(block):
+        if named and all(name in row for name in named):
+            return index
+    units = [index for index, row in enumerate(block) if index and _is_unit_row(row)]
+    return units[0] - 1 if units else len(block) - 1
+
+
+def _is_unit_row(cells: Sequence[str]) -> bool:
+    return any(cells) and all(not cell or cell in "-[]()" or parse_unit(cell) for cell in cells)

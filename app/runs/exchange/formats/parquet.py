@@ -1,0 +1,34 @@
+"""Parquet files, by pyarrow."""
+
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange.content import import_optional
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.tables import LARGEST_BYTES, Table
+from messages.i18n import N_
+
+
+def open_table(path: Path, layout: CsvOptions) -> Table:
+    """Columns by their names; timestamps are date-times. Raises ImportFileError, ExtraMissingError."""
+    file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
+    names = list(file.schema_arrow.names)
+    rows = file.metadata.num_rows
+    if rows * 8 * len(list(layout.wanted)) > LARGEST_BYTES:
+        raise ImportFileError(
+            "{path} holds {num_rows} rows, too many to load. Export a part", path=path, num_rows=rows
+        )
+
+    def column(at: int) -> NDArray[Any]:
+        stored = file.read(columns=[names[at]]).column(names[at])
+        values: NDArray[Any] = stored.to_numpy()
+        if values.dtype.kind not in "iufmM":
+            template = N_("{path}, column {name}: {type} is no number. Export plain numbers")
+            raise ImportFileError(template, path=path, name=names[at], type=stored.type)
+        return values
+
+    zones = {getattr(field.type, "tz", None) for field in file.schema_arrow} - {None}
+    return Table(names, column, has_zone=bool(zones))

@@ -1,0 +1,266 @@
+"""Read foreign files in a child process with limits: `python -m app.runs.exchange.reading_process`.
+
+A file of another program may be damaged or made to harm: its reader may crash, hang or take all memory.
+"""
+
+import atexit
+import contextlib
+import functools
+import math
+import queue
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from app import child_process
+from app.child_process import ChildProcess, CommandReader, EventSender
+from app.log import start_log
+from app.runs.errors import ExtraMissingError, ImportFileError, RunError
+from app.runs.exchange.importing import CsvImport, ForeignRecord, RecordFacts, check_plan, read_record
+from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
+from messages.i18n import N_
+from messages.message import Message, Option, Value
+
+MEMORY_BYTES = 1 << 30
+PROGRESS_S = 10.0
+"""A reader that shows no progress for so long hangs. It reports at least every few megabytes."""
+_START_S = 60.0
+_STOP_S = 5.0
+_IDLE_S = 60.0
+_OPTION, _FLOAT = "\0option", "\0float"
+"""Templates of an `Option` and of a float that is not finite, which JSON does not keep."""
+
+
+class ReadRequest(msgspec.Struct, frozen=True, tag=True):
+    """Read a record into files `0.npy` (time) and `1.npy`, `2.npy` (cells) of a folder."""
+
+    path: str
+    plan: CsvImport
+    folder: str
+
+
+class PreviewRequest(msgspec.Struct, frozen=True, tag=True):
+    """Look into a file for its columns."""
+
+    path: str
+    options: ParseOptions
+
+
+class ReaderReady(msgspec.Struct, frozen=True, tag=True):
+    """The process takes requests."""
+
+
+class ReadingProgress(msgspec.Struct, frozen=True, tag=True):
+    """Share of a file that has been read."""
+
+    share: float
+
+
+class RecordRead(msgspec.Struct, frozen=True, tag=True):
+    """The record is in the folder."""
+
+    facts: RecordFacts
+    columns: int
+
+
+class PreviewRead(msgspec.Struct, frozen=True, tag=True):
+    """What is in the file."""
+
+    preview: FilePreview
+
+
+class ReadingFault(msgspec.Struct, frozen=True, tag=True):
+    """The file cannot be read."""
+
+    message: Message
+    is_extra_missing: bool = False
+
+
+Request = ReadRequest | PreviewRequest
+Event = ReaderReady | ReadingProgress | RecordRead | PreviewRead | ReadingFault
+_decode_event: Callable[[bytes], Event] = child_process.json_decoder(Event)
+
+
+class ReadingProcess:
+    """Reads files, one after another, for several threads."""
+
+    def __init__(self) -> None:
+        self._child: ChildProcess[Request, Event] | None = None
+        self._events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self._turn = threading.Lock()
+
+    @contextlib.contextmanager
+    def read(
+        self, path: Path, plan: CsvImport, report: Callable[[float], object] = lambda _: None
+    ) -> Iterator[ForeignRecord]:
+        """Read a file as `importing.read_record` does; its arrays hold until the context ends.
+
+        Raises RunError, also for a file over which the reader crashes, hangs or needs too much memory.
+        """
+        check_plan(plan)
+        with tempfile.TemporaryDirectory(prefix="slipstand-import-", ignore_cleanup_errors=True) as folder:
+            answer = self._ask(ReadRequest(str(path.absolute()), plan, folder), path, report)
+            if not isinstance(answer, RecordRead):
+                raise _crashed(path)
+            arrays = [
+                np.load(Path(folder) / f"{number}.npy", mmap_mode="r") for number in range(answer.columns)
+            ]
+            facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
+            yield ForeignRecord(facts, arrays[0], tuple(arrays[1:]))
+
+    def preview(self, path: Path, options: ParseOptions) -> FilePreview:
+        """Look into a file as `recognition.preview_file` does. Raises RunError."""
+        answer = self._ask(PreviewRequest(str(path.absolute()), options), path, lambda _: None)
+        if not isinstance(answer, PreviewRead):
+            raise _crashed(path)
+        return answer.preview
+
+    def stop(self) -> None:
+        if self._child:
+            self._child.kill()
+            self._child.stop(_STOP_S)
+            self._child = None
+
+    def _ask(self, request: Request, path: Path, report: Callable[[float], object]) -> Event:
+        with self._turn:
+            self._start()
+            if self._child is None or not self._child.send(request):
+                raise _crashed(path)
+            while isinstance(event := self._next(PROGRESS_S, path), ReadingProgress):
+                report(event.share)
+        if isinstance(event, ReadingFault):
+            kind: type[RunError] = ExtraMissingError if event.is_extra_missing else ImportFileError
+            raise kind(_unpacked(event.message))
+        return event
+
+    def _start(self) -> None:
+        if self._child is not None and not self._child.has_ended:
+            return
+        events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        process = child_process.spawn(__name__, discard_stderr=True)  # a crash becomes a fault of the file
+        self._events = events
+        self._child = ChildProcess(
+            process, child_process.encode_line, _decode_event, events.put, lambda _: events.put(None)
+        )
+        with contextlib.suppress(queue.Empty):
+            if isinstance(events.get(timeout=_START_S), ReaderReady):
+                return
+        self.stop()
+        raise RunError("the process that reads foreign files does not start. Run `slipstand doctor`")
+
+    def _next(self, timeout_s: float, path: Path) -> Event:
+        try:
+            event = self._events.get(timeout=timeout_s)
+        except queue.Empty:
+            self.stop()
+            template = N_(
+                "{path}: reading it shows no progress for {seconds:g} s. The file is damaged, or its disk too"
+                " slow: copy it to this computer and try again"
+            )
+            raise ImportFileError(template, path=path, seconds=timeout_s) from None
+        if event is None:
+            self.stop()
+            raise _crashed(path)
+        return event
+
+
+@functools.cache
+def shared_reading_process() -> ReadingProcess:
+    """The reading process that this process keeps."""
+    reader = ReadingProcess()
+    atexit.register(reader.stop)
+    return reader
+
+
+def main() -> None:
+    """Answer requests until stdin ends: one a line as JSON, with events on stdout."""
+    start_log("reader")
+    child_process.ignore_session_signals()
+    _limit_memory()
+    events: EventSender[Event] = EventSender(
+        child_process.reserve_stdout(), lambda event: isinstance(event, ReadingProgress)
+    )
+    decoder = child_process.LineDecoder(child_process.json_decoder(Request))
+    requests: CommandReader[Request] = CommandReader(0, decoder.feed)
+    events.send(ReaderReady())
+    while not requests.is_closed:
+        if (request := requests.take(_IDLE_S)) is not None:
+            events.send(_answer(request, lambda share: events.send(ReadingProgress(share))))
+    events.close()
+
+
+def _limit_memory() -> None:
+    """Limit what the process may write to; address space alone costs nothing, and libraries reserve much."""
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+
+
+def _answer(request: Request, report: Callable[[float], object]) -> Event:
+    path = Path(request.path)
+    try:
+        if isinstance(request, PreviewRequest):
+            return PreviewRead(preview_file(path, request.options))
+        record = read_record(path, request.plan, report)
+        for number, column in enumerate((record.time_s, *record.cells)):
+            np.save(Path(request.folder) / f"{number}.npy", np.ascontiguousarray(column))
+        facts = msgspec.structs.replace(record.facts, notes=tuple(map(_packed, record.facts.notes)))
+        return RecordRead(facts, 1 + len(record.cells))
+    except RunError as error:
+        return ReadingFault(_packed(error.message), isinstance(error, ExtraMissingError))
+    except MemoryError:
+        template = N_("{path} needs more than {gigabytes:g} GB of memory. Export a part of it")
+        return ReadingFault(ImportFileError(template, path=path, gigabytes=MEMORY_BYTES / 2**30).message)
+    except OSError as error:
+        template = N_("{path}: cannot be read ({reason}). Check the file and its disk")
+        return ReadingFault(ImportFileError(template, path=path, reason=error.strerror or str(error)).message)
+
+
+def _crashed(path: Path) -> ImportFileError:
+    return ImportFileError(
+        "{path}: its reader crashed over it, or needs more than {gigabytes:g} GB of memory. Export it again,"
+        " or a part of it",
+        path=path,
+        gigabytes=MEMORY_BYTES / 2**30,
+    )
+
+
+def _packed(text: Message) -> Message:
+    """Message that JSON keeps."""
+    return Message(
+        text.template, {name: _packed_value(value) for name, value in text.values.items()}, text.plural
+    )
+
+
+def _packed_value(value: Value) -> Value:
+    if isinstance(value, Option):
+        return Message(_OPTION, {"name": value.template})
+    if isinstance(value, float) and not math.isfinite(value):
+        return Message(_FLOAT, {"text": str(value)})
+    return _packed(value) if isinstance(value, Message) else value
+
+
+def _unpacked(text: Message) -> Message:
+    values: dict[str, Any] = {name: _unpacked_value(value) for name, value in text.values.items()}
+    return Message(text.template, values, text.plural)
+
+
+def _unpacked_value(value: Value) -> Value:
+    if not isinstance(value, Message):
+        return value
+    if value.template == _FLOAT:
+        return float(str(value.values["text"]))
+    return Option(str(value.values["name"])) if value.template == _OPTION else _unpacked(value)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,175 @@
+"""Which column of a foreign file is likely what, by the names and the first lines."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange.csv_layout import CsvOptions, CsvText, is_number, survey_csv
+from app.runs.exchange.foreign_files import is_csv, list_columns
+from app.runs.exchange.stamps import find_form
+from app.runs.exchange.units import parse_unit, unit_in_name
+from messages.message import option
+
+_TIME = re.compile(r"^(t|time|times|zeit|temps|время|sekunden|seconds?)\b|^time|^t_", re.IGNORECASE)
+_PLATE = re.compile(r"\bu_?2\b|plate|gauge.?2|ch(annel)?.?2", re.IGNORECASE)
+_RELATIVE = re.compile(r"rel|u_?2\s*[-−–]\s*u_?1", re.IGNORECASE)
+_TABLE = re.compile(r"\bu_?1\b|table|gauge.?1|ch(annel)?.?1|displacement|weg|перемещ", re.IGNORECASE)
+_DATE = re.compile(r"^(date|datum|дата)\b", re.IGNORECASE)
+_TIMES, _LENGTHS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}, {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+
+
+class ParseOptions(msgspec.Struct, frozen=True):
+    """What the user says of the lines of a file; None finds it out."""
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    skip: int = 0
+    header: bool | None = None
+    encoding: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FilePreview:
+    """What is in a file."""
+
+    columns: tuple[str, ...]
+    """As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice."""
+    titles: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    """Cells of the first lines of a text; none of other files."""
+    options: ParseOptions
+    time: str = ""
+    """Which columns they are likely to be; `second` is empty where there is none, `time` too where the file
+    has a time axis of its own."""
+    table: str = ""
+    second: str = ""
+    measures: str = "relative"
+    """What `second` is likely to be: `relative` or `plate`."""
+    time_unit: str = ""
+    unit: str = ""
+    """As the names of their columns say: s, ms, us; m, mm, um; "" where they say none of these."""
+    date: str = ""
+    """Column of dates, where `time` is one of times of day."""
+
+
+def preview_file(path: Path, given: ParseOptions | None = None) -> FilePreview:
+    """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
+    given = given or ParseOptions()
+    if is_csv(path):
+        return _survey_text(path, given)
+    has_header = given.header is not False
+    table = list_columns(path, CsvOptions("", "", skip=given.skip, header=has_header))
+    options = ParseOptions(skip=given.skip, header=has_header)
+    return _recognise(_Columns(table.names, table.units, has_axis=table.has_axis), options)
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """Names and units of the columns of a file, and its first rows."""
+
+    names: Sequence[str]
+    units: Sequence[str]
+    rows: tuple[tuple[str, ...], ...] = ()
+    has_axis: bool = False
+
+    def unit(self, number: int | None, known: dict[str, float]) -> str:
+        """Unit of a column, if it is one of the known."""
+        if number is None or number >= len(self.names):
+            return ""
+        of_file = self.units[number] if number < len(self.units) else ""
+        unit = parse_unit(of_file or unit_in_name(self.names[number]))
+        if unit is None or (known is _TIMES) != unit.is_time:
+            return ""
+        return next((name for name, scale in known.items() if scale == unit.scale), "")
+
+    def stamps(self, number: int | None) -> tuple[bool, bool]:
+        """Whether a column has dates, and whether it has times of day."""
+        cell = next((row[number] for row in self.rows if number is not None and number < len(row)), "")
+        form = find_form(cell)
+        return (False, False) if form is None else ("y" in form.groupindex, "H" in form.groupindex)
+
+
+def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
+    """Read with the given options, and else with names above the numbers, if there are any."""
+    faults = []
+    for header in (True, False) if given.header is None else (given.header,):
+        layout = CsvOptions(
+            "", "", None, given.delimiter, given.decimal, given.skip, header, encoding=given.encoding
+        )
+        try:
+            source = survey_csv(path, layout)
+        except ImportFileError as error:
+            faults.append(error)
+            continue
+        if any(is_number(cell, source.decimal) for row in source.first_rows for cell in row):
+            return _of_text(source, given)
+    if faults:
+        raise faults[0]
+    raise ImportFileError(
+        "{path}: no columns of numbers. Check {skip_option}, {delimiter_option} and {decimal_option}",
+        path=path,
+        skip_option=option("--skip"),
+        delimiter_option=option("--delimiter"),
+        decimal_option=option("--decimal"),
+    )
+
+
+def _of_text(source: CsvText, given: ParseOptions) -> FilePreview:
+    names = [*source.names, *[""] * (source.width - len(source.names))]
+    found = ParseOptions(source.delimiter, source.decimal, given.skip, bool(source.names), given.encoding)
+    return _recognise(_Columns(names, source.units, source.first_rows), found)
+
+
+def _recognise(table: _Columns, given: ParseOptions) -> FilePreview:
+    """Say which column is likely what; a file without names has time first, then table, then relative."""
+    names = table.names
+    columns = tuple(
+        name if name and names.count(name) == 1 else str(number) for number, name in enumerate(names)
+    )
+    titles = tuple(name or f"column {number}" for number, name in enumerate(names))
+    time, date = _time_and_date(table)
+    relative = _first(names, _RELATIVE, (time, date))
+    plate = _first(names, _PLATE, (time, date, relative)) if relative is None else None
+    second = relative if plate is None else plate
+    gauge = _first(names, _TABLE, (time, date, second))
+    rest = [number for number in range(len(names)) if number not in (time, date, gauge, second)]
+    if gauge is None and rest:
+        gauge = rest.pop(0)
+    if second is None and rest and not any(names):
+        second = rest[0]
+    return FilePreview(
+        columns, titles, table.rows, given,
+        time=_at(columns, time), date=_at(columns, date),
+        table=_at(columns, gauge), second=_at(columns, second),
+        measures="relative" if plate is None else "plate",
+        time_unit=table.unit(time, _TIMES), unit=table.unit(gauge, _LENGTHS),
+    )  # fmt: skip
+
+
+def _time_and_date(table: _Columns) -> tuple[int | None, int | None]:
+    """Columns of time, None where the file has an axis of its own, and of dates beside times of day."""
+    names = table.names
+    time = _first(names, _TIME, ()) if any(names) else None
+    if time is None and table.has_axis:
+        return None, None
+    if time is None:
+        stamped = (number for number in range(len(names)) if any(table.stamps(number)))
+        time = next(stamped, 0 if names else None)
+    date = _first(names, _DATE, (time,))
+    if date is None and table.stamps(time) == (True, False):
+        date, time = time, next((n for n in range(len(names)) if table.stamps(n) == (False, True)), time)
+    is_beside = table.stamps(time) == (False, True) and table.stamps(date) == (True, False)
+    return time, date if is_beside else None
+
+
+def _first(names: Sequence[str], pattern: re.Pattern[str], taken: tuple[int | None, ...]) -> int | None:
+    return next((i for i, name in enumerate(names) if i not in taken and pattern.search(name)), None)
+
+
+def _at(columns: tuple[str, ...], number: int | None) -> str:
+    return "" if number is None or number >= len(columns) else columns[number]
