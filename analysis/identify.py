@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from analysis.laws.catalogue import (
 from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import StandEffect, StandModel
 from analysis.motion.stand_motion import INTEGRATION_ERROR_M
-from analysis.plate.friction import estimate_plate_friction
+from analysis.plate.friction import PlateFriction, estimate_plate_friction
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN, FreeDecay, prepare
 from analysis.preparation.oscillation import no_decay_error, pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
@@ -98,6 +98,19 @@ def warm_up() -> None:
     identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Fitted:
+    """What was fitted to a record, and which of it was chosen."""
+
+    search: Search
+    minima: list[Floats]  # of the widest law, from which the laws were fitted
+    fits: list[Fit]  # of friction laws on an ideal stand
+    stand: StandFit | None
+    missing: list[MissingEffect]  # beside the chosen fit
+    joint: JointFit
+    law_is_given: bool
+
+
 def _identify(
     record: Record, model: str, progress: Progress | None, monte_carlo: int | None
 ) -> Identification:
@@ -108,7 +121,6 @@ def _identify(
     decay = prepare(record)
     if not decay.slips:
         return _identify_without_slip(record, decay, with_monte_carlo=monte_carlo is not None)
-
     report(0.1, "first estimate")
     problem = build_problem(record, decay)
     start, informed_problem = initial_guess(problem, decay)
@@ -117,18 +129,34 @@ def _identify(
         points = [search.fit_first_slip(point) for point in initial_points(start, decay)]
     else:
         points = guess_release(informed_problem, start, decay.period_s, record.pullback_m)
-
     plate = estimate_plate_friction(record, decay)
     report(0.3, "following the motion")
     minima = search.find_minima(points)
 
     report(0.6, "fitting " + ", ".join(law.name for law in laws))
     fits = search.fit_all(laws, minima)
-    likeliest = min(fits, key=lambda fit: fit.bic)
+    fitted = _choose(record, decay, search, minima, fits, start if model == "auto" else None, report)
+    report(0.8, "uncertainty")
+    found = _conclude(record, fitted, plate, monte_carlo, report)
+    report(1.0, "done")
+    return found
+
+
+def _choose(
+    record: Record,
+    decay: FreeDecay,
+    search: Search,
+    minima: list[Floats],
+    fits: list[Fit],
+    start: Floats | None,
+    report: Progress,
+) -> _Fitted:
+    """Choose a law, or the simplest with effects of the stand, found from `start`; None: the law is given."""
+    problem, likeliest = search.problem, min(fits, key=lambda fit: fit.bic)
     stand_search: StandSearch | None = None
     stand: StandFit | None = None
     missing: list[MissingEffect] = []
-    if model == "auto" and may_be_friction(problem, fits):
+    if start is not None and may_be_friction(problem, fits):
         stand_search = _stand_search(search, decay, fits)
         missing = _missing_effects(stand_search, decay, likeliest, fits)
         report(0.7, "looking for effects of the stand")
@@ -143,8 +171,6 @@ def _identify(
                 fallback = search.explain_by_fallback(law, widest)
                 if fallback is not None and _is_adequate(problem, decay, [fallback]):
                     fits.append(fallback)
-
-    report(0.8, "uncertainty")
     if stand_search is not None and stand is not None and _explains_more(stand, decay, fits):
         joint = joint_fit.choose_stand(record, decay, stand.fit, stand.problem, fits)
         missing = _missing_effects(stand_search, decay, stand.fit, [stand.fit])
@@ -152,10 +178,18 @@ def _identify(
         joint = joint_fit.choose_law(record, decay, problem, fits)
         if stand_search is not None and joint.chosen is not likeliest:
             missing = _missing_effects(stand_search, decay, joint.chosen, [joint.chosen])
+    return _Fitted(search, minima, fits, stand, missing, joint, law_is_given=start is None)
+
+
+def _conclude(
+    record: Record, fitted: _Fitted, plate: PlateFriction | None, monte_carlo: int | None, report: Progress
+) -> Identification:
+    """Results with their budget, verdict and warnings."""
+    joint, stand, fits = fitted.joint, fitted.stand, fitted.fits
     adequate = joint.selection.adequate
     slip_end = fitted_quantities.find_slip_end(joint)
-    slip_ended = slip_end is not None or (decay.slip_end_s is not None and not adequate)
-    decay = decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
+    slip_ended = slip_end is not None or (joint.decay.slip_end_s is not None and not adequate)
+    decay = joint.decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
     joint = replace(joint, decay=decay)
     effects = joint.chosen.law.effects if isinstance(joint.chosen.law, StandModel) else ()
     has_plain_tail = decay.tail is not None and not any(effect.bends_tail for effect in effects)
@@ -174,14 +208,8 @@ def _identify(
     own = budget.results.get("friction_dynamic")
     fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
     joint = replace(joint, selection=joint.selection.with_friction(fitted_friction))
-    joint, verdict_warnings = judge(
-        joint,
-        plate,
-        budget,
-        min(fits, key=lambda fit: fit.bic),
-        _spread_of_missing(missing, stand, joint),
-        law_is_given=model != "auto",
-    )
+    spread, ideal = _spread_of_missing(fitted.missing, stand, joint), min(fits, key=lambda fit: fit.bic)
+    joint, verdict_warnings = judge(joint, plate, budget, ideal, spread, law_is_given=fitted.law_is_given)
     warnings = [
         *verdict_warnings,
         *(warning for warning in decay.warnings if not _is_refuted(warning, joint)),
@@ -192,13 +220,12 @@ def _identify(
         *pullback_warnings(joint.chosen.value(Parameter.PULLBACK), record.pullback_m),
         *([] if adequate else [joint_fit.inadequate_warning(joint.selection)]),
         *([] if adequate or joint.selection.parts else mass_warnings(joint)),
-        *([] if model == "auto" else _needless_static(search, joint.chosen, minima)),
+        *(_needless_static(fitted.search, joint.chosen, fitted.minima) if fitted.law_is_given else []),
     ]
     drawn = None
     if monte_carlo is not None:
         drawn = _check_by_monte_carlo(joint, constants, budget, monte_carlo, report)
     delays_s = record.table_gauge.lateness_s, record.relative_gauge.lateness_s
-    report(1.0, "done")
     return Identification(
         "two-mass",
         budget.results,
