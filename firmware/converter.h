@@ -1,6 +1,6 @@
 /* The one thing the firmware knows of an analog-to-digital converter.
  *
- * hx711.c, ads1256.c and pattern.c each fill this in; the Makefile links one of them. A new converter is
+ * hx711.c, ads1256.c, ads131m02.c and pattern.c each fill this in; the Makefile links one of them. A new converter is
  * one more such file.
  */
 #pragma once

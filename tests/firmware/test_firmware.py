@@ -51,7 +51,7 @@ def board(workshop):
         yield board
 
 
-@pytest.mark.parametrize("converter", ["ads1256", "hx711", "pattern"])
+@pytest.mark.parametrize("converter", ["ads1256", "ads131m02", "hx711", "pattern"])
 def test_it_compiles_without_a_warning_and_fits(workshop, converter, tmp_path):
     made = run_make(f"CONVERTER={converter}", f"BUILD={tmp_path}")
     assert (made.returncode, made.stderr) == (0, "")

@@ -54,15 +54,24 @@ def test_two_hx711_are_read_bit_by_bit_and_paired(workshop):
     np.testing.assert_allclose(np.diff(listener.times_s), 1.02 / 80, rtol=0.001)
 
 
-@pytest.mark.parametrize(("rate_hz", "samples_per_frame"), [(100, 1), (1000, 5), (1020, 5)])
-def test_an_ads1256_is_switched_and_read(workshop, rate_hz, samples_per_frame):
+@pytest.mark.parametrize(
+    ("converter", "rate_hz", "samples_per_frame"),
+    [
+        ("ads1256", 100, 1),
+        ("ads1256", 1000, 5),
+        ("ads1256", 1020, 5),
+        ("ads131m02", 1000, 5),
+        ("ads131m02", 4000, 20),
+    ],
+)
+def test_a_converter_of_both_gauges_is_read(workshop, converter, rate_hz, samples_per_frame):
     given = readings()
     with (
-        running(workshop, workshop.firmware("ads1256"), "ads1256", given) as board,
+        running(workshop, workshop.firmware(converter), converter, given) as board,
         listening(board, rate_hz) as listener,
     ):
-        assert listener.source.identity.firmware == "1.0.0+ads1256"
-        listener.listen(2 * COUNT)
+        assert listener.source.identity.firmware == f"1.0.0+{converter}"
+        listener.listen(max(2 * COUNT, 10 * samples_per_frame))
     expected = np.resize(given, listener.counts.shape)
     np.testing.assert_array_equal(listener.counts, expected)
     of_frame = np.bitwise_or.reduceat(
@@ -95,5 +104,47 @@ def test_a_rate_too_fast_for_the_chip_is_refused(workshop):
         running(workshop, firmware, "ads1256") as board,
         pytest.raises(Exception, match="does not take 1021 Hz and stays at 1000 Hz"),
         listening(board, 1021),
+    ):
+        pass
+
+
+def test_an_ads131m02_converts_both_inputs_at_once(workshop):
+    with (
+        running(workshop, workshop.firmware("ads131m02"), "ads131m02") as board,
+        listening(board, 2000) as listener,
+    ):
+        listener.listen(400)
+        assert listener.source.filters[0].order == 3
+    table_us, relative_us = listener.counts.T
+    np.testing.assert_array_equal(relative_us, table_us)
+    np.testing.assert_allclose(np.diff(table_us), 500, atol=1)
+    told_us = listener.times_s * 1e6
+    np.testing.assert_allclose(table_us - table_us[0], told_us, rtol=0, atol=25)
+
+
+@pytest.mark.parametrize(("fault", "lost"), [("noisy", {1}), ("hasty", {2, 3})])
+def test_readings_of_an_ads131m02_that_came_damaged_or_too_fast_are_left_out_and_counted(
+    workshop, fault, lost
+):
+    given = readings()
+    with (
+        running(workshop, workshop.firmware("ads131m02"), f"ads131m02-{fault}", given) as board,
+        listening(board, 1000) as listener,
+    ):
+        listener.listen(5 * COUNT)
+    is_missing = (listener.status & SampleStatus.MISSING) != 0
+    expected = np.resize(given, listener.counts.shape)
+    np.testing.assert_array_equal(listener.counts[~is_missing], expected[~is_missing])
+    first, last = np.flatnonzero(np.diff(is_missing.astype(int), prepend=0, append=0)).reshape(-1, 2).T
+    assert len(first) >= 5
+    assert set(last - first) <= lost
+    assert listener.source.losses.missing == np.count_nonzero(is_missing)
+
+
+def test_an_ads131m02_has_rates_of_its_own(workshop):
+    with (
+        running(workshop, workshop.firmware("ads131m02"), "ads131m02") as board,
+        pytest.raises(Exception, match="does not take 500 Hz and stays at 1000 Hz"),
+        listening(board, 500),
     ):
         pass

@@ -3,21 +3,15 @@
  * Each self-calibration begins the file of readings anew. Only the first result after a SYNC is a reading;
  * those that follow by themselves, at times the firmware does not know, are STRAY.
  */
-#include <simavr/avr_spi.h>
 #include <string.h>
 
 #include "board.h"
-
-#define SPCR 0x4C                       /* addresses of the ATmega328P */
-#define SPSR 0x4D
-#define SPDR 0x4E
-#define SPI_MODE 0x0C
-#define MODE_1 0x04
 
 #define NS_PER_CYCLE 62.5
 #define TAU_NS 130.208                  /* one clock of 7.68 MHz */
 #define T6_CYCLES (50 * TAU_NS / NS_PER_CYCLE)
 #define T11_SYNC_CYCLES (24 * TAU_NS / NS_PER_CYCLE)
+#define FASTEST_HZ (7680000 / 4)
 #define CALIBRATION_US 9000
 #define STRAY 0x5A5A5A
 #define HIGHEST 0x7FFFFF
@@ -42,9 +36,7 @@ static struct {
     bool is_selected, is_calibrating, is_stopped, is_ready;
     uint32_t value;
     uint64_t readings[2];               /* taken since the calibration, table and relative */
-    avr_cycle_count_t byte_began, byte_ended, woken;
-    uint8_t byte;
-    avr_irq_t *reply;
+    avr_cycle_count_t woken;
 } chip;
 
 static void set_ready(avr_t *avr, bool is_ready)
@@ -128,7 +120,7 @@ static void calibrate(avr_t *avr)
 
 static void wake_up(avr_t *avr)
 {
-    if (chip.is_stopped && chip.byte_began - chip.byte_ended < T11_SYNC_CYCLES) {
+    if (chip.is_stopped && spi_times.byte_began - spi_times.byte_ended < T11_SYNC_CYCLES) {
         fault(avr, "ADS1256: t11 after SYNC is too short");
     }
     chip.is_stopped = false;
@@ -175,7 +167,7 @@ static void write_register(avr_t *avr, uint8_t byte)
 
 static uint8_t read_data(avr_t *avr)
 {
-    if (chip.argument == 0 && chip.byte_began - chip.byte_ended < T6_CYCLES) {
+    if (chip.argument == 0 && spi_times.byte_began - spi_times.byte_ended < T6_CYCLES) {
         fault(avr, "ADS1256: t6 after RDATA is too short");
     }
     if (chip.argument == 0 && !chip.is_ready) {
@@ -191,6 +183,9 @@ static uint8_t read_data(avr_t *avr)
 
 static uint8_t answer(avr_t *avr, uint8_t byte)
 {
+    if (!chip.is_selected) {
+        return 0xFF;
+    }
     if (chip.command == RDATA) {
         return read_data(avr);
     }
@@ -200,33 +195,6 @@ static uint8_t answer(avr_t *avr, uint8_t byte)
         begin_command(avr, byte);
     }
     return 0;
-}
-
-static avr_cycle_count_t byte_ended(avr_t *avr, avr_cycle_count_t when, void *param)
-{
-    (void)param;
-    const uint8_t reply = chip.is_selected ? answer(avr, chip.byte) : 0xFF;
-    chip.byte_ended = when;
-    avr_raise_irq(chip.reply, reply);
-    return 0;
-}
-
-/* simavr 1.6 gives every byte 100 us; here it takes its eight clocks. */
-static void byte_began(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *param)
-{
-    static const int divisors[] = {4, 16, 64, 128};
-    const int divisor = divisors[avr->data[SPCR] & 3] / (1 + (avr->data[SPSR] & 1));
-    (void)address;
-    (void)param;
-    if (CLOCK_HZ / divisor > 7680000 / 4) {
-        fault(avr, "ADS1256: SCLK is too fast");
-    }
-    if ((avr->data[SPCR] & SPI_MODE) != MODE_1) {
-        fault(avr, "ADS1256: it needs SPI mode 1");
-    }
-    chip.byte = byte;
-    chip.byte_began = avr->cycle;
-    avr_cycle_timer_register(avr, 8 * divisor, byte_ended, &chip);
 }
 
 static void select_changed(avr_irq_t *irq, uint32_t level, void *param)
@@ -239,8 +207,7 @@ static void select_changed(avr_irq_t *irq, uint32_t level, void *param)
 
 void connect_ads1256(avr_t *avr)
 {
-    chip.reply = avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_INPUT);
-    avr_register_io_write(avr, SPDR, byte_began, NULL);
+    connect_spi(avr, FASTEST_HZ, answer);
     watch_pin(avr, 'B', 2, select_changed, NULL);
     set_ready(avr, true);
 }

@@ -1,6 +1,6 @@
 /* An Arduino Uno in simavr, its serial line on a pseudo-terminal.
  *
- *     board FIRMWARE.hex none|hx711|ads1256 READINGS.txt|times [bootloader]
+ *     board FIRMWARE.hex none|hx711|ads1256|ads131m02[-noisy|-hasty] READINGS.txt|times [bootloader]
  *
  * READINGS.txt has a line "table relative" for each; "times" in its place makes each reading its own time.
  * Writes the name of the pseudo-terminal to stdout, faults to stderr. Follows the wall clock where it can, and
@@ -31,6 +31,7 @@
 #define EXTERNAL_RESET 0x02
 #define MAX_READINGS 65536
 #define COMMAND_BYTES 16
+#define ADS131M02 "ads131m02"
 
 static volatile sig_atomic_t is_reset_pressed;
 static struct reading readings[MAX_READINGS];
@@ -234,13 +235,15 @@ static void connect_converter(avr_t *avr, const char *name)
         connect_hx711_pair(avr);
     } else if (strcmp(name, "ads1256") == 0) {
         connect_ads1256(avr);
+    } else if (strncmp(name, ADS131M02, strlen(ADS131M02)) == 0) {
+        connect_ads131m02(avr, name + strlen(ADS131M02));
     }
 }
 
 int main(int count, char **words)
 {
     if (count < 4) {
-        fprintf(stderr, "use: board FIRMWARE.hex none|hx711|ads1256 READINGS.txt|times [bootloader]\n");
+        fprintf(stderr, "use: board FIRMWARE.hex none|hx711|ads1256|ads131m02[-noisy|-hasty] READINGS.txt|times [bootloader]\n");
         return 2;
     }
     if (strcmp(words[3], "times") != 0) {

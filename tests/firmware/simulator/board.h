@@ -17,6 +17,19 @@ void watch_pin(avr_t *avr, char port, int bit, avr_irq_notify_t changed, void *p
 /* The firmware did to a converter what its data sheet forbids: said on stderr, where the tests look. */
 void fault(const avr_t *avr, const char *what);
 
+/* What the converter on the SPI pins answers to a byte. */
+typedef uint8_t (*spi_answer_t)(avr_t *avr, uint8_t byte);
+
+void connect_spi(avr_t *avr, unsigned fastest_hz, spi_answer_t answer);
+
+/* When the byte that is answered began, and the one before it ended. */
+struct spi_times {
+    avr_cycle_count_t byte_began;
+    avr_cycle_count_t byte_ended;
+};
+
+extern struct spi_times spi_times;
+
 struct reading {
     int32_t table;
     int32_t relative;
@@ -30,3 +43,8 @@ bool readings_are_times(void);
 
 void connect_hx711_pair(avr_t *avr);
 void connect_ads1256(avr_t *avr);
+
+/* `fault`: "-noisy", now and then a bit of its answer is wrong; "-hasty", three conversions follow each other in
+ * 20 us, as if the board were late; or "".
+ */
+void connect_ads131m02(avr_t *avr, const char *fault);
