@@ -61,7 +61,9 @@ class FileOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """Make runs of files of other programs: text, .mat, .xlsx, .parquet.
+    """Make runs of files of other programs.
+
+    Text, .mat, .h5, .tdms, .lvm, .uff, .mf4, .wav, catman .bin, .xlsx, .parquet; any of them as .gz.
 
     Times are kept, uneven ones and gaps included.
     """

@@ -1,7 +1,10 @@
 """Reads time and gauges from files of other programs; the format is told by the content, else by the name."""
 
 import contextlib
+import gzip
 import importlib
+import tempfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,9 +20,12 @@ from app.runs.exchange.formats import FORMATS, Format
 from app.runs.exchange.stamps import to_datetime
 from app.runs.exchange.tables import Table, TimeAxis
 from messages.i18n import N_
-from messages.message import option
+from messages.message import Message, option
 
 ReportShare = Callable[[float], object]
+_GZIP = b"\x1f\x8b"
+_PIECE_BYTES = 1 << 22
+_UNPACKED_MOST_BYTES = 2 << 30
 
 
 def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> ForeignColumns:
@@ -53,6 +59,46 @@ def has_own_time(path: Path) -> bool:
     """Tell whether a file is of a format that keeps times beside its columns."""
     found = find_format(path)
     return found is not None and found.has_own_time
+
+
+@contextlib.contextmanager
+def unpacked(path: Path, report: ReportShare = lambda _: None) -> Iterator[Path]:
+    """Unpack a gzip file for the time of the context; any other is itself. Raises ImportFileError."""
+    is_packed = False
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        is_packed = file.read(2) == _GZIP
+    if not is_packed:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="slipstand-gzip-") as folder:
+        plain = Path(folder) / (path.stem or "unpacked")
+        _unpack(path, plain, report)
+        try:
+            yield plain
+        except RunError as error:  # which names the unpacked file
+            said = error.message
+            values = {
+                name: str(path) if value == str(plain) else value for name, value in said.values.items()
+            }
+            raise type(error)(Message(said.template, values, said.plural)) from None
+
+
+def _unpack(path: Path, plain: Path, report: ReportShare) -> None:
+    done = 0
+    try:
+        with gzip.open(path) as packed, plain.open("wb") as file:
+            while data := packed.read(_PIECE_BYTES):
+                done += len(data)
+                if done > _UNPACKED_MOST_BYTES:
+                    raise ImportFileError(
+                        "{path} unpacks to more than {gigabytes:g} GB. Unpack it and import a part",
+                        path=path,
+                        gigabytes=_UNPACKED_MOST_BYTES / 2**30,
+                    )
+                file.write(data)
+                report(0.0)
+    except (EOFError, gzip.BadGzipFile, zlib.error):
+        raise ImportFileError("{path} is a damaged gzip file. Pack it again", path=path) from None
 
 
 def find_format(path: Path) -> Format | None:

@@ -17,7 +17,7 @@ from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns
 from app.runs.exchange.csv_layout import CsvOptions
-from app.runs.exchange.foreign_files import has_own_time, read_foreign
+from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
 from app.runs.exchange.rounded_times import even_times
 from app.runs.exchange.units import parse_unit
@@ -186,8 +186,13 @@ def read_record(path: Path, plan: CsvImport, report: ReportShare = lambda _: Non
     with limits.
     """
     check_plan(plan)
-    plan = _with_time(path, plan)
-    columns = read_foreign(path, plan.layout, report)
+    with unpacked(path, report) as plain:
+        plan = _with_time(plain, plan)
+        columns = read_foreign(plain, plan.layout, report)
+        return _record(path, plan, columns, report)
+
+
+def _record(path: Path, plan: CsvImport, columns: ForeignColumns, report: ReportShare) -> ForeignRecord:
     if not len(columns):
         raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
     unit_s = _time_unit_s(path, plan, columns)

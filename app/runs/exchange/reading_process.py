@@ -6,6 +6,7 @@ A file of another program may be damaged or made to harm: its reader may crash, 
 import atexit
 import contextlib
 import functools
+import importlib
 import math
 import queue
 import sys
@@ -22,6 +23,7 @@ from app import child_process
 from app.child_process import ChildProcess, CommandReader, EventSender
 from app.log import start_log
 from app.runs.errors import ExtraMissingError, ImportFileError, RunError
+from app.runs.exchange.foreign_files import find_format
 from app.runs.exchange.importing import CsvImport, ForeignRecord, RecordFacts, check_plan, read_record
 from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 from messages.i18n import N_
@@ -60,6 +62,8 @@ class ReadingProgress(msgspec.Struct, frozen=True, tag=True):
     """Share of a file that has been read."""
 
     share: float
+    is_loading: bool = False
+    """Whether a library is being loaded, which may take long on a busy computer."""
 
 
 class RecordRead(msgspec.Struct, frozen=True, tag=True):
@@ -132,7 +136,9 @@ class ReadingProcess:
             self._start()
             if self._child is None or not self._child.send(request):
                 raise _crashed(path)
-            while isinstance(event := self._next(PROGRESS_S, path), ReadingProgress):
+            timeout_s = PROGRESS_S
+            while isinstance(event := self._next(timeout_s, path), ReadingProgress):
+                timeout_s = _START_S if event.is_loading else PROGRESS_S
                 report(event.share)
         if isinstance(event, ReadingFault):
             kind: type[RunError] = ExtraMissingError if event.is_extra_missing else ImportFileError
@@ -191,6 +197,7 @@ def main() -> None:
     events.send(ReaderReady())
     while not requests.is_closed:
         if (request := requests.take(_IDLE_S)) is not None:
+            _load_library(Path(request.path), events.send)
             events.send(_answer(request, lambda share: events.send(ReadingProgress(share))))
     events.close()
 
@@ -203,6 +210,16 @@ def _limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+
+
+def _load_library(path: Path, send: Callable[[Event], object]) -> None:
+    """Load what reads a file, before time without progress counts."""
+    found = find_format(path)
+    if found is not None and found.library:
+        send(ReadingProgress(0.0, is_loading=True))
+        with contextlib.suppress(ImportError, MemoryError):  # the reader says so
+            importlib.import_module(found.library)
+        send(ReadingProgress(0.0))
 
 
 def _answer(request: Request, report: Callable[[float], object]) -> Event:

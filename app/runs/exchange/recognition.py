@@ -10,7 +10,7 @@ import msgspec
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_layout import CsvOptions, CsvText, is_number, survey_csv
-from app.runs.exchange.foreign_files import is_csv, list_columns
+from app.runs.exchange.foreign_files import is_csv, list_columns, unpacked
 from app.runs.exchange.stamps import find_form
 from app.runs.exchange.units import parse_unit, unit_in_name
 from messages.message import option
@@ -59,7 +59,11 @@ class FilePreview:
 
 def preview_file(path: Path, given: ParseOptions | None = None) -> FilePreview:
     """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
-    given = given or ParseOptions()
+    with unpacked(path) as plain:
+        return _preview(plain, given or ParseOptions())
+
+
+def _preview(path: Path, given: ParseOptions) -> FilePreview:
     if is_csv(path):
         return _survey_text(path, given)
     has_header = given.header is not False

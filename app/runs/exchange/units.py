@@ -15,7 +15,7 @@ _INCH_M = 0.0254
 _STANDARD_GRAVITY = 9.80665  # m/s^2, of which `g` is the unit in records of accelerometers (ISO 80000-3)
 _OTHERS = re.compile(
     r"[munk]?v|[mu]?v/v|[mu]?a|counts?|cts|digits?|lsb|adc|ppm|%|[munk]?strain|u?[mε]/m|ε|[mkd]?n|kgf?|[mk]?hz"
-    r"|m?rad|deg|°|[mk]?pa|bar|°?c|ft|raw|в|мв|мв/в",
+    r"|full scale|m?rad|deg|°|[mk]?pa|bar|°?c|ft|raw|в|мв|мв/в",
     re.IGNORECASE,
 )
 _PLAIN = str.maketrans({"µ": "u", "μ": "u", "²": "2", "·": "*", "−": "-", "^": None, " ": None})
@@ -42,7 +42,7 @@ class Unit:
 def parse_unit(text: str) -> Unit | None:
     """Read a unit; None for a text that is none."""
     bare = text.strip().strip("[](){}<>").strip()
-    plain = bare.translate(_PLAIN)
+    plain = bare if bare == "full scale" else bare.translate(_PLAIN)
     plain = _RUSSIAN.get(plain.lower(), plain)
     if plain in _TIMES:
         return Unit(bare, None, _TIMES[plain], is_time=True)

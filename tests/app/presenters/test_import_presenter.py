@@ -10,8 +10,8 @@ from app.cli.commands import SlipstandGroup
 from app.presenters.base import TaskFailure, Tone
 from app.presenters.runs.import_form import FIELDS, GAIN, Form, make_form, validate
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.state import ImportPreview, Overlay
-from app.presenters.runs.tasks import csv_import, import_file, preview_import, survey_file
+from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
+from app.presenters.runs.tasks import csv_import, import_file, import_files, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
 from app.runs.exchange.recognition import FilePreview, ParseOptions
 from app.runs.reader import open_run
@@ -89,6 +89,20 @@ def test_one_look_at_a_time_and_only_the_latest_counts() -> None:
     assert len(desk.asked) == asked + 1
     desk.answer(FOUND)
     assert desk.last[2]["table"] == "u1"
+
+
+def test_all_files_are_imported_alike() -> None:
+    desk = Desk("/a.csv", "/b.csv", "/c.csv")
+    desk.make_ready()
+    desk.presenter.import_all()
+    assert desk.asked[-1].name == "import_files"
+    assert desk.asked[-1].arguments[0] == ("/a.csv", "/b.csv", "/c.csv")
+    desk.answer(ImportOutcome(("/runs/a.h5", "/runs/c.h5"), ("a 1 s", "c 2 s"), ("b.csv: no numbers",)))
+    state = desk.presenter.state
+    assert desk.imported == ["/runs/a.h5", "/runs/c.h5"]
+    assert (state.path, state.pending, state.can_import) == ("", 0, False)
+    assert (state.message.text, state.message.tone) == ("Imported 2 files", Tone.WARN)
+    assert state.results.splitlines() == ["a 1 s", "c 2 s", "b.csv: no numbers"]
 
 
 def test_what_is_said_about_the_test_reads_nothing_anew() -> None:
@@ -177,6 +191,26 @@ def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     assert run.table_reading == pytest.approx((60.5 - np.arange(60)) * 1e-3)
     assert (run.metadata.series, run.metadata.plate_mass_kg) == ("1FFM0", 23.5)
     assert (run.metadata.operator, run.metadata.note) == ("Anna", "from the logger")
+
+
+def test_files_alike_become_runs_with_a_line_each(path: Path) -> None:
+    second, bad = path.with_name("second.csv"), path.with_name("bad.csv")
+    second.write_text(LINES, encoding="utf-8")
+    bad.write_text("t (ms);x\n0;1\n1;2\n", encoding="utf-8")
+    paths = tuple(map(str, (path, bad, second)))
+    shares: list[float] = []
+    outcome = import_files(
+        paths,
+        filled(path, name="first"),
+        str(path.parent),
+        lambda progress: shares.append(progress.fraction or 0.0),
+    )
+    assert [Path(run).name for run in outcome.runs] == ["first.h5", "second.h5"]
+    assert "0.059\u202fs   1000\u202fHz" in outcome.rows[1]
+    assert "no release found" in outcome.rows[1]
+    assert "bad.csv" in outcome.faults[0]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
 
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:

@@ -13,6 +13,8 @@ class Format:
     """Module below `app.runs.exchange.formats` whose `open_table` reads it."""
     magic: bytes = b""
     """First bytes of such a file, where they tell it."""
+    library: str = ""
+    """Module of other people that reads it, which may take long to load."""
     has_rows: bool = False
     """Whether it has lines and a header, as a sheet has."""
     has_own_time: bool = False
@@ -20,9 +22,18 @@ class Format:
 
 
 FORMATS = (
-    Format("MATLAB", (".mat",), "matlab"),
-    Format("Excel", (".xlsx",), "excel", has_rows=True),
-    Format("Parquet", (".parquet",), "parquet", b"PAR1"),
+    Format("MATLAB", (".mat",), "matlab", b"MATLAB ", "scipy.io"),
+    Format("Excel", (".xlsx",), "excel", library="openpyxl", has_rows=True),
+    Format("Parquet", (".parquet",), "parquet", b"PAR1", "pyarrow.parquet"),
+    Format("TDMS", (".tdms",), "tdms", b"TDSm", "nptdms", has_own_time=True),
+    Format("LVM", (".lvm",), "labview", b"LabVIEW Measurement", "lvm_read", has_own_time=True),
+    Format("UFF 58", (".uff", ".unv", ".uff58"), "universal", b"    -1", "pyuff", has_own_time=True),
+    Format("MDF", (".mf4", ".mdf"), "mdf", b"MDF ", "asammdf", has_own_time=True),
+    Format("WAV", (".wav",), "wave", b"RIFF", "scipy.io", has_own_time=True),
+    Format("catman", (".bin",), "catman"),
+    Format("HDF5", (".h5", ".hdf5", ".hdf"), "hdf5", b"\x89HDF"),
 )
-SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", *(suffix for one in FORMATS for suffix in one.suffixes))
+SUFFIXES = (
+    ".csv", ".txt", ".tsv", ".dat", ".asc", ".gz", *(suffix for one in FORMATS for suffix in one.suffixes)
+)  # fmt: skip
 """Names of files that can be imported; a text may have any other."""

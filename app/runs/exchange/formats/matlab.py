@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7, by scipy."""
+"""MATLAB files: up to version 7 by scipy, of version 7.3 by h5py."""
 
 import math
 from collections.abc import Iterator
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.formats.hdf5 import open_matlab
 from app.runs.exchange.tables import LARGEST_BYTES, Table
 
 
@@ -19,7 +20,7 @@ def open_table(path: Path, _layout: CsvOptions) -> Table:
 
     with path.open("rb") as file:
         if file.read(128)[124:128] in (b"\x00\x02IM", b"\x02\x00MI"):
-            raise ImportFileError("{path} is a version 7.3 MAT file. Save it with -v7 in MATLAB", path=path)
+            return open_matlab(path)
     if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > LARGEST_BYTES:
         raise ImportFileError("{path} holds more numbers than can be loaded. Save a part of them", path=path)
     content = loadmat(path, simplify_cells=True)

@@ -1,0 +1,279 @@
+"""Files of other programs, written at test time, come back to the last bit through the limited process."""
+
+import datetime
+import gzip
+import os
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange import reading_process
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.reading_process import ReadingProcess, shared_reading_process
+from app.runs.exchange.recognition import ParseOptions
+
+# pyuff 2.5.8 does not close the file that it writes.
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+ROWS, RATE_HZ = 200, 500.0
+TIME_S = np.arange(ROWS) / RATE_HZ
+TABLE = np.sin(0.1 * np.arange(ROWS)) * 12.0
+RELATIVE = np.cos(0.1 * np.arange(ROWS)) / 3.0
+BEGUN = datetime.datetime(2019, 5, 4, 14, 3, 7, 250000, tzinfo=datetime.UTC)
+
+
+def write_matlab_73(path):
+    hdf5storage = pytest.importorskip("hdf5storage")
+    content = {"t": TIME_S, "both": np.column_stack([TABLE, RELATIVE]), "name": "a test"}
+    hdf5storage.savemat(path, content, appendmat=False, oned_as="column", store_python_metadata=False)
+
+
+def write_tdms(path):
+    nptdms = pytest.importorskip("nptdms")
+    facts = {"wf_increment": 1 / RATE_HZ, "wf_start_offset": 0.0, "unit_string": "mm",
+             "wf_start_time": np.datetime64(BEGUN.replace(tzinfo=None), "us")}  # fmt: skip
+    channels = (("u1", TABLE), ("rel", RELATIVE))
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("gauges", name, data, facts) for name, data in channels])
+
+
+def write_lvm(path):
+    lvmio = pytest.importorskip("lvmio")
+    start = BEGUN.astimezone()
+    channels = [
+        lvmio.Channel(name, data.tolist(), "mm", delta_x=1 / RATE_HZ)
+        for name, data in (("u1", TABLE), ("rel", RELATIVE))
+    ]
+    date, begun = f"{start:%Y/%m/%d}", f"{start:%H:%M:%S.%f}"
+    lvmio.write_lvm(path, channels, date=date, time=begun, precision=17)
+
+
+def write_universal(path):
+    pyuff = pytest.importorskip("pyuff")
+    none = dict.fromkeys((f"{axis}_{kind}_unit_exp" for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
+                          for kind in ("len", "force", "temp")), 0)  # fmt: skip
+    none |= dict.fromkeys(("ordinate_spec_data_type", "orddenom_spec_data_type", "z_axis_spec_data_type"), 0)
+    none |= dict.fromkeys(
+        ("abscissa_axis_units_lab", "orddenom_axis_units_lab", "z_axis_axis_units_lab"), "NONE"
+    )
+    for name, data in (("u1", TABLE), ("rel", RELATIVE)):
+        one = pyuff.prepare_58(
+            **none, binary=1, byte_ordering=1, fp_format=2, id1="test", id2=name, id3="NONE",
+            id4="NONE", id5="NONE",
+            func_type=1, ver_num=0, load_case_id=0, rsp_ent_name="TABLE", rsp_node=1, rsp_dir=1,
+            ref_ent_name="NONE", ref_node=0, ref_dir=0, ord_data_type=4, num_pts=ROWS, abscissa_spacing=1,
+            abscissa_min=0.0, abscissa_inc=1 / RATE_HZ, z_axis_value=0.0, abscissa_spec_data_type=17,
+            ordinate_axis_units_lab="mm", data=data, x=TIME_S,
+        )  # fmt: skip
+        pyuff.UFF(str(path)).write_sets(one, mode="add")
+
+
+def write_mdf(path):
+    asammdf = pytest.importorskip("asammdf")
+    signals = [
+        asammdf.Signal(samples=data, timestamps=TIME_S, name=name, unit="mm")
+        for name, data in (("u1", TABLE), ("rel", RELATIVE))
+    ]
+    with asammdf.MDF(version="4.10") as file:
+        file.append(signals)
+        file.start_time = BEGUN
+        file.save(path)
+
+
+def write_hdf5(path):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["raw/t"] = TIME_S
+        file["raw/u1"] = TABLE
+        file["raw/u1"].attrs["units"] = "mm"
+        rows = np.zeros(ROWS, [("rel", "f8"), ("count", "i4")])
+        rows["rel"] = RELATIVE
+        file["raw/more"] = rows
+
+
+def write_gzip(path):
+    rows = zip(TIME_S.tolist(), TABLE.tolist(), RELATIVE.tolist(), strict=True)
+    lines = "".join(f"{t!r},{u!r},{r!r}\n" for t, u, r in rows)
+    path.write_bytes(gzip.compress(b"t,u1 [mm],rel\n" + lines.encode()))
+
+
+ROUNDED = {"labview.lvm": 1e-16}
+"""Formats of decimal digits, of which lvmio writes seventeen behind the point."""
+FORMATS = {
+    "matlab.mat": (write_matlab_73, CsvOptions("t", "both:0", "both:1"), 1.0, None),
+    "labview.tdms": (write_tdms, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
+    "labview.lvm": (write_lvm, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
+    "bench.uff": (write_universal, CsvOptions("", "u1", "rel"), 1e-3, None),
+    "vehicle.mf4": (write_mdf, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
+    "laboratory.hdf5": (write_hdf5, CsvOptions("raw/t", "raw/u1", "raw/more.rel"), 1e-3, None),
+    "packed.csv.gz": (write_gzip, CsvOptions("t", "u1 [mm]", "rel"), 1e-3, None),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_file_of_another_program_is_read_to_the_last_bit(tmp_path, name):
+    write, layout, unit_m, start = FORMATS[name]
+    path = tmp_path / name
+    write(path)
+    with shared_reading_process().read(path, CsvImport(layout)) as record:
+        for cells, written in zip(record.cells, (TABLE, RELATIVE), strict=True):
+            assert np.abs(cells - written).max() <= ROUNDED.get(name, 0.0)
+        assert record.time_s == pytest.approx(TIME_S, abs=1e-12)
+        facts = record.facts
+        assert facts.gauges[0].gain_m_per_count == unit_m
+        assert facts.rate_hz == pytest.approx(RATE_HZ)
+        assert facts.start == start
+        assert facts.source.name == name
+    found = shared_reading_process().preview(path, ParseOptions())
+    assert (found.time == "") == (layout.time == "")
+    assert {layout.table, layout.second} <= set(found.columns)
+
+
+def test_a_sound_file_is_full_scale_times_a_gain(tmp_path):
+    from scipy.io import wavfile
+
+    path = tmp_path / "recorder.wav"
+    counts = np.round(TABLE / 12.0 * 32767).astype(np.int16)
+    wavfile.write(path, int(RATE_HZ), np.column_stack([counts, -counts]))
+    plan = CsvImport(CsvOptions("", "channel 0", "channel 1"), gain=0.01)
+    with shared_reading_process().read(path, plan) as record:
+        assert np.array_equal(record.cells[0], counts / 32768.0)
+        assert record.block.readings[:, 1] == pytest.approx(-0.01 * counts / 32768.0)
+        assert record.facts.rate_hz == pytest.approx(RATE_HZ)
+    assert "what one full scale means is not known. Add --gain" in fault_of(path, CsvOptions("", "0"))
+
+
+def fault_of(path, layout):
+    """Text of the error that a file is refused with."""
+    with pytest.raises(ImportFileError) as caught, shared_reading_process().read(path, CsvImport(layout)):
+        pass
+    return str(caught.value)
+
+
+def catman_file(channels):
+    """A catman file as its description has it (`app.runs.exchange.formats.catman`)."""
+
+    def text(value, code="h"):
+        data = value.encode("cp1252")
+        return struct.pack("<" + code, len(data)) + data
+
+    heads, bodies = b"", b""
+    for number, (name, unit, data, code) in enumerate(channels, start=1):
+        extended = bytearray(148)
+        extended[140] = code
+        heads += struct.pack("<hi", number, len(data)) + text(name) + text(unit) + text("")
+        heads += struct.pack("<hhd", 0, 8, 0.0) + struct.pack("<i", len(extended)) + bytes(extended)
+        heads += b"00" + struct.pack("<Bd", 1, 2.5) + struct.pack("<h", 0) + text("") + text("T8", "i")
+        if code == 2:
+            low, high = float(data.min()), float(data.max())
+            bodies += struct.pack("<dd", low, high)
+            bodies += np.round((data - low) / (high - low) * 32767).astype("<u2").tobytes()
+        else:
+            bodies += data.astype({0: "<f8", 1: "<f4"}[code]).tobytes()
+    head = text("a comment") + text("") * 32 + struct.pack("<hi", len(channels), 0)
+    head += struct.pack(f"<{len(channels)}i", *[0] * len(channels)) + struct.pack("<i", 0) + heads
+    return struct.pack("<hi", 5012, 6 + len(head)) + head + bodies
+
+
+CATMAN = [("Time  1 - default", "s", TIME_S, 0), ("Tisch", "mm", TABLE, 1), ("Platte", "µm", RELATIVE, 2)]
+
+
+def test_a_catman_file_is_read_in_all_its_widths(tmp_path):
+    path = tmp_path / "old.bin"
+    path.write_bytes(catman_file(CATMAN))
+    plan = CsvImport(CsvOptions("", "Tisch", "Platte"))
+    with shared_reading_process().read(path, plan) as record:
+        assert np.array_equal(record.cells[0], TABLE.astype(np.float32))
+        step = np.ptp(RELATIVE) / 32767
+        assert np.abs(record.cells[1] - RELATIVE).max() <= step / 2 * (1 + 1e-9)
+        assert np.array_equal(record.time_s, TIME_S)
+        assert [gauge.gain_m_per_count for gauge in record.facts.gauges] == [1e-3, 1e-6]
+
+
+@pytest.mark.peer
+def test_apread_reads_the_same_of_a_catman_file(tmp_path):
+    apread = pytest.importorskip("apread", exc_type=ImportError)
+    path = tmp_path / "old.bin"
+    path.write_bytes(catman_file(CATMAN))
+    channels = {channel.Name: channel.data for channel in apread.APReader(str(path)).Channels}
+    with shared_reading_process().read(path, CsvImport(CsvOptions("", "Tisch", "Platte"))) as record:
+        assert np.array_equal(channels["Tisch"], record.cells[0])
+        assert np.array_equal(channels["Platte"], record.cells[1])
+
+
+def hostile_files(folder: Path) -> dict[str, bytes]:
+    """A hostile file of each format: cut, huge by its own word, or a bomb."""
+    made = {}
+    for name, (write, *_) in FORMATS.items():
+        write(folder / name)
+        data = (folder / name).read_bytes()
+        made[f"cut {name}"] = data[: len(data) * 2 // 3]
+        made[f"scrambled {name}"] = data[:100] + bytes(byte ^ 0xA5 for byte in data[100:])
+    made["cut old.bin"] = catman_file(CATMAN)[:-100]
+    made["huge old.bin"] = catman_file(CATMAN).replace(struct.pack("<i", ROWS), struct.pack("<i", 2**31 - 1))
+    made["empty.wav"] = b"RIFF\xff\xff\xff\xffWAVEfmt \x10\0\0\0\x01\0\x02\0"
+    made["huge.h5"] = huge_hdf5(folder)
+    return made
+
+
+def huge_hdf5(folder: Path) -> bytes:
+    """100 GB of zeros in 2 kB."""
+    import h5py
+
+    with h5py.File(folder / "zeros.h5", "w") as file:
+        for name in ("t", "u1"):
+            file.create_dataset(name, (12_500_000_000,), "f8", chunks=(1 << 20,), compression="gzip")
+    return (folder / "zeros.h5").read_bytes()
+
+
+def read_or_fault(path, layout):
+    """Name and text of the fault of a file, or its name where it can be read in spite of all."""
+    try:
+        with shared_reading_process().read(path, CsvImport(layout)) as record:
+            assert len(record) <= ROWS
+            return path.name
+    except ImportFileError as error:
+        return str(error)
+
+
+def test_every_hostile_file_is_one_line_and_the_next_file_is_read(tmp_path):
+    sound = tmp_path / "sound.csv.gz"
+    write_gzip(sound)
+    layouts = {Path(name).suffix: layout for name, (_, layout, *_) in FORMATS.items()}
+    layouts[".bin"] = CsvOptions("", "Tisch", "Platte")
+    for name, data in hostile_files(tmp_path).items():
+        path = tmp_path / name
+        path.write_bytes(data)
+        layout = layouts.get(path.suffix, CsvOptions("t", "u1"))
+        said = read_or_fault(path, layout)
+        assert said.count("\n") == 0, name
+        assert len(said) < 600, name
+        assert path.name in said, name
+        with shared_reading_process().read(sound, CsvImport(CsvOptions("t", "u1 [mm]"))) as record:
+            assert np.array_equal(record.cells[0], TABLE)
+
+
+def test_what_needs_too_much_memory_is_one_line(tmp_path):
+    path = tmp_path / "huge.h5"
+    path.write_bytes(huge_hdf5(tmp_path))
+    assert "memory" in fault_of(path, CsvOptions("t", "u1"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a file that never ends is a pipe here")
+def test_a_reader_without_progress_is_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading_process, "PROGRESS_S", 0.5)
+    path = tmp_path / "endless.csv"
+    os.mkfifo(path)
+    reader = ReadingProcess()
+    try:
+        fault = pytest.raises(ImportFileError, match=r"endless.csv: reading it shows no progress for 0.5 s")
+        with fault, reader.read(path, CsvImport(CsvOptions("t", "u1"))):
+            pass
+    finally:
+        reader.stop()
