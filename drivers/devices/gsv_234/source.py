@@ -34,7 +34,10 @@ class Gsv234Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Gsv234Source(SampleSource):
-    """Conversation: stop, identify, set and read the rate, start. The stream is timed by the host's clock."""
+    """Conversation: stop, identify, set and read the rate, start.
+
+    The first stream is timed by the host's clock. After a loss it is not, because readings are waited for.
+    """
 
     stop_command = commands.STOP
 
@@ -44,6 +47,7 @@ class Gsv234Source(SampleSource):
         super().__init__(identity, DRIVER.default_baud_for({"format": self._model}), rate_hz)
         self._channels = (settings.table, settings.relative)
         self._layout = FORMATS[self._model]
+        self._was_timed = False
 
     @property
     def channels(self) -> int:
@@ -66,6 +70,8 @@ class Gsv234Source(SampleSource):
         self._set_rate(link)
         link.write(commands.START)
         first = self.await_stream(link, self._has_frames, self.timeout_s)
+        if self._was_timed:
+            return first
         more, sent_hz = self.time_stream(link, self._layout.marks.length)
         if sent_hz is not None:
             template = N_(
@@ -73,6 +79,7 @@ class Gsv234Source(SampleSource):
                 " than a second off with the vendor's program, and check its baud rate"
             )
             raise ProtocolError(template, rate_hz=self.rate_hz, actual_hz=sent_hz)
+        self._was_timed = True
         return first + more
 
     def make_decoder(self, data: bytes) -> FrameDecoder | None:  # noqa: ARG002 - all is known but the rate

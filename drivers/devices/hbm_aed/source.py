@@ -44,7 +44,7 @@ class HbmAedSource(SampleSource):
     """Conversation: stop, select, identify, set format, filter and rate (None: that of the device), start.
 
     The device tells by what power of two its rate is divided, and not the rate. So the stream is timed by the
-    host's clock, which tells one of the rates that the maker names.
+    host's clock, which tells one of the rates that the maker names. After a loss it is not timed again.
     """
 
     stop_command = commands.STOP
@@ -54,6 +54,7 @@ class HbmAedSource(SampleSource):
         super().__init__(DeviceIdentity(DRIVER.name, "HBM AED"), DRIVER.default_baud, rate_hz)
         self._settings = settings
         self._output = FORMATS[settings.format]
+        self._full_hz: float | None = None
 
     @property
     def channels(self) -> int:
@@ -100,6 +101,11 @@ class HbmAedSource(SampleSource):
         """Start, find out the rate, and start again where another one was asked for."""
         asked_hz = self._rate_hz
         divider = self._read_divider(link)
+        if self._full_hz is not None:
+            wanted = commands.find_divider(self._full_hz, self.rate_hz)
+            if wanted is not None and wanted != divider:
+                self._require(link, commands.set_divider(wanted))
+            return self._await_values(link)
         received, sent_hz = self._start_stream(link)
         full_hz = commands.full_rate(sent_hz, divider) if sent_hz else None
         if full_hz is None:
@@ -110,7 +116,7 @@ class HbmAedSource(SampleSource):
             rates = [f"{rate_hz:g}" for rate_hz in commands.FULL_RATES_HZ]
             raise ProtocolError(template, sent_hz=sent_hz or 0.0, divider=divider, rates=rates)
         if asked_hz is None:
-            self._rate_hz = full_hz / 2**divider
+            self._full_hz, self._rate_hz = full_hz, full_hz / 2**divider
             return received
         wanted = commands.find_divider(full_hz, asked_hz)
         if wanted is None:
@@ -118,6 +124,7 @@ class HbmAedSource(SampleSource):
             rates = [f"{full_hz / 2**n:g}" for n in range(commands.MAX_DIVIDER + 1)]
             raise SettingsError(template, rate_hz=asked_hz, rates=rates)
         if wanted == divider:
+            self._full_hz = full_hz
             return received
         self.silence(link)
         self._require(link, commands.set_divider(wanted))
@@ -128,6 +135,7 @@ class HbmAedSource(SampleSource):
                 " for a lower rate"
             )
             raise ProtocolError(template, rate_hz=asked_hz, sent_hz=sent_hz or 0.0)
+        self._full_hz = full_hz
         return received
 
     def _read_divider(self, link: Link) -> int:
@@ -138,17 +146,21 @@ class HbmAedSource(SampleSource):
 
     def _start_stream(self, link: Link) -> tuple[bytes, float | None]:
         """Start; returns what came, and how many values a second, None where they come unevenly."""
-        link.write(commands.START)
-        received, good = self.await_data(
-            link, max(self.timeout_s, (_VALUES_AT_START + 1) * _LONGEST_PERIOD_S), self._has_values
-        )
-        if not good:
-            raise self._no_values_error(received)
-        length = self._output.marks.length
+        received = self._await_values(link)
         arrivals = ArrivalRate(_TIMED_S)
-        more, _ = self.await_data(link, self.timeout_s, _until_steady(arrivals, length))
+        timed = _until_steady(arrivals, self._output.marks.length)
+        more, _ = self.await_data(link, self.timeout_s, timed)
         windows_hz = arrivals.windows_hz
         return received + more, arrivals.steady_hz or (windows_hz[-1] if windows_hz else None)
+
+    def _await_values(self, link: Link) -> bytes:
+        """Start, and wait for the first values."""
+        link.write(commands.START)
+        longest_s = max(self.timeout_s, (_VALUES_AT_START + 1) * _LONGEST_PERIOD_S)
+        received, good = self.await_data(link, longest_s, self._has_values)
+        if not good:
+            raise self._no_values_error(received)
+        return received
 
     def _has_values(self, received: bytes) -> bool:
         return codec.count_frames(self._settings.format, received) >= _VALUES_AT_START

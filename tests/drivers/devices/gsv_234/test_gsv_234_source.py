@@ -67,6 +67,17 @@ def test_the_conversation_of_a_start():
     assert link.sent[-1] == b"\x23"
 
 
+def test_a_device_that_is_back_is_set_again_and_not_timed_again(monkeypatch):
+    source = make_source({}, 500.0)
+    timed = []
+    monkeypatch.setattr(source, "time_stream", lambda _, length: (timed.append(length), (b"", None))[1])
+    source.start(ScriptedLink(Firmware()))
+    link = ScriptedLink(Firmware(rate=b"\xa9"))  # it lost its power, and its rate
+    source.resume(link)
+    assert b"\xab" in link.sent
+    assert timed == [11]
+
+
 def test_a_rate_is_set_and_a_locked_device_is_unlocked_for_it():
     link = ScriptedLink(Firmware())
     make_source({}, 250.0).start(link)

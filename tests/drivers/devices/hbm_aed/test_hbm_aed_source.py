@@ -113,6 +113,16 @@ def test_rates_that_cannot_be(monkeypatch):
         make_source({}, 600.0).start(Device(monkeypatch, 1200.0, divider=4, limit_hz=160.0))
 
 
+def test_a_device_that_is_back_is_set_again_and_not_timed_again(monkeypatch):
+    source = make_source({}, None)
+    source.start(Device(monkeypatch, 1200.0, divider=1))
+    link = Device(monkeypatch, 1200.0, divider=4)  # it lost its power, and what was set
+    first = source.resume(link)
+    assert link.sent[-2:] == [b"ICR1;", b"MSV?0;"]
+    assert len(first) / 6 / 600.0 < 0.1
+    assert source.rate_hz == 600.0
+
+
 def test_text_a_filter_that_is_left_and_an_address(monkeypatch):
     link = Device(monkeypatch, kind=Format.ASCII)
     source = make_source({"format": "ascii", "filter": "device", "address": "3"}, None)
