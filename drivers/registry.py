@@ -9,7 +9,6 @@ from drivers.errors import SettingsError
 from messages.i18n import N_
 
 _RESERVED = (
-    DeviceDriver("enod4", "Scaime eNod4 fast SCMBus", 70, 115200, 1),
     DeviceDriver("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 80, 115200, 1),
     DeviceDriver("scale-line", "Lines of scales (Dini Argeo, KERN, Laumas)", 90, channels=1),
 )

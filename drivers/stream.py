@@ -192,7 +192,7 @@ class SampleSource(ABC):
             return True
         return abs(measured_hz / self._rate_hz - 1) <= RATE_TOLERANCE
 
-    def time_stream(self, link: Link, frame_bytes: int) -> tuple[bytes, float | None]:
+    def time_stream(self, link: Link, frame_bytes: float) -> tuple[bytes, float | None]:
         """Read until frames come at the nominal rate; returns what came, and the rate where it is another.
 
         Only a steady rate that is far off counts: a busy computer loses samples, now more, now less.

@@ -124,6 +124,7 @@ def record_command(report: PortReport) -> str:
     if line := report.line_settings:
         words += ["--baud", str(line.baud)] if line.baud != usual else []
         words += ["--parity", line.parity] if line.parity != "N" else []
+        words += ["--stop-bits", str(line.stop_bits)] if line.stop_bits != 1 else []
     for key, value in found.settings.items():
         words += ["--set", f"{key}={value}"]
     if found.rate_option:

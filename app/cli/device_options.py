@@ -63,7 +63,7 @@ class StandOptions:
     )
     clock_ppm: float = option("--clock-ppm", "How much the device's clock is fast (ppm).", 0.0)
     gauge: str | None = choice(
-        "--gauge", ("table", "relative"), "The only gauge (csv, modbus); both if absent."
+        "--gauge", ("table", "relative"), "The only gauge (csv, enod4, gsv-234, hbm-aed, modbus)."
     )
     lag_s: float = option("--lag", "How much older its readings are than they seem (s).", 0.0)
     rate_error: float = option("--rate-error", "Sample faster than stated, by this fraction.", 0.0)

@@ -81,6 +81,7 @@ def test_what_sends_by_itself_is_recognised_without_a_word(make, protocol, setti
         (open_tcp_port, "slipstand-binary", {}, "firmware simulated-1, 500 Hz"),
         pytest.param(open_pseudo_terminal, "harp", {}, "", marks=posix),
         (open_tcp_port, "dataq", {}, "DI-2108"),
+        (open_tcp_port, "enod4", {}, "an eNod4 with address 1: give its rate with --rate"),
         (open_tcp_port, "modbus", {}, "unit 1 answers: choose its register map with --set map=NAME"),
         (
             open_tcp_port,

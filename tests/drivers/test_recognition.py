@@ -16,6 +16,8 @@ DEVICES = {
     "gsv-2": ("gsv-234", {"format": "gsv-2"}),
     "dataq": ("dataq", {}),
     "hbm-aed": ("hbm-aed", {}),
+    "enod4": ("enod4", {}),
+    "enod4-data": ("enod4", {"checksum": "data"}),
     "openscale": ("csv", {"format": "openscale"}),
     "csv": ("csv", {"columns": "time_us,table,relative"}),
     "csv-ms": ("csv", {"columns": "time_ms,sequence,table,relative", "separator": "tab"}),
@@ -43,9 +45,10 @@ def test_each_device_is_known_by_its_bytes(name):
     assert (found.protocol, found.settings) == (protocol, given)
     assert found.share > 0.95
     assert found.rate_hz == pytest.approx(RATES_HZ[protocol], rel=0.01)
-    has_one = "value" in given.get("columns", "") or name in ("openscale", "gsv-3", "gsv-2", "hbm-aed")
+    one_gauge = ("openscale", "gsv-3", "gsv-2", "hbm-aed", "enod4", "enod4-data")
+    has_one = "value" in given.get("columns", "") or name in one_gauge
     assert found.channels == (1 if has_one else 2)
-    assert found.needs_rate == (name in ("csv-bare", "csv-crc"))
+    assert found.needs_rate == (name in ("csv-bare", "csv-crc", "enod4", "enod4-data"))
     assert bool(found.remark) == (name in ("harp", "gsv-4", "dataq"))
 
 

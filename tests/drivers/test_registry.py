@@ -23,6 +23,7 @@ def test_all_promised_names_are_there_in_order():
         ("csv", 115200),
         ("gsv", 115200),
         ("gsv-234", 115200),
+        ("enod4", 115200),
         ("dataq", 115200),
         ("modbus", 115200),
         ("hbm-aed", 9600),

@@ -108,6 +108,8 @@ def test_the_command_that_probe_prints_records_from_the_defaults_of_the_simulate
         command = shlex.split(found["speaks"]["command"].replace("PORT-OF-GAUGE-2", stands[-1].port))[1:]
         command += ["--calibration", stands[0].calibration] if stands[0].calibration else []
         command += ["--trigger-timeout", 60] if is_pair else []
+        if protocol == "enod4":  # whose remark says that the rate must be given
+            command += ["--rate", find_driver(protocol).simulated_rate_hz]
         wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
         recorded = slipstand(*command, "--directory", tmp_path, *wanted).json
         true = stands[0].truth().stand.friction_dynamic

@@ -36,3 +36,13 @@ WIRE = (
     one_gauge("openscale", OPENSCALE_FORMAT),
 )
 RECORDING = RecordingExample("CSV lines, time and two values")
+VARIANTS = {
+    "csv-polled": RecordingExample(
+        "two SCPI multimeters, lines that are asked for",
+        rates_hz=(5, 10, 20, 50, 100, 150, 200, 250),
+        is_exact=False,
+        polled_hz=20.0,
+        is_pair=True,
+        settings={"format": "scpi-read"},
+    )
+}
