@@ -310,8 +310,12 @@ def _scales(start: Parameters, order: int) -> Floats:
 
 
 def parameter_shift(found: OneMassFit, disturbance: Floats) -> Floats:
-    """Shift (10,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
-    places = used_places(found.parameters)
+    """Shift (10,) of the fitted parameters when `disturbance` (n,) is added to the readings.
+
+    x_k and n that are held at 0 stay there.
+    """
+    used = used_places(found.parameters)
+    places = [place for place in used if place not in (DAMPING, COULOMB) or found.parameters[place]]
     scale = _scales(found.parameters, found.order)[places]
     columns = gradient(found.parameters, found.channel.time_s, found.order, places) * scale
     shift = np.zeros(len(found.parameters))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
 from analysis.motion.one_mass import turning_magnitude
+from analysis.one_mass.drive import find_drive
 from analysis.one_mass.fit import (
     COULOMB,
     LINEAR_COUNT,
@@ -24,7 +25,7 @@ from analysis.one_mass.fit import (
     within_bounds,
 )
 from analysis.one_mass.halves import halves_agree, spread_of_halves
-from analysis.one_mass.parts import add_parts, parts_of
+from analysis.one_mass.parts import add_parts, parts_are_clear
 from analysis.one_mass.residuals import (
     COMPUTED,
     ResidualAssessment,
@@ -36,7 +37,7 @@ from analysis.one_mass.residuals import (
 from analysis.one_mass.turning_points import Crossings, find_crossings
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import check_gap, median_of_three
-from analysis.quantities import ResultWarning
+from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient
 from messages.i18n import N_
@@ -53,6 +54,10 @@ _AMPLITUDE = (1, 3, 4)  # places of swing, damping and friction; the frequency i
 _SIGMAS = 3.0
 _SPIKE_SIGMAS = 6.0
 _SPIKES_MAX = 0.02
+_PULLS_MAX = 3  # half cycles at the start that a hand may have moved
+_PULL_SEEN = 1.5  # residual of the first half cycle over that of all: free ones of other laws reach this too
+_PULL_OFF = 5.0  # the same over that of a decay fitted without it: they do not reach this
+_UNSEEN_MAX = 0.05  # of the swing: a second mode of this size biases T and n, so it must show
 _REST_READINGS_MIN = 8
 _STEPS_SEEN = 3.0  # swings under this many rounding steps look as if they stopped
 _BETTER = 0.5  # residual over that of the linear model; parts that leave more than noise must halve it
@@ -84,50 +89,111 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     readings = _without_single_spikes(readings, warnings)
     crossings = find_crossings(readings)
     check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
-    step = rounding_step(readings.value_m)
-    found = _fit_stretch(readings, crossings, order)
-    interval_s = float(np.median(np.diff(readings.time_s)))
-
-    def assess(one: OneMassFit) -> ResidualAssessment:
-        return assess_residuals(one.residual, interval_s, step, float(np.ptp(one.channel.value_m)))
-
-    found, noted = _refined(found, step, unit)
-    dies_away = _loss(found)[0] > 0.0
-    bounded = within_bounds(found) if dies_away else found
-    explained = 1.0 - found.cost / max(_scatter(found), 1e-300)
-    is_decay = dies_away and _PROMISING < explained < 1.0 - COMPUTED**2
-    richer = add_parts(found) if is_decay else found
-    if richer is not found:
-        whole = readings.between(float(found.channel.time_s[0]), math.inf)
-        whole = readings_before_stop(whole, richer.parameters)
-        richer, noted_richer = _refined(fit(whole, richer.parameters, order), step, unit)
-        bounded_richer = within_bounds(richer)
-        better = bounded_richer.rms < _BETTER * bounded.rms and _parts_are_clear(bounded_richer)
-        if better or assess(bounded_richer).adequate:
-            found, bounded, noted = richer, bounded_richer, noted_richer
-    verdict = assess(bounded)
-    warnings += noted
-    _refuse_what_is_no_decay(found, verdict)
-    viscous = fit(bounded.channel, bounded.parameters, order, held=(COULOMB,))
-    quiet = _quiet_after(readings, bounded, step, unit, warnings)
+    rounding = _Rounding(rounding_step(readings.value_m), unit)
+    found = _refined(_fit_stretch(readings, crossings, order), rounding)
+    if _loss(found.fit)[0] > 0.0:
+        found = _with_parts(readings, found, rounding)
+    verdict = _assess(found.bounded, rounding.step)
+    warnings += found.warnings
+    _refuse_what_is_no_decay(found.fit, verdict)
+    viscous = fit(found.bounded.channel, found.bounded.parameters, order, held=(COULOMB,))
+    doubts = _doubts(readings, found.bounded, verdict, rounding)
     if not verdict.adequate:
-        warnings += _second_mode(bounded, step, unit)
-    spread = None if verdict.adequate else spread_of_halves(bounded)
-    holds = quiet and spread is not None and halves_agree(bounded, spread)
-    adequate = verdict.adequate and quiet
-    return FreeDecayFit(bounded, viscous, verdict, adequate, spread, holds, unit, warnings)
+        warnings += _second_mode(found.bounded, rounding)
+    adequate = verdict.adequate and not doubts
+    spread = None if verdict.adequate else spread_of_halves(found.bounded)
+    holds = not doubts and spread is not None and halves_agree(found.bounded, spread)
+    return FreeDecayFit(found.bounded, viscous, verdict, adequate, spread, holds, unit, warnings + doubts)
 
 
-def _second_mode(found: OneMassFit, step: float, unit: str) -> list[ResultWarning]:
+@dataclass(frozen=True, slots=True)
+class _Rounding:
+    step: float  # of the readings; 0 where they are not rounded
+    unit: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Refined:
+    """A fit without spikes and without what rounding hides."""
+
+    fit: OneMassFit  # x_k and n may be negative
+    bounded: OneMassFit  # neither is
+    warnings: list[ResultWarning]
+
+
+def _with_parts(readings: Channel, linear: _Refined, rounding: _Rounding) -> _Refined:
+    """Fit with parts beyond a linear spring and damping where they explain the readings; else `linear`."""
+    found = linear.fit
+    explained = 1.0 - found.cost / max(_scatter(found), 1e-300)
+    richer = add_parts(found) if _PROMISING < explained < 1.0 - COMPUTED**2 else found
+    if richer is found:
+        return linear
+    whole = readings.between(float(found.channel.time_s[0]), math.inf)
+    whole = readings_before_stop(whole, richer.parameters)
+    refined = _refined(fit(whole, richer.parameters, found.order), rounding)
+    is_noise = _assess(refined.bounded, rounding.step).adequate
+    explains = is_noise or refined.bounded.rms < _BETTER * linear.bounded.rms
+    return refined if explains and parts_are_clear(refined.bounded) else linear
+
+
+def _assess(found: OneMassFit, step: float) -> ResidualAssessment:
+    interval_s = float(np.median(np.diff(found.channel.time_s)))
+    return assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+
+
+def _doubts(
+    readings: Channel, found: OneMassFit, verdict: ResidualAssessment, rounding: _Rounding
+) -> list[ResultWarning]:
+    """Findings beside which neither a fit that explains the readings holds, nor halves that agree."""
+    whole = readings.between(float(found.channel.time_s[0]), math.inf)
+    doubts = _unrest(readings, found, rounding)
+    if verdict.adequate:
+        return doubts + _hidden_modes(found, verdict, rounding)
+    return doubts + _drive(whole, found, rounding)
+
+
+def _hidden_modes(found: OneMassFit, verdict: ResidualAssessment, rounding: _Rounding) -> list[ResultWarning]:
+    """Whether the noise would hide what makes a decay no single one."""
+    swing = 0.5 * float(np.ptp(found.channel.value_m))
+    share = verdict.unseen / max(swing, 1e-300)
+    if share < _UNSEEN_MAX:
+        return []
+    return [
+        result_warning(
+            "noise-hides-modes",
+            "noise of {rms} would hide a second mode of {share:.2g} % of the swing: what fits may be no"
+            " single decay. Pull further, choose a finer range, or read more often.",
+            rms=format_with_unit(verdict.rms, rounding.unit),
+            share=100.0 * share,
+        )
+    ]
+
+
+def _drive(readings: Channel, found: OneMassFit, rounding: _Rounding) -> list[ResultWarning]:
+    drive = find_drive(readings, found, rounding.step)
+    if drive is None:
+        return []
+    return [
+        result_warning(
+            "steady-drive",
+            "a steady oscillation at {frequency_hz} Hz with {amplitude} goes on beside the decay: T and n of"
+            " a free decay cannot be told. Take a record after the release, with the drive off.",
+            frequency_hz=format_number(drive.frequency_hz),
+            amplitude=format_with_unit(drive.amplitude, rounding.unit),
+        )
+    ]
+
+
+def _second_mode(found: OneMassFit, rounding: _Rounding) -> list[ResultWarning]:
     period_s = found.parameters.period_s
-    line = find_second_mode(found.channel.time_s, found.residual, period_s, step)
+    line = find_second_mode(found.channel.time_s, found.residual, period_s, rounding.step)
     if line is None:
         return []
     text = message(
         "the residual oscillates at {frequency_hz} Hz with {amplitude}, beside the decay at {period_s} Hz"
         " ({share:.2g} % of its swing): a second mode, or hum. Tighten what is mounted, ground the cables.",
         frequency_hz=format_number(line.frequency_hz),
-        amplitude=format_with_unit(line.amplitude, unit),
+        amplitude=format_with_unit(line.amplitude, rounding.unit),
         period_s=format_number(1.0 / period_s),
         share=200.0 * line.amplitude / float(np.ptp(found.channel.value_m)),
     )
@@ -150,7 +216,7 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
             period_s=format_number(crossings.period_s),
             periods_min=PERIODS_MIN,
         )
-    found = fit_with_friction(free, crossings.period_s, order)
+    found, start_s = _fit_from_passage(readings, start_s, crossings.period_s, order)
     first_s = found.parameters.from_turning_point_before(start_s).turning_s
     earlier = readings.between(first_s, start_s)
     if len(earlier) < 2:
@@ -160,6 +226,45 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
         return found  # the earlier readings lie farther from the curve than the others
     longer = readings_before_stop(readings.between(first_s, math.inf), found.parameters)
     return fit(longer, found.parameters, order)
+
+
+def _fit_from_passage(
+    readings: Channel, start_s: float, period_s: float, order: int
+) -> tuple[OneMassFit, float]:
+    """Fit from `start_s`, or from later half cycles on where the first are not of that decay; and its start.
+
+    A hand that pulls the mass through its middle begins before it swings freely. Raises RecordError where no
+    decay begins at any of them.
+    """
+    found, refusals = None, []
+    for number in range(_PULLS_MAX + 1):
+        later_s = start_s + 0.5 * period_s * number
+        if number and float(readings.time_s[-1]) - later_s < (PERIODS_MIN + 0.25) * period_s:
+            break
+        try:
+            later = fit_with_friction(readings.between(later_s, math.inf), period_s, order)
+        except RecordError as error:
+            refusals.append(error)
+            continue
+        if found is not None and not _is_pull(readings.between(found[1], later_s), later):
+            break
+        found = later, later_s
+        first = later.channel.time_s < later_s + 0.5 * period_s
+        if not first.any() or _rms(later.residual[first]) < _PULL_SEEN * later.rms:
+            break
+    if found is None:
+        raise refusals[0]
+    return found
+
+
+def _is_pull(before: Channel, found: OneMassFit) -> bool:
+    """Tell whether readings before those fitted are far off the same decay, traced back."""
+    off = before.value_m - curve(found.parameters, before.time_s, found.order)
+    return len(before) > 0 and _rms(off) > _PULL_OFF * found.rms
+
+
+def _rms(values: Floats) -> float:
+    return math.sqrt(float(np.mean(values**2)))
 
 
 def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> Channel:
@@ -173,20 +278,14 @@ def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> 
     return _left_out(readings, off > reach, warnings) if reach > 0.0 else readings
 
 
-def _parts_are_clear(found: OneMassFit) -> bool:
-    """Tell whether each part is well above its uncertainty, correlated noise included."""
-    limit = _SIGMAS * math.sqrt(found.noise_factor)
-    places = (part.place for part in parts_of(found.parameters))
-    return all(abs(found.parameters[place]) > limit * found.uncertainty(place) for place in places)
-
-
-def _refined(found: OneMassFit, step: float, unit: str) -> tuple[OneMassFit, list[ResultWarning]]:
-    """Fit again without spikes, and without what rounding to `step` hides."""
+def _refined(found: OneMassFit, rounding: _Rounding) -> _Refined:
+    """Fit again without spikes, and without what rounding hides."""
     warnings: list[ResultWarning] = []
     found = _refit_without_spikes(found, warnings)
-    if is_rounding(found.rms, step):
-        found = _refit_above_rounding(found, step, unit, warnings)
-    return found, warnings
+    if is_rounding(found.rms, rounding.step):
+        found = _refit_above_rounding(found, rounding, warnings)
+    bounded = within_bounds(found) if _loss(found)[0] > 0.0 else found
+    return _Refined(found, bounded, warnings)
 
 
 def _refit_without_spikes(found: OneMassFit, warnings: list[ResultWarning]) -> OneMassFit:
@@ -207,17 +306,17 @@ def _left_out(readings: Channel, spikes: NDArray[np.bool_], warnings: list[Resul
 
 
 def _refit_above_rounding(
-    found: OneMassFit, step: float, unit: str, warnings: list[ResultWarning]
+    found: OneMassFit, rounding: _Rounding, warnings: list[ResultWarning]
 ) -> OneMassFit:
     """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
-    limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
+    limit = _STEPS_SEEN * rounding.step / found.parameters.omega_rad_per_s**found.order
     above = readings_before_amplitude(limit, found.channel, found.parameters)
     if len(above) == len(found.channel):
         return found
     text = message(
         "readings come in steps of {step}: what swings under {steps_seen:g} of them was not fitted,"
         " since rounding looks like friction there. Choose a finer range.",
-        step=format_with_unit(step, unit),
+        step=format_with_unit(rounding.step, rounding.unit),
         steps_seen=_STEPS_SEEN,
     )
     warnings.append(ResultWarning("coarse-steps", text))
@@ -299,30 +398,27 @@ def _loss_with_parts(found: OneMassFit) -> tuple[float, float]:
     return loss(), math.sqrt(max(0.0, float(slopes @ found.covariance @ slopes)))
 
 
-def _quiet_after(
-    readings: Channel, found: OneMassFit, step: float, unit: str, warnings: list[ResultWarning]
-) -> bool:
-    """Tell whether, a period after the fitted stretch, the mass rests near its middle.
+def _unrest(readings: Channel, found: OneMassFit, rounding: _Rounding) -> list[ResultWarning]:
+    """Whether, a period after the fitted stretch, the mass does not rest near its middle.
 
     Static friction may hold it anywhere inside 3 x_k, where the fitted stretch ends; below a few rounding
     steps it may still swing.
     """
     after = readings.between(float(found.channel.time_s[-1]) + found.parameters.period_s, math.inf)
     if len(after) < _REST_READINGS_MIN:
-        return True
+        return []
     level = float(np.median(after.value_m))
     spread = 1.4826 * float(np.median(np.abs(after.value_m - level)))
     reach = max(found.parameters.coulomb, 0.0) * found.parameters.omega_rad_per_s**found.order
-    unseen = _STEPS_SEEN * step
+    unseen = _STEPS_SEEN * rounding.step
     quiet = spread <= math.hypot((1.0 + _SIGMAS / math.sqrt(len(after))) * found.rms, 0.25 * reach) + unseen
     centred = abs(level - found.parameters.offset) <= 3.0 * (reach + found.rms) + unseen
     if quiet and centred:
-        return True
+        return []
     text = message(
         "after its decay the mass is {level} off and moves by {spread}: it was touched, or released"
         " twice. Take one release only.",
-        level=format_with_unit(level - found.parameters.offset, unit),
-        spread=format_with_unit(spread, unit),
+        level=format_with_unit(level - found.parameters.offset, rounding.unit),
+        spread=format_with_unit(spread, rounding.unit),
     )
-    warnings.append(ResultWarning("moves-again", text))
-    return False
+    return [ResultWarning("moves-again", text)]

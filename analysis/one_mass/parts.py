@@ -21,6 +21,7 @@ from messages.i18n import N_
 
 _EVIDENCE = 10.0  # fall of BIC that is very strong evidence (Kass and Raftery 1995)
 _CLOSE = 0.02  # residual, of the swing, above which the first order says little
+_SIGMAS = 3.0  # of each part above its uncertainty
 _TRIALS = 2  # parts that are fitted in each round: those with the best first-order scores
 
 
@@ -59,6 +60,13 @@ PARTS = (
 def parts_of(parameters: Parameters) -> tuple[Part, ...]:
     """Parts that a fit holds."""
     return tuple(part for part in PARTS if parameters[part.place] != 0.0)
+
+
+def parts_are_clear(found: OneMassFit) -> bool:
+    """Tell whether each part is well above its uncertainty, correlated noise included."""
+    limit = _SIGMAS * math.sqrt(found.noise_factor)
+    places = (part.place for part in parts_of(found.parameters))
+    return all(abs(found.parameters[place]) > limit * found.uncertainty(place) for place in places)
 
 
 def add_parts(found: OneMassFit) -> OneMassFit:
@@ -116,10 +124,10 @@ def _score(found: OneMassFit, part: Part) -> float:
 
 
 def _with_part(best: _Candidate, part: Part) -> _Candidate | None:
-    """Fit with one more part; None where that fails, or damping would fall with the velocity."""
+    """Fit with one more part; None where that fails, a part is unclear, or drag drives."""
     start = best.bounded
     try:
         richer = _Candidate(fit(start.channel, start.parameters, start.order, parts=(part.place,)))
     except (RecordError, np.linalg.LinAlgError):
         return None
-    return None if richer.bounded.parameters.drag < 0.0 else richer
+    return richer if richer.bounded.parameters.drag >= 0.0 and parts_are_clear(richer.bounded) else None

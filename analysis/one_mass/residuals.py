@@ -56,6 +56,12 @@ class ResidualAssessment:
     rms: float
     noise: float  # root mean square of their part which neighbours do not share
     line: SpectralLine | None
+    count: int
+
+    @property
+    def unseen(self) -> float:
+        """Amplitude of the largest line that noise of this size hides."""
+        return 2.0 * self.rms * math.sqrt(math.log(max(1, self.count // 2) / _RARE) / max(1, self.count))
 
 
 def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:
@@ -71,15 +77,15 @@ def assess_residuals(residual: Floats, interval_s: float, step: float, swing: fl
     rms = math.sqrt(float(np.mean(residual**2)))
     noise = math.sqrt(0.5 * float(np.mean(np.diff(residual) ** 2)))
     if rms < COMPUTED * swing:
-        return ResidualAssessment(adequate=True, rms=rms, noise=noise, line=None)
+        return ResidualAssessment(adequate=True, rms=rms, noise=noise, line=None, count=len(residual))
     power = _ordinates(residual)
     line = _strongest_line(residual, power, interval_s)
     if is_rounding(rms, step):
         line = line if line is not None and line.amplitude > _ROUNDED_LINE * step else None
-        return ResidualAssessment(line is None, rms, noise, line)
+        return ResidualAssessment(line is None, rms, noise, line, len(residual))
     small = rms**2 <= noise**2 * (1.0 + _BAND / math.sqrt(len(residual)))
     adequate = small and line is None and _is_flat(power) and _is_even(residual)
-    return ResidualAssessment(adequate, rms, noise, line)
+    return ResidualAssessment(adequate, rms, noise, line, len(residual))
 
 
 def find_second_mode(time_s: Floats, residual: Floats, period_s: float, step: float) -> SpectralLine | None:

@@ -208,9 +208,7 @@ def test_stated_uncertainties_reach_the_budget():
 
 
 def test_nonlinearity_share_is_what_such_a_gauge_does():
-    truth = Truth(
-        coulomb=0.005, offset=0.0
-    )  # x_k off its bound; the bend is below the noise: else it would be fitted as a spring that softens
+    truth = Truth(offset=0.0)  # the bend is below the noise: else it would be fitted as a spring that softens
     time_s, value = readings(truth)
     bent = value + 2e-6 * (4 * (value / value.max()) ** 3 - 3 * value / value.max())
     record = single_channel(time_s, value).replace(table_gauge=GaugeUncertainty(nonlinearity_m=2e-6))
@@ -346,6 +344,19 @@ def test_what_one_decay_does_not_explain_is_never_a_bare_number(kind):
         return
     assert not result.model.adequate
     assert "model-inadequate" in [caution.code for caution in result.warnings]
+
+
+def test_air_drag_is_identified():
+    """1 / (1 + k t) is the swing that quadratic drag of 3 pi k / 4 w leaves, with no other damping."""
+    result = identify_one_mass(
+        single_channel(TIME_S, np.cos(OMEGA * TIME_S) / (1.0 + 0.5 * TIME_S) + noise(6))
+    )
+    drag = result.results["drag_per_m"]
+
+    assert result.model.parts == ("drag",)
+    assert "drag" in [caution.code for caution in result.warnings]
+    assert abs(drag.value - 3.0 * math.pi * 0.5 / 4.0 / OMEGA) < 3.0 * drag.standard_uncertainty
+    assert drag.standard_uncertainty < 0.1 * drag.value
 
 
 def test_a_second_mode_is_named():
