@@ -25,8 +25,11 @@ _HALF_CYCLES_MIN = 4
 _STOPS_TRIED = 3
 _GROWTH = 20.0  # largest natural logarithm by which a trial swing may grow over the record
 _FAR = 1e12  # residual, in units of the swing, of impossible trial parameters
-_TRIALS_MAX = 30  # curves that a fit with a numerical motion may compute, each with its derivatives
+_LINEAR_LIMITS = {"max_nfev": 100}
+_NUMERICAL_LIMITS = {"max_nfev": 30, "ftol": 1e-6, "xtol": 1e-6}
+"""Curves that a fit may compute, each with its derivatives; a numerical motion is some 1e-7 exact."""
 _DIFFERENCE = 1e-5  # step of numerical derivatives, in natural sizes of the parameters
+_CHANGES_FREQUENCY = (2, 3, 6, 7)  # places of the parameters whose effect grows with the angle swung through
 
 
 class Parameters(NamedTuple):
@@ -258,7 +261,7 @@ def _fit(channel: Channel, start: Parameters, order: int, free: list[int]) -> On
         slopes,
         method="lm",
         x_scale="jac",
-        max_nfev=100 if start.is_linear else _TRIALS_MAX,
+        **_LINEAR_LIMITS if start.is_linear else _NUMERICAL_LIMITS,
     )
     parameters = unpack(found.x)
     residual = channel.value_m - curve(parameters, channel.time_s, order)
@@ -278,11 +281,20 @@ def used_places(parameters: Parameters, *parts: int) -> list[int]:
 
 def gradient(parameters: Parameters, time_s: Floats, order: int, places: Sequence[int]) -> Floats:
     """Derivatives (n, k) of the curve by the parameters at k `places`."""
-    one = _complex_step if parameters.is_linear and max(places) < LINEAR_COUNT else _difference
     columns = np.ones((len(time_s), len(places)))
+    if parameters.is_linear and max(places) < LINEAR_COUNT:
+        for column, place in enumerate(places):
+            if place != OFFSET:
+                columns[:, column] = _complex_step(parameters, time_s, order, place)
+        return columns
+    motion = np.array(parameters.motion)
+    here = nonlinear_decay(time_s, motion, order)
+    steps = _difference_steps(parameters, time_s)
     for column, place in enumerate(places):
         if place != OFFSET:
-            columns[:, column] = one(parameters, time_s, order, place)
+            stepped = motion.copy()
+            stepped[place - (place > OFFSET)] += steps[place]
+            columns[:, column] = (nonlinear_decay(time_s, stepped, order) - here) / steps[place]
     return columns
 
 
@@ -292,14 +304,12 @@ def _complex_step(parameters: Parameters, time_s: Floats, order: int, place: int
     return np.asarray(free_decay(time_s, *stepped, order=order).imag / _STEP)
 
 
-def _difference(parameters: Parameters, time_s: Floats, order: int, place: int) -> Floats:
-    step = _DIFFERENCE * float(_scales(parameters, order)[place])
-    sides = []
-    for shift in (step, -step):
-        motion = np.array(parameters.motion)
-        motion[place - (place > OFFSET)] += shift
-        sides.append(nonlinear_decay(time_s, motion, order))
-    return np.asarray((sides[0] - sides[1]) / (2.0 * step))
+def _difference_steps(parameters: Parameters, time_s: Floats) -> Floats:
+    """Steps (10,) of numerical derivatives: no phase shifts by much over the record."""
+    steps = _DIFFERENCE * _scales(parameters, 0)
+    angle = parameters.omega_rad_per_s * float(time_s[-1] - time_s[0])
+    steps[list(_CHANGES_FREQUENCY)] /= max(1.0, angle)
+    return steps
 
 
 def _scales(start: Parameters, order: int) -> Floats:
