@@ -265,6 +265,7 @@ CATALOGUE: Final = (
     _Row("damping_n2_per_s", Symbol("n", "2"), "1/s", N_("damping, table alone"), PER_SECOND,
          column=TableColumn(6, "damping_n2_per_s", is_of_stand=True)),
     _Row("damping_n_per_s", Symbol("n"), "1/s", N_("damping"), PER_SECOND),
+    _Row("damping_mean_per_s", Symbol("n", "m"), "1/s", N_("mean damping of the record"), PER_SECOND),
     _Row("stiffness_n_per_m", Symbol("c"), "N/m", N_("stiffness"), Unit("N/m"),
          {Place.WINDOW: Unit("kN/m", 1e-3)}, column=TableColumn(2, "stiffness_as_printed", is_of_stand=True)),
     _Row("damping_coefficient_kg_per_s", Symbol("μ", ascii="mu"), "kg/s", N_("damping coefficient"),

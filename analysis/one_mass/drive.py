@@ -21,7 +21,6 @@ _TRIALS_MAX = 40
 _BAND = (0.5, 2.0)  # of the decay's frequency: a drive beyond it shows as a second mode
 _PARAMETERS = 3  # more than those of the decay: swing, phase and frequency of the drive
 _EVIDENCE = 10.0  # fall of BIC that is very strong evidence (Kass and Raftery 1995)
-_FAR_BETTER = 0.25  # residual over that of the decay alone; free decays of known origin leave over 0.56
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +35,12 @@ def find_drive(readings: Channel, found: OneMassFit, step: float) -> SteadyDrive
     """Find the steady sine that explains what the decay `found` leaves of `readings`, rounded to `step`.
 
     `readings` begin with those fitted and may go on beyond them: a drive does not stop. None where a decay
-    with viscous damping beside a steady sine leaves neither noise nor far less.
+    with viscous damping beside a steady sine does not leave noise.
     """
     stride = -(-len(readings) // _READINGS_MAX)
     thinned = Channel(readings.time_s[::stride], readings.value_m[::stride])
     drive, residual = _fit(thinned, found.parameters.omega_rad_per_s)
     ratio = math.sqrt(float(np.mean(residual**2))) / max(found.rms, 1e-300)
-    if ratio < _FAR_BETTER:
-        return drive
     interval_s = float(np.median(np.diff(thinned.time_s)))
     effective = len(thinned) / found.noise_factor
     gains = -2.0 * effective * math.log(ratio) > _PARAMETERS * math.log(effective) + _EVIDENCE

@@ -56,7 +56,8 @@ _SPIKE_SIGMAS = 6.0
 _SPIKES_MAX = 0.02
 _PULLS_MAX = 3  # half cycles at the start that a hand may have moved
 _PULL_SEEN = 1.5  # residual of the first half cycle over that of all: free ones of other laws reach this too
-_PULL_OFF = 5.0  # the same over that of a decay fitted without it: they do not reach this
+_PULL_OFF = 0.4  # residual of what a hand moved, over the swing: drag leaves up to 0.26
+_PULL_OUTLIES = 5.0  # the same over that of the decay without it: pendulums from up to 2.5 rad leave 4
 _UNSEEN_MAX = 0.05  # of the swing: a second mode of this size biases T and n, so it must show
 _REST_READINGS_MIN = 8
 _STEPS_SEEN = 3.0  # swings under this many rounding steps look as if they stopped
@@ -259,8 +260,10 @@ def _fit_from_passage(
 
 def _is_pull(before: Channel, found: OneMassFit) -> bool:
     """Tell whether readings before those fitted are far off the same decay, traced back."""
-    off = before.value_m - curve(found.parameters, before.time_s, found.order)
-    return len(before) > 0 and _rms(off) > _PULL_OFF * found.rms
+    if not len(before):
+        return False
+    off = _rms(before.value_m - curve(found.parameters, before.time_s, found.order))
+    return off > max(_PULL_OUTLIES * found.rms, _PULL_OFF * 0.5 * float(np.ptp(found.channel.value_m)))
 
 
 def _rms(values: Floats) -> float:

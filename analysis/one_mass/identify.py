@@ -14,7 +14,7 @@ from analysis.identification import Curves, Degree, Events, Identification, Mode
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass.fit import COULOMB, OneMassFit, Parameters, curve, parameter_shift
 from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
-from analysis.one_mass.parts import Part, parts_of
+from analysis.one_mass.parts import Part, mean_damping, parts_of
 from analysis.one_mass.turning_points import classical_log_decrement, find_turning_points
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
@@ -212,7 +212,13 @@ def _functions(found: OneMassFit, *, with_mass: bool) -> dict[str, Callable[[Flo
     def of_part(part: Part) -> Callable[[Floats], float]:
         return lambda point: part.size(Parameters(*point[:-1].tolist()))
 
-    parts = {part.result: of_part(part) for part in parts_of(found.parameters)}
+    def mean(point: Floats) -> float:
+        return mean_damping(Parameters(*point[:-1].tolist()), *found.channel.time_s[[0, -1]].tolist())
+
+    present = parts_of(found.parameters)
+    parts = {part.result: of_part(part) for part in present}
+    if not all(part.bends_spring for part in present):
+        parts["damping_mean_per_s"] = mean
     return _QUANTITIES | parts | (_WITH_MASS if with_mass else {})
 
 

@@ -11,6 +11,7 @@ from analysis.one_mass.fit import (
     DAMPING,
     OneMassFit,
     Parameters,
+    envelope,
     fit,
     gradient,
     used_places,
@@ -22,6 +23,10 @@ from messages.i18n import N_
 _EVIDENCE = 10.0  # fall of BIC that is very strong evidence (Kass and Raftery 1995)
 _CLOSE = 0.02  # residual, of the swing, above which the first order says little
 _SIGMAS = 3.0  # of each part above its uncertainty
+_MEAN_TIMES, _MEAN_TRIALS = (
+    400,
+    8,
+)  # times at which the swing is taken for the mean damping; Gauss-Newton steps
 _TRIALS = 2  # parts that are fitted in each round: those with the best first-order scores
 
 
@@ -60,6 +65,23 @@ PARTS = (
 def parts_of(parameters: Parameters) -> tuple[Part, ...]:
     """Parts that a fit holds."""
     return tuple(part for part in PARTS if parameters[part.place] != 0.0)
+
+
+def mean_damping(parameters: Parameters, start_s: float, end_s: float) -> float:
+    """Damping constant (1/s) of the exponential nearest to the swing between two times.
+
+    Dry friction is left out. It is what a fit with viscous damping alone gives: n of the swings that count
+    most in least squares.
+    """
+    time_s = np.linspace(start_s, end_s, _MEAN_TIMES)
+    swing = envelope(parameters._replace(coulomb=0.0), time_s)
+    since_s, damping, first = time_s - start_s, math.log(swing[0] / swing[-1]) / (end_s - start_s), swing[0]
+    for _ in range(_MEAN_TRIALS):
+        fading = np.exp(-damping * since_s)
+        columns = np.column_stack((fading, -first * since_s * fading))
+        steps = np.linalg.lstsq(columns, swing - first * fading, rcond=None)[0]
+        first, damping = first + steps[0], damping + steps[1]
+    return float(damping)
 
 
 def parts_are_clear(found: OneMassFit) -> bool:
@@ -124,10 +146,10 @@ def _score(found: OneMassFit, part: Part) -> float:
 
 
 def _with_part(best: _Candidate, part: Part) -> _Candidate | None:
-    """Fit with one more part; None where that fails, a part is unclear, or drag drives."""
+    """Fit with one more part; None where that fails, or damping would fall with the velocity."""
     start = best.bounded
     try:
         richer = _Candidate(fit(start.channel, start.parameters, start.order, parts=(part.place,)))
     except (RecordError, np.linalg.LinAlgError):
         return None
-    return richer if richer.bounded.parameters.drag >= 0.0 and parts_are_clear(richer.bounded) else None
+    return None if richer.bounded.parameters.drag < 0.0 else richer

@@ -83,6 +83,7 @@ def test_springs_that_harden_or_soften_give_the_period_of_small_swings(hardening
     found = identified(cubic_per_m2=hardening / SWING_M**2)
 
     assert found.model.parts == ("spring-hardening",)
+    assert "damping_mean_per_s" not in found.results
     for name, true in (("spring_hardening", hardening), ("period_s", PERIOD_S)):
         assert_holds(found, name, true)
 
@@ -95,7 +96,7 @@ def test_damping_that_rises_with_the_square_of_the_swing():
     assert_holds(found, "damping_n_per_s", DAMPING_PER_S)
 
 
-@pytest.mark.parametrize("swing_rad", [0.5, 0.8, 1.5])
+@pytest.mark.parametrize("swing_rad", [0.5, 0.8, 1.5, 2.2])
 def test_a_pendulum_is_identified_beyond_small_angles(swing_rad):
     omega = 2.0 * math.pi
 
@@ -119,6 +120,23 @@ def test_pure_drag_is_a_decay():
     assert found.model.parts == ("drag",)
     assert_holds(found, "drag_per_m", 4.0)
     assert_holds(found, "damping_n_per_s", 0.0)
+
+
+@pytest.mark.parametrize("loss", [{"drag_per_m": 8.0}, {"rise_per_m2": 2.0 / SWING_M**2}])
+def test_mean_damping_is_that_of_the_nearest_exponential(loss):
+    """n is that of small swings, far below the damping that a reader of such a record would give."""
+    found = identified(**loss, noise=1e-4)
+    time_s = np.arange(0.0, 5.0, 0.005)
+    damping = found.results["damping_mean_per_s"]
+
+    def decay(t, swing, n, omega, phase):
+        return swing * np.exp(-n * t) * np.cos(omega * t + phase)
+
+    start = (SWING_M, 2.0 * DAMPING_PER_S, 2.0 * math.pi / PERIOD_S, 0.0)
+    nearest, _ = curve_fit(decay, time_s, found.curves(time_s).table_displacement_m, start)
+    assert damping.value == pytest.approx(nearest[1], rel=0.02)
+    assert damping.value > 1.2 * found.results["damping_n_per_s"].value
+    assert damping.standard_uncertainty < found.results["damping_n_per_s"].standard_uncertainty
 
 
 @pytest.mark.parametrize("seed", range(6))
