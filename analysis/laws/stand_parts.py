@@ -26,6 +26,7 @@ from analysis.motion.events import (
 )
 from analysis.motion.stand_motion import (
     ACCELERATION,
+    BASE_ACCELERATION,
     SLIP,
     SLIP_RATE,
     STAND_PARAMETER_COUNT,
@@ -238,7 +239,8 @@ class StandSolver(MotionSolver):
         _, nodes = self.kernels.integrate(vector, duration_s)
         arc = vector[len(vector) - STAND_PARAMETER_COUNT + StandParameter.ARC]
         vertical = arc * (nodes[:, VELOCITY] ** 2 + nodes[:, TABLE] * nodes[:, ACCELERATION])
-        load = vector[GRAVITY] * vector[TILT] - nodes[:, ACCELERATION] - nodes[:, SLIP_RATE]
+        table = nodes[:, ACCELERATION] + nodes[:, BASE_ACCELERATION]
+        load = vector[GRAVITY] * vector[TILT] - table - nodes[:, SLIP_RATE]
         force = np.abs(load / (vector[GRAVITY] + vertical)) * np.abs(nodes[:, SLIP])
         steps_s = np.diff(nodes[:, TIME])
         path = float(steps_s @ (np.abs(nodes[1:, SLIP]) + np.abs(nodes[:-1, SLIP])))

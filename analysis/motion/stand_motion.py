@@ -129,8 +129,9 @@ _EVENT_STEPS = 40  # of the search for the time of an event; its bracket is halv
 _GRAZING_DIVISIONS = 4  # of a first step of a slip that seems to end within it, each to a quarter
 _ESCAPE, _ESCAPE_M = 10.0, 0.1
 """A table farther off than this, in pullbacks and metres, does not come back: its springs pull no more."""
-TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE = range(7)
-"""Columns of a node: time since release, u1 with its derivatives, and u2 - u1 with its derivatives."""
+TIME, TABLE, VELOCITY, ACCELERATION, RELATIVE, SLIP, SLIP_RATE, BASE_ACCELERATION = range(8)
+"""Columns of a node: time since release, u1 with its derivatives, u2 - u1 with its derivatives, and the
+acceleration of the base, against which u1 is."""
 FIRST_NODE = 5  # column of a phase beside those of `events`: row of its first node
 _STATE = 9
 """u1, u1', u2' - u1', u2 - u1, then displacement and velocity of the second mode on the table and of the
@@ -327,7 +328,7 @@ def demand(
 
 
 def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
-    """Phases (m, 6) and nodes (k, 7) from the release to `duration_s`.
+    """Phases (m, 6) and nodes (k, 8) from the release to `duration_s`.
 
     Phases are as `integrate_events` gives them, with the row of their first node.
     """
@@ -335,7 +336,7 @@ def integrate(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     longest, longest_at_rest = longest_steps(parameters, parts)
     size, pull, deflected = state_size(parts), abs(parameters[PULLBACK]), parts[PRESLIDING]
     is_dry = parts[STAND_FRICTION] != 0.0 or parts[LOSS_FACTOR] != 0.0
-    phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 7))
+    phases, nodes = np.empty((64, 6)), np.empty((256 + int(min(2.0 * duration_s / longest, _NODES_MOST)), 8))
     state, trial, slopes = np.zeros(_STATE), np.zeros(_STATE), np.zeros((5, _STATE))
     state[0], state[1] = parameters[PULLBACK], parts[START_VELOCITY] + parts[HOLD_CREEP]
     time, path, began, count, node = 0.0, 0.0, 0.0, 0, 0
@@ -511,6 +512,7 @@ def _append_node(nodes: Floats, count: int, time: float, state: Floats, rates: F
     row = nodes[count]
     row[TIME], row[TABLE], row[VELOCITY], row[ACCELERATION] = time, state[0], state[1], rates[1]
     row[RELATIVE], row[SLIP], row[SLIP_RATE] = state[3], state[2], rates[2]
+    row[BASE_ACCELERATION] = rates[7]
     return nodes
 
 
