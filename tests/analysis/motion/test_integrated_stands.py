@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from analysis.laws.stand_parts import stand_displacements
-from analysis.motion.stand_motion import INTEGRATION_ERROR_M
+from analysis.laws.catalogue import PARAMETER_COUNT
+from analysis.laws.coulomb import COULOMB
+from analysis.laws.parameters import MOTION_PARAMETER_COUNT
+from analysis.laws.stand_parts import STAND_PLACES, compose, effects_by_name, stand_displacements
+from analysis.motion.stand_motion import INTEGRATION_ERROR_M, STAND_PARAMETER_COUNT
 from analysis.motion.two_mass import TwoMassParameters
 from benchmarks.real_stand import REL, RealStand, U
 
@@ -67,6 +70,24 @@ def test_a_soft_base_moves_as_that_of_an_independent_integrator():
     table, relative = stand_displacements(parameters(), effects, 5.1)(TIMES_S)
     np.testing.assert_allclose(table[moving], state[U], atol=2.0 * INTEGRATION_ERROR_M)
     np.testing.assert_allclose(relative[moving], state[REL], atol=2.0 * INTEGRATION_ERROR_M)
+
+
+def test_mean_friction_on_a_moving_base_is_that_over_the_slid_path():
+    stand = RealStand(film_s_per_m=1.5, base_compliance=0.03, base_mass_kg=500.0, base_damping_ratio=0.05)
+    frequency_hz = math.sqrt(parameters(0.1).stiffness_n_per_m / 0.03 / 500.0) / (2.0 * math.pi)
+    effects = effects_by_name(("film", "base"))
+    values = {
+        "film_s_per_m": 1.5,
+        "base_compliance": 0.03,
+        "base_frequency_hz": frequency_hz,
+        "base_damping": 0.05,
+    }
+    point = np.zeros(PARAMETER_COUNT + STAND_PARAMETER_COUNT)
+    point[:MOTION_PARAMETER_COUNT] = parameters(0.1).vector()
+    for name, value in values.items():
+        point[PARAMETER_COUNT + STAND_PLACES[name]] = value
+    found = compose(COULOMB, effects).mean_friction(point, 5.1)
+    assert found == pytest.approx(stand.simulate(5.1).friction_dynamic, rel=2e-4)
 
 
 def test_a_table_that_creeps_in_its_hold_leaves_it_with_that_velocity():
