@@ -3,6 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# Tests wait for child processes now and then: one worker more than there are processors.
+TEST_WORKERS = $(shell $(PYTHON) -c 'import os; print(1 + (os.cpu_count() or 1))')
+# Without bytecode on disk each of some thousand child processes compiles its modules again.
+unexport PYTHONDONTWRITEBYTECODE
 
 # What Qt 6 needs of the system on Debian and Ubuntu, and the virtual-environment module their Python lacks.
 QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0 \
@@ -11,7 +15,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 # What compiles the Arduino firmware, and the simulator that its tests run it in.
 FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 
-.PHONY: translations help setup run test lint bench bench-recording bench-desktop peers screenshots study drill lock system-libraries firmware firmware-tools
+.PHONY: translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers screenshots study drill lock system-libraries firmware firmware-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -72,17 +76,26 @@ run: setup
 		$(BIN)/slipstand demo; \
 	fi
 
-test: setup
-	$(BIN)/python -m pytest tests -m "not realtime" -n auto --dist loadfile
+test: compiled
+	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile
 	$(BIN)/python -m pytest tests -m realtime -n 3 --dist loadfile
 
-lint: setup
+# Once, before processes that start at once would each do it.
+compiled: setup
+	@$(BIN)/python -m tools.compile_all
+
+lint: types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	@for system in win32 darwin; do \
-		$(BIN)/mypy --platform $$system --no-warn-unreachable --cache-dir .mypy_cache/$$system || exit 1; done
 	$(BIN)/lint-imports
+
+types: types-host types-win32 types-darwin
+
+types-host: setup
+	$(BIN)/mypy
+
+types-win32 types-darwin: types-%: setup
+	$(BIN)/mypy --platform $* --no-warn-unreachable --cache-dir .mypy_cache/$*
 
 bench: setup
 	@for script in benchmarks/solver.py benchmarks/identification.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done

@@ -1,8 +1,10 @@
 """Shared by all tests: no window system is needed, and warnings are errors (pyproject.toml)."""
 
+import gc
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import hypothesis
 import pytest
@@ -46,6 +48,13 @@ def use_language() -> Iterator[Callable[[str], None]]:
     i18n.use_language(i18n.ENGLISH)
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import no other file for the tests in real time: three workers would each do it, for half a minute."""
+    is_test = collection_path.name.startswith("test_") and collection_path.suffix == ".py"
+    is_left_out = is_test and collection_path.name not in REALTIME_FILES
+    return True if is_left_out and config.getoption("markexpr") == "realtime" else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what runs in real time, and what meets a program that is not ours: `make peers` runs these."""
     for item in items:
@@ -53,3 +62,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.realtime)
         if "_peer" in item.path.stem or item.path.parent.name == "firmware":
             item.add_marker(pytest.mark.peer)
+
+
+def pytest_collection_finish() -> None:
+    """Let garbage collections pass over what imports and collected tests hold: most of all objects."""
+    gc.collect()
+    gc.freeze()

@@ -1,5 +1,7 @@
 """Masses that contradict the motion are reported, with masses that would explain it."""
 
+from functools import cache
+
 import pytest
 from synthetic import Truth, simulate_record
 
@@ -7,6 +9,7 @@ from analysis.identify import identify
 from analysis.record import StandMasses
 
 
+@cache
 def cautions_for(given_table_kg, given_plate_kg, **truth):
     made = simulate_record(
         Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3)

@@ -97,7 +97,7 @@ def test_a_run_that_fails_does_not_stop_the_rest(slipstand: Any, simulated_run: 
 def test_saved_results_stand_beside_earlier_ones(slipstand: Any, simulated_run: Path) -> None:
     samples = open_run(simulated_run).table_reading.copy()
     assert slipstand("analyze", simulated_run, "--save", "--model", "coulomb").code == 0
-    assert slipstand("analyze", simulated_run, "--save", "--plate-mass", 23).code == 0
+    assert slipstand("analyze", simulated_run, "--save", "--model", "static", "--plate-mass", 23).code == 0
     run = open_run(simulated_run)
     assert [saved.settings["plate_mass_kg"] for saved in run.analyses] == [None, 23.0]
     assert np.array_equal(run.table_reading, samples)
