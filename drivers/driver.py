@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from drivers.simulated.protocol import SimulatedProtocol
     from drivers.stream import SampleSource
 
-UNVERIFIED = "not verified on hardware"
+UNVERIFIED = N_("not verified on hardware")
 RESERVED = "reserved, comes later"
 GAUGES = ("table", "relative")
 

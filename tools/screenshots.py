@@ -195,8 +195,11 @@ def _shoot_stand(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None
     motion = stand_displacements(truth.parameters(), _EFFECTS, truth.duration_s + 1e-3)
     _, table, relative = simulate_readings(truth, motion)
     now = datetime.datetime.now().astimezone()
-    metadata = create_metadata(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=truth.rate_hz)
-    path = Path(presenter.runs.state.folder) / "slow-release.h5"
+    metadata = create_metadata(
+        load_stand(), load_gauges(), now, series="1FFM0", rate_hz=truth.rate_hz, source="simulated"
+    )
+    # Apart from the recorded run, so that Campaign does not pool both.
+    path = Path(presenter.runs.state.folder).parent / "real-stand" / "slow-release.h5"
     path.parent.mkdir(parents=True, exist_ok=True)
     readings = np.column_stack([table, relative])
     store_motion(path, metadata, readings, release_s=truth.hold_s, rate_hz=truth.rate_hz)

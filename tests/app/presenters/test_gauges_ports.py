@@ -3,6 +3,7 @@
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -50,6 +51,17 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
     )
     assert settings.rate_hz == 80.4
     assert settings.device == COLUMNS
+
+
+def test_that_a_device_is_unverified_and_its_line_are_told_in_the_language_of_the_window(
+    use_language: Callable[[str], None],
+) -> None:
+    use_language("ru")
+    card = probed_port(
+        PortReport(ARDUINO, "", ProbeOutcome.RECOGNISED, recognition=LINES, line_settings=LineSettings(57600))
+    )
+    assert "; не проверено на приборе" in card.description[0]
+    assert card.status.text.endswith(" на 57600 бод 8N1")
 
 
 def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() -> None:

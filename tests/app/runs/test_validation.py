@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from runs_kit import block, small_run
 
+from app.runs import reader
 from app.runs import validator as validator_module
 from app.runs.errors import (
     BeingRecordedError,
@@ -40,6 +41,20 @@ def test_a_good_run_passes_with_its_summary(run_path, metadata, validator):
     assert (summary.title, summary.samples, summary.ended) == (metadata.title, 9000, "rest")
     assert (summary.series, summary.start_time, summary.note) == ("1FFM1", metadata.start_time, metadata.note)
     assert summary.duration_s == pytest.approx(8999 / 500)
+
+
+def test_without_a_validator_one_is_started_and_stopped(run_path, monkeypatch):
+    started = []
+
+    class Counted(Validator):
+        def _started(self):
+            started.append(self)
+            return super()._started()
+
+    monkeypatch.setattr(reader, "Validator", Counted)
+    assert len(open_run(run_path)) == 9000
+    assert started
+    assert {validator.pid for validator in started} == {None}
 
 
 def test_what_is_no_run_is_told_in_one_line(tmp_path, validator):
@@ -248,9 +263,9 @@ def test_a_crash_is_the_fault_of_the_file(run_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_computer_that_is_too_busy_is_not_the_fault_of_the_file(run_path, monkeypatch):
-    monkeypatch.setattr(validator_module, "_REPLY_S", 0.5)
     with Validator.start() as validator:
         validator.validate(run_path)
+        monkeypatch.setattr(validator_module, "_REPLY_S", 0.5)
         os.kill(validator.pid, signal.SIGSTOP)
         with pytest.raises(ValidationTimeoutError, match="too busy"):
             validator.validate(run_path)
