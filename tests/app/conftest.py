@@ -1,22 +1,27 @@
 """Puts the fakes of this folder (`stage.py`) within reach of the tests below it."""
 
-import contextlib
 import datetime
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from app.runs import reader
+from app.runs import file_operations, listing, reader
+from app.runs.exchange import exporting
 from app.runs.validator import Validator, shared_validator
 
 
 class KeptValidator:
-    """Stands for `Validator` where a run is opened without one: one process serves all tests."""
+    """Stands for `Validator` where one is started for each run or folder: one process serves all tests."""
 
-    @staticmethod
-    def start() -> contextlib.nullcontext[Validator]:
-        return contextlib.nullcontext(shared_validator())
+    @classmethod
+    def start(cls) -> "KeptValidator":
+        return cls()
+
+    def __enter__(self) -> Validator:
+        return shared_validator()
+
+    def __exit__(self, *_: object) -> None: ...
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -24,7 +29,8 @@ def keep_validator() -> Iterator[None]:
     """Start that process before a test counts its children. One for each open file takes 0.4 s."""
     shared_validator()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reader, "Validator", KeptValidator)
+        for module in (reader, listing, file_operations, exporting):
+            patch.setattr(module, "Validator", KeptValidator)
         yield
 
 
