@@ -67,7 +67,7 @@ command -v dpkg-query >/dev/null 2>&1 || exit 0; \
 endef
 
 firmware:
-	@for converter in ads1256 hx711 pattern; do $(MAKE) --no-print-directory -s -C firmware CONVERTER=$$converter || exit 1; done
+	@for converter in ads1256 ads131m02 hx711 pattern; do $(MAKE) --no-print-directory -s -C firmware CONVERTER=$$converter || exit 1; done
 
 run: setup
 	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] || [ "$$(uname)" = Darwin ]; then \
