@@ -279,8 +279,11 @@ def test_a_drift_that_settles_is_named_and_not_taken_for_a_steady_one():
 
     found = identify(made.replace(relative_displacement_m=made.relative_displacement_m + warming))
 
-    assert "gauge-2-drifts" in codes(found)
-    assert not found.model.adequate
+    assert {"gauge-2-drifts", "gauge-2-creep"} <= set(codes(found))
+    assert found.results["gauge_2_creep_time_s"].value == pytest.approx(2.0, rel=0.05)
+    since_release_m = -5e-4 * np.exp(-found.events.release_s / 2.0)
+    assert found.results["gauge_2_creep_m"].value == pytest.approx(since_release_m, rel=0.05)
+    assert off(found) < 4.0
 
 
 @pytest.mark.parametrize(

@@ -72,9 +72,12 @@ def layout_in_header(data: bytes) -> ScanLayout | None:
 def find_layout(data: bytes) -> ScanLayout | None:
     """Layout by the fixed bits of `data`; None where most of them are not scans of any.
 
-    Only open digital inputs are known by it: a stream whose fixed bits are all 0 could be any.
+    Only open digital inputs are known by it: a stream whose fixed bits are all 0 could be any, and so could
+    one that repeats itself.
     """
     for layout in (WITH_DIGITAL, PLAIN):
+        if data[layout.length :] == data[: -layout.length]:
+            continue
         decoder = ScanDecoder(layout, 1.0)
         bytes_of_scans = sum(map(len, decoder.feed(data, 0))) * layout.length
         held = (FOLLOWING + 1) * layout.length

@@ -130,7 +130,8 @@ def test_masses_that_are_not_those_of_the_run_are_said(slipstand: Any, folder: P
 
 
 def test_an_expired_calibration_travels_with_the_run(slipstand: Any, folder: Path) -> None:
-    run = pullback_run(slipstand, folder)
+    begun = ("--unit", "m", "--begun", "2026-05-04T14:03:00+02:00")
+    run = stored(slipstand, folder / "begun.h5", *simulate_readings(Truth(rate_hz=250.0)), options=begun)
     calibration = folder / "expired.toml"
     gauge = "[{}]\ngain_m_per_count = 1.0\nzero_count = 0.0\nvalid_until = 2020-01-31\n"
     calibration.write_text(gauge.format("table") + gauge.format("relative"))

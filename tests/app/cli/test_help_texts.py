@@ -20,7 +20,7 @@ COMMANDS = (
 )  # fmt: skip
 UNIT = re.compile(
     r"\((m|m/s|mm|kg|s|Hz|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"
-    r"|\b[Ss]econds\b|[Ss]amples a second|in counts|\bMetres\b"
+    r"|\b[Ss]econds\b|([Ss]amples|[Rr]ows) a second|in counts|\bMetres\b"
 )
 PURE = re.compile(r"f_[ds]\b|friction coefficient|[Ff]raction|share|by this fraction|[Rr]elative standard")
 """Numbers that have no unit."""

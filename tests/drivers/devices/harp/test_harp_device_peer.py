@@ -96,10 +96,11 @@ def test_the_peer_reads_every_sample_of_the_simulated_device(device):
         time.sleep(0.2)
     assert len(got) == stand.log.samples - stand.log.samples_lost
     times_s, values = np.array(got)[:, 0], np.array(got)[:, 1:]
-    first = round(values[0, 2])
-    indices = first + np.arange(len(got))
-    np.testing.assert_array_equal(values[:, 2], indices)
+    indices = np.rint(values[:, 2]).astype(int)
     np.testing.assert_array_equal(values[:, 5], -indices)
-    np.testing.assert_allclose(np.diff(times_s), 1 / RATE_HZ, atol=1.5 / TICKS_PER_S)
+    apart = np.diff(indices)
+    assert apart.min() == 1
+    assert (apart - 1).sum() <= stand.log.samples_lost  # those that this computer sent too late
+    np.testing.assert_allclose(np.diff(times_s), apart / RATE_HZ, atol=1.5 / TICKS_PER_S)
     steps = np.rint(np.diff(times_s) * TICKS_PER_S).astype(int)
-    assert set(steps) == {31, 32}
+    assert set(steps[apart == 1]) == {31, 32}
