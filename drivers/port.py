@@ -15,6 +15,7 @@ from typing import Any, Protocol, Self
 import serial
 from serial.tools import list_ports as serial_list_ports
 
+from drivers import lsl_link
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
 from drivers.source import LineSettings, Link
 from messages.i18n import N_
@@ -119,6 +120,11 @@ def list_ports() -> list[PortInfo]:
     ]
 
 
+def list_streams() -> list[PortInfo]:
+    """LSL streams in the network, searched for a second; none without pylsl."""
+    return [PortInfo(url, description) for url, description in lsl_link.find_streams()]
+
+
 def port_info(url: str) -> PortInfo:
     """What is known of the port that `url` opens, or leads to as a symbolic link."""
     if "://" in url:
@@ -144,14 +150,16 @@ def find_replugged(lost: PortInfo) -> str | None:
     return None
 
 
-def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
-    """Open a port for this program alone.
+def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port | StreamPort":
+    """Open a port for this program alone, or an LSL stream (`lsl://NAME`), to which the rest does not apply.
 
     `url` is a device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
     (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`); `parity` N, E or O; `stop_bits`
     1 or 2; bytes have 8 data bits. Raises PortUnavailableError if the port does not exist, is busy, or may
     not be opened, SettingsError if it cannot be set so.
     """
+    if url.startswith(lsl_link.SCHEME):
+        return StreamPort(*lsl_link.open_inlet(url), url)
     if parity not in PARITIES:
         template = N_("parity {parity!r} is not known: give one of {allowed}")
         raise SettingsError(template, parity=parity, allowed=PARITIES)
@@ -177,6 +185,14 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
     _log.info("opened %s at %s", url, LineSettings(baud, parity, stop_bits))
     return Port(wire, url)
+
+
+class StreamPort(lsl_link.LslLink):
+    """An LSL stream that is read as a port."""
+
+    @property
+    def info(self) -> PortInfo:
+        return PortInfo(self.url)
 
 
 class Port:

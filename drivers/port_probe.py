@@ -7,7 +7,7 @@ from enum import StrEnum
 
 from drivers.errors import DriverError, SettingsError
 from drivers.host_checks import PortHint, port_hints, usb_chip_name
-from drivers.port import Port, PortInfo, PortUser, open_port, other_port_users
+from drivers.port import Port, PortInfo, PortUser, StreamPort, open_port, other_port_users
 from drivers.recognition import (
     IdentityQuery,
     Recognition,
@@ -100,7 +100,7 @@ def probe_port(port: PortInfo, write: bool, on_progress: Callable[[Message], Non
 
 
 def _probe_link(
-    link: Port, write: bool, on_progress: Callable[[Message], None]
+    link: Port | StreamPort, write: bool, on_progress: Callable[[Message], None]
 ) -> tuple[ProbeOutcome, Message, ListenResult]:
     found = listen(link, on_progress)
     if found.recognition is not None:
@@ -126,7 +126,9 @@ def _probe_link(
 
 
 def listen(
-    link: Port, on_progress: Callable[[Message], None], clock: Callable[[], float] = time.monotonic
+    link: Port | StreamPort,
+    on_progress: Callable[[Message], None],
+    clock: Callable[[], float] = time.monotonic,
 ) -> ListenResult:
     """Listen at `COMMON_LINE_SETTINGS` until what comes is recognised; nothing is sent.
 
@@ -152,7 +154,7 @@ def listen(
 
 
 def query_identity(
-    link: Port,
+    link: Port | StreamPort,
     on_progress: Callable[[Message], None],
     clock: Callable[[], float] = time.monotonic,
     *,
@@ -208,7 +210,7 @@ def _informativeness(result: ListenResult) -> tuple[float, bool, float]:
 
 
 def _query_once(
-    link: Port, query: IdentityQuery, settings: LineSettings | None, clock: Callable[[], float]
+    link: Port | StreamPort, query: IdentityQuery, settings: LineSettings | None, clock: Callable[[], float]
 ) -> Message | None:
     if settings is not None:
         try:

@@ -12,7 +12,7 @@ from app.cli import output as out
 from app.cli.device_options import ListDevicesOptions, ListPortsOptions, ProbeOptions
 from drivers.driver import DeviceDriver, DeviceVariant
 from drivers.host_checks import usb_chip_name
-from drivers.port import PortInfo, other_port_users, port_info
+from drivers.port import PortInfo, list_streams, other_port_users, port_info
 from drivers.port import list_ports as present_ports
 from drivers.port_probe import PortReport, probe_port
 from drivers.registry import DRIVERS
@@ -21,6 +21,10 @@ UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
 
 
 _NO_PORT = "No serial port found. Plug the amplifier in, or try: slipstand device simulate"
+
+
+def _ports_and_streams() -> list[PortInfo]:
+    return [*present_ports(), *list_streams()]
 
 
 def list_devices(options: ListDevicesOptions) -> None:
@@ -52,7 +56,7 @@ def device_documents(info: DeviceDriver) -> Iterator[dict[str, Any]]:
 
 
 def list_ports(options: ListPortsOptions) -> None:
-    ports = present_ports()
+    ports = _ports_and_streams()
     if options.as_json:
         out.print_json([asdict(port) for port in ports])
     elif not ports:
@@ -67,7 +71,7 @@ def list_ports(options: ListPortsOptions) -> None:
 
 
 def probe(options: ProbeOptions) -> None:
-    ports = [port_info(url) for url in options.ports] if options.ports else present_ports()
+    ports = [port_info(url) for url in options.ports] if options.ports else _ports_and_streams()
     reports = []
     for port in ports:
         report = probe_port(port, options.write, partial(_print_progress, port))

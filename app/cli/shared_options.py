@@ -71,7 +71,7 @@ class LinkOptions:
 class DeviceOptions(LinkOptions):
     """Which device to read."""
 
-    port: str = option("--port", "Serial port or URL: /dev/ttyUSB0, COM3, socket://host:port.", REQUIRED)
+    port: str = option("--port", "Port or URL: /dev/ttyUSB0, COM3, socket://host:port, lsl://NAME.", REQUIRED)
     protocol: str = option("--protocol", "Protocol name, see `slipstand device list`.", REQUIRED)
 
 

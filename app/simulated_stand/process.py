@@ -19,6 +19,7 @@ from app.simulated_stand.stand import SimulatedStandDevice
 from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
 from drivers.errors import DriverError, SettingsError
+from drivers.registry import find_driver
 from drivers.simulated.faults import Disturbance, parse_disturbance
 from drivers.simulated.transport import has_pseudo_terminals, open_pseudo_terminal, open_tcp_port
 
@@ -44,7 +45,10 @@ def serve(
             on_truth(truth)
 
     is_tcp = options.tcp_port is not None or not has_pseudo_terminals()
-    transport = open_tcp_port(options.tcp_port or 0) if is_tcp else open_pseudo_terminal()
+    protocol = find_driver(options.protocol).make_simulated(options.device)
+    transport = protocol.open_transport(options.sample_rate_hz)
+    if transport is None:
+        transport = open_tcp_port(options.tcp_port or 0) if is_tcp else open_pseudo_terminal()
     try:
         stand = SimulatedStandDevice(options, transport, publish)
         done = options.completed()

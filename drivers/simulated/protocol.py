@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from drivers.arrays import Floats, Int32s, UInt8s
+from drivers.simulated.transport import Transport
 
 MAX_RATE_HZ = 100_000.0  # rate at which the simulated stand still keeps up on a common computer
 MAX_COUNT = 2**23 - 1  # of a 24-bit converter
@@ -58,6 +59,10 @@ class SimulatedProtocol(ABC):
     line_end = b""
     """What ends a frame; damage to its last byte damages the next frame too. b"" for frames of fixed form."""
     flags_overload = False  # whether a frame flags clipped readings
+
+    def open_transport(self, rate_hz: float) -> Transport | None:  # noqa: ARG002
+        """Port of a device that has no serial one, at its rate (Hz); None for most."""
+        return None
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         """Whole commands in `data`, and the number of bytes that were used; the rest may begin a command."""

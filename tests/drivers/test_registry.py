@@ -25,6 +25,7 @@ def test_all_promised_names_are_there_in_order():
         ("gsv-234", 115200),
         ("enod4", 115200),
         ("dataq", 115200),
+        ("lsl", 0),
         ("modbus", 115200),
         ("hbm-aed", 9600),
         ("harp", 1_000_000),

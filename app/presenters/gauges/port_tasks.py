@@ -9,7 +9,7 @@ from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
 from drivers.driver import UNVERIFIED
 from drivers.host_checks import usb_chip_name
-from drivers.port import PortInfo, list_ports
+from drivers.port import PortInfo, list_ports, list_streams
 from drivers.port_probe import PortReport, ProbeOutcome, probe_port
 from drivers.recognition import Recognition
 from drivers.registry import DRIVERS
@@ -32,8 +32,8 @@ def list_port_cards() -> tuple[PortCard, ...]:
 
 
 def probe_ports(query_silent: bool, connected: str, report: ReportProgress) -> tuple[PortCard, ...]:
-    """Probe all ports but `connected`; with `query_silent`, send requests to silent devices."""
-    present = list_ports()
+    """Probe ports and LSL streams but `connected`; with `query_silent`, send requests to silent devices."""
+    present = [*list_ports(), *list_streams()]
     cards = []
     for number, port in enumerate(present):
         if port.device == connected:

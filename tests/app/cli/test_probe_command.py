@@ -41,6 +41,7 @@ def probe(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]
 
         monkeypatch.setattr(device, "probe_port", look)
         monkeypatch.setattr(device, "present_ports", lambda: [ARDUINO])
+        monkeypatch.setattr(device, "list_streams", list)
         outcome = slipstand("device", "probe", *arguments)
         assert outcome.err == f"{asked[0][0]}: listening\n"
         return outcome, asked
@@ -117,5 +118,26 @@ def test_as_json(probe: Callable[..., Any]) -> None:
 
 def test_without_any_port(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(device, "present_ports", list)
+    monkeypatch.setattr(device, "list_streams", list)
     assert "No serial port found" in slipstand("device", "probe").out
     assert slipstand("device", "probe", "--json").json == []
+
+
+def test_streams_are_listed_and_probed_with_the_ports(
+    slipstand: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = PortInfo("lsl://rig-7", "LSL stream My rig of lab-pc")
+    found = Recognition("lsl", 1.0, 900, rate_hz=1000.0)
+    asked = []
+
+    def look(port: PortInfo, *_: Any) -> PortReport:
+        asked.append(port)
+        return PortReport(port, "", ProbeOutcome.RECOGNISED, recognition=found)
+
+    monkeypatch.setattr(device, "present_ports", list)
+    monkeypatch.setattr(device, "list_streams", lambda: [stream])
+    monkeypatch.setattr(device, "probe_port", look)
+    assert "lsl://rig-7" in slipstand("device", "ports").out
+    said = slipstand("device", "probe").out
+    assert "slipstand record --port lsl://rig-7 --protocol lsl\n" in said
+    assert asked == [stream]

@@ -112,6 +112,7 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
 
     there = [PortInfo(terminal.url), PortInfo("COM7")]
     monkeypatch.setattr(port_tasks, "list_ports", lambda: there)
+    monkeypatch.setattr(port_tasks, "list_streams", list)
     told: list[Progress] = []
     sender = threading.Thread(target=send)
     sender.start()
