@@ -102,7 +102,7 @@ class DataqSource(SampleSource):
 
     def _identify(self, link: Link, received: bytes) -> Model:
         name = self._ask(link, "info 1", _TRIES)
-        if name is None:
+        if not name:  # or only its echo
             raise self.no_answer_error(received, sends=codec.find_layout(received) is not None)
         model = MODELS.get(name)
         if model is None or self._settings.model not in ("auto", name):

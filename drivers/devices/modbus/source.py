@@ -281,6 +281,7 @@ def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSou
         template = N_("rate {rate_hz:g} Hz cannot be polled: give one up to {most:g}, or leave it out")
         raise SettingsError(template, rate_hz=rate_hz, most=MAX_RATE_HZ)
     parsed, register_map = read_modbus_settings(settings)
+    _check_registers(register_map)
     return ModbusSource(parsed, register_map, rate_hz)
 
 
@@ -315,12 +316,16 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[ModbusSettings, R
 
 
 def _check_units(register_map: RegisterMap) -> None:
-    places = []
     for gauge, channel in register_map.channels.items():
         if register_map.framing is Framing.RTU and not 1 <= channel.unit <= MAX_UNIT:
             template = N_("{gauge}_unit = {unit} is no unit of a serial line: give 1 to {most}")
             raise SettingsError(template, gauge=gauge, unit=channel.unit, most=MAX_UNIT)
-        places.append((channel.unit, channel.function, channel.register))
+
+
+def _check_registers(register_map: RegisterMap) -> None:
+    """Raise SettingsError where one device would give both gauges the same reading."""
+    channels = register_map.channels.values()
+    places = [(channel.unit, channel.function, channel.register) for channel in channels]
     if len(places) > len(set(places)):
         template = N_(
             "both gauges would be read from register {register} of unit {unit}: give the unit or the register"

@@ -119,7 +119,7 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
     [
         (["--port", "/dev/no-such-port", "--protocol", "csv"], "/dev/no-such-port"),
         (["--port", "loop://", "--protocol", "morse"], "'morse'"),
-        (["--port", "loop://", "--protocol", "dataq"], "'dataq'"),
+        (["--port", "loop://", "--protocol", "scale-line"], "'scale-line'"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour=red"], "colour"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour"], "KEY=VALUE"),
         (["--port", "loop://", "--protocol", "csv", "--set", "format=openscale"], "one gauge, and two are"),

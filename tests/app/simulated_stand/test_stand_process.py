@@ -196,8 +196,8 @@ def test_the_truth_can_be_read_where_it_was_wanted(tmp_path):
 def test_a_stand_that_cannot_be_is_refused_with_its_reason():
     with pytest.raises(SimulatedStandError, match="1XXM0"):
         SimulatedStand.start(SimulatedStandOptions(series="1XXM0"))
-    with pytest.raises(SimulatedStandError, match="dataq"):
-        SimulatedStand.start(SimulatedStandOptions(protocol="dataq"))
+    with pytest.raises(SimulatedStandError, match="scale-line"):
+        SimulatedStand.start(SimulatedStandOptions(protocol="scale-line"))
     with pytest.raises(SimulatedStandError, match="friction_static"):
         SimulatedStand.start(SimulatedStandOptions(friction=0.2, static_friction=0.1))
 
