@@ -150,21 +150,20 @@ class Search:
 
     def fit_fallback(self, law: FrictionLaw, simpler: Fit) -> Fit:
         """Fit a law that is too slow for a search, from its start points about the fit of a simpler law."""
-        starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
-        return self._refine_fallback(law, self._rough_fallback(law, simpler, starts))
+        return self._refine_fallback(law, self._rough_fallback(law, simpler))
 
     def explain_by_fallback(self, law: FrictionLaw, simpler: Fit) -> Fit | None:
         """`fit_fallback`, but None where a shorter window shows that the law does not explain the record."""
         first = self.window(simpler.value(Parameter.RELEASE) + _WINDOWS_PERIODS[1] * self.period_s)
-        starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
-        start = min(starts, key=lambda point: first.chi_square(point, law))
+        start = _nearest_starts(first, law, simpler)[0]
         early = first.minimise(start, law, _FALLBACK_STEPS)
         if early.cost > _UNEXPLAINED * first.sample_count:
             return None
-        rough = self.window(np.inf).minimise(early.parameters, law, _FALLBACK_STEPS)
-        if rough.cost > _EXPLAINED * self.window(np.inf).sample_count:
-            rough = self._rough_fallback(law, simpler, starts)
-        if rough.cost > _UNEXPLAINED * self.window(np.inf).sample_count:
+        some = self.window(np.inf)
+        rough = some.minimise(early.parameters, law, _FALLBACK_STEPS)
+        if rough.cost > _EXPLAINED * some.sample_count:
+            rough = self._rough_fallback(law, simpler)
+        if rough.cost > _UNEXPLAINED * some.sample_count:
             return None
         return self._refine_fallback(law, rough)
 
@@ -172,10 +171,10 @@ class Search:
         last = self.problem.minimise(rough.parameters, law, _FALLBACK_STEPS)
         return fit_at_minimum(self.problem, law, last)
 
-    def _rough_fallback(self, law: FrictionLaw, simpler: Fit, starts: list[Floats]) -> Minimum:
+    def _rough_fallback(self, law: FrictionLaw, simpler: Fit) -> Minimum:
         """Minimum of a law with some of the readings, from the best of a few start points."""
         some = self.window(np.inf)
-        nearest = sorted(starts, key=lambda point: some.chi_square(point, law))[:_FALLBACK_KEPT]
+        nearest = _nearest_starts(some, law, simpler)[:_FALLBACK_KEPT]
         rough = [some.minimise(point, law, _FALLBACK_STEPS) for point in nearest]
         best = min(rough, key=lambda minimum: minimum.cost)
         worth = _WORTH * some.chi_square(simpler.parameters, simpler.law)
@@ -269,6 +268,12 @@ def _reading_count(problem: FitProblem) -> int:
     swing_m = 0.5 * float(np.ptp(problem.table.value_m))
     share = max(problem.noise_m) / (_CLEAR * max(swing_m, 1e-9))
     return round(min(_MOST, _FEW * max(1.0, share) ** 2))
+
+
+def _nearest_starts(window: FitProblem, law: FrictionLaw, simpler: Fit) -> list[Floats]:
+    """Start points of an integrated law about the fit of a simpler one, the nearest to the readings first."""
+    starts = [simpler.parameters, *law.start_points(simpler.parameters, law.own_places)]
+    return sorted(starts, key=lambda point: window.chi_square(point, law))
 
 
 def _without_tilt(point: Floats) -> Floats:

@@ -197,7 +197,7 @@ def main() -> None:
     events.send(ReaderReady())
     while not requests.is_closed:
         if (request := requests.take(_IDLE_S)) is not None:
-            _load_library(Path(request.path), events.send)
+            _load_reader(Path(request.path), events.send)
             events.send(_answer(request, lambda share: events.send(ReadingProgress(share))))
     events.close()
 
@@ -212,14 +212,15 @@ def _limit_memory() -> None:
             resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
 
 
-def _load_library(path: Path, send: Callable[[Event], object]) -> None:
+def _load_reader(path: Path, send: Callable[[Event], object]) -> None:
     """Load what reads a file, before time without progress counts."""
     found = find_format(path)
-    if found is not None and found.library:
-        send(ReadingProgress(0.0, is_loading=True))
-        with contextlib.suppress(ImportError, MemoryError):  # the reader says so
-            importlib.import_module(found.library)
-        send(ReadingProgress(0.0))
+    if found is None or not found.reader:
+        return
+    send(ReadingProgress(0.0, is_loading=True))
+    with contextlib.suppress(ImportError, MemoryError):  # `_answer` says so
+        importlib.import_module(found.reader)
+    send(ReadingProgress(0.0))
 
 
 def _answer(request: Request, report: Callable[[float], object]) -> Event:

@@ -13,7 +13,7 @@ class Format:
     """Module below `app.runs.exchange.formats` whose `open_table` reads it."""
     magic: bytes = b""
     """First bytes of such a file, where they tell it."""
-    library: str = ""
+    reader: str = ""
     """Module of other people that reads it, which may take long to load."""
     has_rows: bool = False
     """Whether it has lines and a header, as a sheet has."""
@@ -23,7 +23,7 @@ class Format:
 
 FORMATS = (
     Format("MATLAB", (".mat",), "matlab", b"MATLAB ", "scipy.io"),
-    Format("Excel", (".xlsx",), "excel", library="openpyxl", has_rows=True),
+    Format("Excel", (".xlsx",), "excel", reader="openpyxl", has_rows=True),
     Format("Parquet", (".parquet",), "parquet", b"PAR1", "pyarrow.parquet"),
     Format("TDMS", (".tdms",), "tdms", b"TDSm", "nptdms", has_own_time=True),
     Format("LVM", (".lvm",), "labview", b"LabVIEW Measurement", "lvm_read", has_own_time=True),
