@@ -159,7 +159,7 @@ SECOND = Unit("s")
 MILLIRADIAN = Unit("mrad", 1e3)
 PER_SECOND = Unit("1/s", latex="s$^{-1}$")
 _RADIANS_PER_SECOND = Unit("rad/s", latex="s$^{-1}$")
-_MILLIMETRES_PER_SECOND = Unit("mm/s", 1e3)
+MILLIMETRES_PER_SECOND = Unit("mm/s", 1e3)
 METRES_PER_SECOND = Unit("m/s")
 KILOGRAM = Unit("kg")
 ACCELERATION = Unit("m/s²", latex="m/s$^2$")
@@ -180,7 +180,7 @@ CATALOGUE: Final = (
     _Row("friction_static_upper", Symbol("f", "s", relation="≤"), "1", N_("static friction, at most"),
          _NUMBER),
     _Row("stribeck_velocity_m_per_s", Symbol("v", "s"), "m/s", N_("Stribeck velocity"),
-         _MILLIMETRES_PER_SECOND),
+         MILLIMETRES_PER_SECOND),
     _Row("release_ramp_s", Symbol("t", "r"), "s",
          N_("time of release"), MILLISECOND),
     _Row("release_step", Symbol("q", "r"), "1",
@@ -188,9 +188,9 @@ CATALOGUE: Final = (
     _Row("release_shape", Symbol("p", "r"), "1",
          N_("shape of the release"), _NUMBER),
     _Row("release_velocity_m_per_s", Symbol("v", "0"), "m/s",
-         N_("velocity at the release"), _MILLIMETRES_PER_SECOND),
+         N_("velocity at the release"), MILLIMETRES_PER_SECOND),
     _Row("hold_creep_m_per_s", Symbol("v", "h"), "m/s",
-         N_("velocity of the hold"), _MILLIMETRES_PER_SECOND),
+         N_("velocity of the hold"), MILLIMETRES_PER_SECOND),
     _Row("gauge_2_lag_s", Symbol("t", "2"), "s",
          N_("lag of gauge 2"), MILLISECOND),
     _Row("relative_gain", Symbol("g", "2"), "1",
@@ -284,8 +284,8 @@ CATALOGUE: Final = (
                             missing=N_("Slip had not ended when the record did: u_s is not known."))),
     _Row("coulomb_displacement_m", Symbol("x", "k"), "m", N_("Coulomb displacement"), MILLIMETRE),
     _Row("table_velocity_max_m_per_s", Symbol("v", "max"), "m/s", N_("table velocity"),
-         _MILLIMETRES_PER_SECOND, _IN_METRES, column=TableColumn(9, "velocity_max_m_per_s")),
-    _Row("plate_velocity_max_m_per_s", Symbol("v", "2"), "m/s", N_("plate velocity"), _MILLIMETRES_PER_SECOND,
+         MILLIMETRES_PER_SECOND, _IN_METRES, column=TableColumn(9, "velocity_max_m_per_s")),
+    _Row("plate_velocity_max_m_per_s", Symbol("v", "2"), "m/s", N_("plate velocity"), MILLIMETRES_PER_SECOND,
          _IN_METRES, is_minor=True),
     _Row("table_acceleration_max_m_per_s2", Symbol("a", "max"), "m/s2", N_("table acceleration"),
          ACCELERATION, column=TableColumn(10, "acceleration_max_m_per_s2")),
@@ -295,6 +295,11 @@ CATALOGUE: Final = (
          column=TableColumn(1, "plate_mass_kg"), is_minor=True),
 )  # fmt: skip
 """Every quantity that an analysis finds, in the order of reports."""
+
+
+def reading_units(unit: str) -> tuple[Unit, Unit]:
+    """Units in which readings in `unit` and their residuals are drawn: metres as mm and µm."""
+    return (MILLIMETRE, MICROMETRE) if unit == "m" else (Unit(unit), Unit(unit))
 
 
 def definition(name: str) -> QuantityDefinition:

@@ -73,6 +73,7 @@ class AnalysedRun:
     table: Channel
     relative: Channel | None
     """None without a second gauge."""
+    unit: str = "m"  # of the readings, of which names say metres
     results: dict[str, Quantity] = field(default_factory=dict)
     labels: dict[str, str | bool] = field(default_factory=dict)
     model: ModelSelection | None = None

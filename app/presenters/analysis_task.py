@@ -47,6 +47,7 @@ def run_analysis(task: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         time_s=record.time_s,
         table=table,
         relative=relative,
+        unit=run.metadata.unit,
         results=found.results,
         labels=found.labels,
         model=found.model,

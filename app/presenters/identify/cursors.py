@@ -13,7 +13,7 @@ from messages.i18n import ngettext
 _FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5  # initial places of the cursors, as shares of the visible span
 _PERIOD_TOLERANCE = 0.2
 """A distance that differs from a whole number of periods by less (in periods) is shown as periods."""
-_DECIMALS = {"s": 4, "mm": 3, "µm": 1, "mm/s": 2, "m/s²": 3}
+_TIME_DECIMALS = 4
 
 
 def first_cursors(start_s: float, end_s: float) -> Cursors:
@@ -49,14 +49,17 @@ def read_cursors(
     at_a, at_b = ([_value(quantity, at_s) for quantity in drawn] for at_s in (a_s, b_s))
     difference = [later - earlier for earlier, later in zip(at_a, at_b, strict=True)]
     rows = ((Cursor.A.value, a_s, at_a), (Cursor.B.value, b_s, at_b), (f"B {MINUS} A", b_s - a_s, difference))
-    units = [quantity.unit for quantity in drawn]
+
+    def texts(values: Sequence[float]) -> list[str]:
+        return [_text(value, one.decimals, one.unit) for value, one in zip(values, drawn, strict=True)]
+
     return replace(
         cursors,
         a_s=a_s,
         b_s=b_s,
         symbols=tuple(quantity.symbol for quantity in drawn),
         values=(tuple(at_a), tuple(at_b)),
-        cells=tuple((name, _text(at_s, "s"), *map(_text, values, units)) for name, at_s, values in rows),
+        cells=tuple((name, _text(at_s, _TIME_DECIMALS, "s"), *texts(values)) for name, at_s, values in rows),
         period=_period(abs(b_s - a_s), period_s),
     )
 
@@ -73,8 +76,8 @@ def _value(quantity: PlottedQuantity, at_s: float) -> float:
     return float(np.interp(at_s, quantity.time_s, quantity.values, left=np.nan, right=np.nan))
 
 
-def _text(value: float, unit: str) -> str:
-    return with_unit(number_text.format_fixed(value, _DECIMALS[unit]), unit) if np.isfinite(value) else "–"
+def _text(value: float, decimals: int, unit: str) -> str:
+    return with_unit(number_text.format_fixed(value, decimals), unit) if np.isfinite(value) else "–"
 
 
 def _period(distance_s: float, period_s: float | None) -> str:

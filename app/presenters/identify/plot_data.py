@@ -1,5 +1,18 @@
 """Plot data of an analysed run: curves, lines of the fitted motion, and words about f_d set by hand."""
 
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.catalogue import (
+    ACCELERATION,
+    MICROMETRE,
+    MILLIMETRE,
+    MILLIMETRES_PER_SECOND,
+    Unit,
+    reading_units,
+)
 from analysis.formatting import format_value, typeset, with_unit
 from analysis.plate.trends import FrictionTrend
 from app.presenters import number_text, results
@@ -11,11 +24,13 @@ from app.presenters.identify.state import (
     Motion,
     PlotTab,
     PlottedQuantity,
+    ReadingUnit,
     SlipPlot,
     SlipPlots,
 )
 from messages.i18n import N_, gettext
 
+_DECIMALS = {MILLIMETRE: 3, MICROMETRE: 1, MILLIMETRES_PER_SECOND: 2, ACCELERATION: 3}
 _TABLE, _PLATE = "u<sub>1</sub>", "u<sub>2</sub>"
 _RELATIVE = f"{_PLATE} − {_TABLE}"
 _NO_RELATIVE = {
@@ -38,26 +53,34 @@ def time_span(run: AnalysedRun) -> tuple[float, float]:
 def curves(run: AnalysedRun) -> Curves:
     """Record, simulation and residual."""
     origin_s = time_origin_s(run)
+    unit, residual_unit = reading_units(run.unit)
+    channels = [channel for channel in (run.table, run.relative) if channel is not None]
     return Curves(
         time_s=run.time_s - origin_s,
         time_label=gettext(
             "time in the record, s" if run.events.release_s is None else "time from release, s"
         ),
-        channels=tuple(_channel(channel) for channel in (run.table, run.relative) if channel is not None),
+        channels=tuple(_channel(channel, unit, residual_unit) for channel in channels),
+        unit=_reading_unit(unit, channels),
+        residual_unit=_reading_unit(residual_unit, channels),
         no_relative_reason="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
-        noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
+        noise=None if run.model is None else run.model.noise_rms_m * residual_unit.scale,
     )
 
 
 def measured_lines(shown: Curves) -> tuple[PlottedQuantity, ...]:
     """Records of the gauges, then the residuals."""
     gauges = list(zip((_TABLE, _RELATIVE), shown.channels, strict=False))
-    records = [PlottedQuantity(symbol, "mm", shown.time_s, channel.record_mm) for symbol, channel in gauges]
+
+    def line(symbol: str, unit: ReadingUnit, values: Floats) -> PlottedQuantity:
+        return PlottedQuantity(symbol, unit.symbol, unit.decimals, shown.time_s, values)
+
+    records = [line(symbol, shown.unit, channel.record) for symbol, channel in gauges]
     residuals = [
-        PlottedQuantity(gettext("residual {symbol}", symbol=symbol), "µm", shown.time_s, channel.residual_um)
+        line(gettext("residual {symbol}", symbol=symbol), shown.residual_unit, channel.residual)
         for symbol, channel in gauges
-        if channel.residual_um is not None
+        if channel.residual is not None
     ]
     return (*records, *residuals)
 
@@ -69,23 +92,28 @@ def motion(run: AnalysedRun) -> Motion | None:
         return None
     time_s = found.time_s - time_origin_s(run)
 
-    def line(symbol: str, unit: str, values: Floats) -> PlottedQuantity:
-        return PlottedQuantity(symbol, unit, time_s, values if unit == "m/s²" else 1e3 * values)
+    def line(symbol: str, unit: Unit, values: Floats) -> PlottedQuantity:
+        return PlottedQuantity(symbol, unit.symbol, _DECIMALS[unit], time_s, unit.scale * values)
 
-    velocity = line(f"{_TABLE}′", "mm/s", found.table_m_per_s)
-    relative = line(_RELATIVE, "mm", found.relative_m)
-    relative_velocity = line(f"{_PLATE}′ − {_TABLE}′", "mm/s", found.plate_m_per_s - found.table_m_per_s)
+    velocity = line(f"{_TABLE}′", MILLIMETRES_PER_SECOND, found.table_m_per_s)
+    relative = line(_RELATIVE, MILLIMETRE, found.relative_m)
+    sliding = found.plate_m_per_s - found.table_m_per_s
+    relative_velocity = line(f"{_PLATE}′ − {_TABLE}′", MILLIMETRES_PER_SECOND, sliding)
     return {
-        PlotTab.VELOCITY: (velocity, line(f"{_PLATE}′", "mm/s", found.plate_m_per_s), relative_velocity),
+        PlotTab.VELOCITY: (
+            velocity,
+            line(f"{_PLATE}′", MILLIMETRES_PER_SECOND, found.plate_m_per_s),
+            relative_velocity,
+        ),
         PlotTab.ACCELERATION: (
-            line(f"{_TABLE}″", "m/s²", found.table_m_per_s2),
-            line(f"{_PLATE}″", "m/s²", found.plate_m_per_s2),
+            line(f"{_TABLE}″", ACCELERATION, found.table_m_per_s2),
+            line(f"{_PLATE}″", ACCELERATION, found.plate_m_per_s2),
         ),
         PlotTab.RELATIVE: (
-            line(f"{_PLATE}″ − {_TABLE}″", "m/s²", found.plate_m_per_s2 - found.table_m_per_s2),
+            line(f"{_PLATE}″ − {_TABLE}″", ACCELERATION, found.plate_m_per_s2 - found.table_m_per_s2),
             relative,
         ),
-        PlotTab.PHASE: (line(_TABLE, "mm", found.table_m), velocity, relative, relative_velocity),
+        PlotTab.PHASE: (line(_TABLE, MILLIMETRE, found.table_m), velocity, relative, relative_velocity),
     }
 
 
@@ -126,10 +154,20 @@ def manual_fit_text(friction: float, objective: Objective) -> str:
     )
 
 
-def _channel(channel: Channel) -> ChannelCurves:
+def _channel(channel: Channel, unit: Unit, residual_unit: Unit) -> ChannelCurves:
+    record = unit.scale * channel.record_m
     if channel.fit_m is None or channel.residual_m is None:
-        return ChannelCurves(channel.record_m * 1e3)
-    return ChannelCurves(channel.record_m * 1e3, channel.fit_m * 1e3, channel.residual_m * 1e6)
+        return ChannelCurves(record)
+    return ChannelCurves(record, unit.scale * channel.fit_m, residual_unit.scale * channel.residual_m)
+
+
+def _reading_unit(unit: Unit, channels: Sequence[Channel]) -> ReadingUnit:
+    """The unit with decimals that show a ten-thousandth of the largest reading, where none are usual."""
+    decimals = _DECIMALS.get(unit)
+    if decimals is None:
+        largest = max(float(np.nanmax(np.abs(channel.record_m), initial=0.0)) for channel in channels)
+        decimals = 4 - math.ceil(math.log10(largest)) if 0.0 < largest < math.inf else 0
+    return ReadingUnit(unit.symbol, max(0, decimals))
 
 
 def _slips(run: AnalysedRun) -> tuple[tuple[float, float], ...]:

@@ -16,13 +16,21 @@ from messages.i18n import N_
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True)
+class ReadingUnit:
+    """Unit of drawn values, and decimals of a value that is read off."""
+
+    symbol: str
+    decimals: int
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ChannelCurves:
-    """One gauge: record and simulation (mm), residual (µm), each (n,); NaN where absent."""
+    """One gauge: record, simulation and residual in the units of `Curves`, each (n,); NaN where absent."""
 
-    record_mm: Floats
-    simulation_mm: Floats | None = None
-    residual_um: Floats | None = None
+    record: Floats
+    simulation: Floats | None = None
+    residual: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,11 +41,13 @@ class Curves:
     time_label: str
     channels: tuple[ChannelCurves, ...]
     """Of the table, then of gauge 2 if there is one."""
+    unit: ReadingUnit
+    residual_unit: ReadingUnit
     no_relative_reason: str = ""
     slips: tuple[tuple[float, float], ...] = ()
     """Start and end of each slip, in the times of `time_s`."""
-    noise_um: float | None = None
-    """Standard deviation of the noise of the gauges. The drawn band is ± 2 standard deviations."""
+    noise: float | None = None
+    """Standard deviation of the noise of the gauges, as residuals. The band is ± 2 standard deviations."""
 
 
 class PlotTab(StrEnum):
@@ -57,6 +67,7 @@ class PlottedQuantity:
 
     symbol: str  # as rich text
     unit: str
+    decimals: int  # of values that are read off
     time_s: Floats
     values: Floats
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from msgspec import convert
 
+from analysis.catalogue import reading_units
 from analysis.formatting import with_unit
 from analysis.record import AnalysisError
 from app.presenters.base import Progress, ReportProgress, batch_progress
@@ -145,13 +146,13 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
     return Overlay(
         traces=tuple(_run_trace(overview) for overview in overviews),
         time_label=gettext("time from release, s") if aligned else gettext("time, s"),
-        unit="mm" if unit == "m" else unit,
+        unit=reading_units(unit)[0].symbol,
         message=". ".join(faults),
     )
 
 
 def _run_trace(overview: DecimatedRun) -> Trace:
-    scale = 1e3 if overview.unit == "m" else 1.0
+    scale = reading_units(overview.unit)[0].scale
     table, *others = (scale * readings for readings in overview.readings)
     time_s = overview.time_s - (overview.release_s or 0.0)
     return Trace(overview.path.stem, time_s, table, others[0] if others else None)
@@ -235,8 +236,9 @@ def import_files(paths: tuple[str, ...], form: Form, folder: str, report: Report
 
 def _result_row(run: import_run.ImportedRun) -> str:
     """Name, length, rate, range of each gauge, and release of an imported run."""
-    scale, unit = (1e3, "mm") if run.unit == "m" else (1.0, run.unit)
-    ranges = (with_unit(f"{scale * low:.4g} … {scale * high:.4g}", unit) for low, high in run.ranges)
+    unit, _ = reading_units(run.unit)
+    ends = ((unit.scale * low, unit.scale * high) for low, high in run.ranges)
+    ranges = (with_unit(f"{low:.4g} … {high:.4g}", unit.symbol) for low, high in ends)
     release = gettext("no release found")
     if run.release_s is not None:
         release = gettext("released at {time}", time=with_unit(format_fixed(run.release_s, 3), "s"))

@@ -7,7 +7,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
-from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine
+from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine, ReadingUnit
 from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
@@ -25,9 +25,9 @@ from app.qt.widgets.text import padded
 from messages.i18n import N_, gettext
 
 _NAMES = (
-    N_("table displacement u<sub>1</sub>, mm"),
-    N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
-    N_("residual, µm"),
+    N_("table displacement u<sub>1</sub>, {unit}"),
+    N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, {unit}"),
+    N_("residual, {unit}"),
 )
 _COLOURS = ("channel_1", "channel_2", "text")
 _KEY = N_("— record &nbsp; - - simulation")
@@ -35,7 +35,6 @@ _RECORD_ONLY = N_("— record; no motion was fitted")
 _OF_RESIDUAL = N_("table and relative; between the dashes: twice the noise")
 _OF_TABLE = N_("table; between the dashes: twice the noise")
 _NO_RESIDUAL = N_("nothing was fitted that could leave any")
-_UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
 
 
@@ -53,7 +52,7 @@ class CurvePlots(QWidget):
         self._theme = theme
         self._curves: Curves | None = None
         self._stack = PlotStack(
-            theme, list(zip(map(gettext, _NAMES), _COLOURS, strict=True)), interactive=True, heights=(3, 3, 2)
+            theme, [("", colour) for colour in _COLOURS], interactive=True, heights=(3, 3, 2)
         )
         table, relative, residual = self._stack.plots
         self._records = [_curve(table), _curve(relative)]
@@ -76,17 +75,17 @@ class CurvePlots(QWidget):
         self._curves = curves
         self._stack.set_time_title(curves.time_label)
         for row, channel in enumerate(padded(curves.channels, 2, None)):
-            _set(self._records[row], curves.time_s, channel.record_mm if channel else None)
-            _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
-            _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
+            _set(self._records[row], curves.time_s, channel.record if channel else None)
+            _set(self._simulations[row], curves.time_s, channel.simulation if channel else None)
+            _set(self._residuals[row], curves.time_s, channel.residual if channel else None)
         self.show_manual_fit(None)
         for plot, lines in zip(self._stack.plots, _lines(curves), strict=True):
             plot.fit_values(*lines)
         self._set_titles(curves)
         for slip in self._slips:
             slip.show_spans(curves.slips)
-        band_um = 2.0 * (curves.noise_um or 0.0)
-        place_region(self._noise, (-band_um, band_um) if band_um else None)
+        band = 2.0 * (curves.noise or 0.0)
+        place_region(self._noise, (-band, band) if band else None)
         self._stack.set_time_range(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
 
     def show_manual_fit(self, hand: ManualFit | None) -> None:
@@ -107,7 +106,7 @@ class CurvePlots(QWidget):
 
     def _set_titles(self, curves: Curves) -> None:
         table, relative = padded(curves.channels, 2, None)
-        is_fitted = any(channel.residual_um is not None for channel in curves.channels)
+        is_fitted = any(channel.residual is not None for channel in curves.channels)
         of_residual = gettext(_OF_TABLE if relative is None else _OF_RESIDUAL)
         texts = (
             _key(table),
@@ -115,8 +114,8 @@ class CurvePlots(QWidget):
             of_residual if is_fitted else gettext(_NO_RESIDUAL),
         )
         shown = (True, relative is not None, is_fitted)
-        for row, (name, text) in enumerate(zip(_NAMES, texts, strict=True)):
-            self._stack.set_title(row, f"{gettext(name)} &nbsp; {text}")
+        for row, (name, unit, text) in enumerate(zip(_NAMES, _units(curves), texts, strict=True)):
+            self._stack.set_title(row, f"{gettext(name, unit=unit.symbol)} &nbsp; {text}")
             self._stack.set_plot_visible(row, shown=shown[row])
 
     def _restyle(self) -> None:
@@ -141,19 +140,23 @@ class CurvePlots(QWidget):
     def _show_values(self, at_s: float) -> None:
         if self._curves is None:
             return
-        for row, lines in enumerate(_lines(self._curves)):
+        for row, (lines, unit) in enumerate(zip(_lines(self._curves), _units(self._curves), strict=True)):
             values = [value_at(self._curves.time_s, line, at_s) for line in lines]
-            self._stack.show_values(row, at_s, values, _UNITS[row], 3 if row < 2 else 0)
+            self._stack.show_values(row, at_s, values, unit.symbol, unit.decimals)
+
+
+def _units(curves: Curves) -> tuple[ReadingUnit, ...]:
+    return curves.unit, curves.unit, curves.residual_unit
 
 
 def _key(channel: ChannelCurves | None) -> str:
-    return gettext(_RECORD_ONLY if channel is None or channel.simulation_mm is None else _KEY)
+    return gettext(_RECORD_ONLY if channel is None or channel.simulation is None else _KEY)
 
 
 def _lines(curves: Curves) -> tuple[list[Floats], ...]:
     """Lines of each plot: record and simulation of each gauge, and the residuals."""
-    gauges = [(channel.record_mm, channel.simulation_mm) for channel in curves.channels]
-    residuals = [channel.residual_um for channel in curves.channels]
+    gauges = [(channel.record, channel.simulation) for channel in curves.channels]
+    residuals = [channel.residual for channel in curves.channels]
     rows = (*padded(gauges, 2, ()), residuals)
     return tuple([line for line in lines if line is not None] for lines in rows)
 

@@ -14,8 +14,8 @@ from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
 
 _TITLES = (
-    (N_("table displacement u<sub>1</sub>, mm"), "text"),
-    (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
+    N_("table displacement u<sub>1</sub>, {unit}"),
+    N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, {unit}"),
 )
 _MOST = 8
 _MOST_VALUES = 3
@@ -31,9 +31,7 @@ class RunsPreview(QWidget):
         super().__init__()
         self._theme = theme
         self._overlay = Overlay()
-        self._stack = PlotStack(
-            theme, [(gettext(words), token) for words, token in _TITLES], interactive=True
-        )
+        self._stack = PlotStack(theme, [("", "text") for _ in _TITLES], interactive=True)
         self._stack.hovered.connect(self._show_values)
         self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
         self._names = label(role=TextRole.LABEL, wrap=True)
@@ -52,6 +50,8 @@ class RunsPreview(QWidget):
             message=gettext("Select runs to see them here, several to compare them.")
         )
         traces = self._overlay.traces
+        for row, title in enumerate(_TITLES):
+            self._stack.set_title(row, gettext(title, unit=self._overlay.unit))
         self._stack.setVisible(bool(traces))
         self._names.setVisible(bool(traces))
         self._words.setText(gettext(self._overlay.message))
@@ -110,7 +110,9 @@ class RunsPreview(QWidget):
                 if (line := _lines(trace)[row]) is not None
             ]
             values = [value for value in values if math.isfinite(value)]
-            self._stack.show_values(row, at_s, values if len(values) <= _MOST_VALUES else (), "mm")
+            self._stack.show_values(
+                row, at_s, values if len(values) <= _MOST_VALUES else (), self._overlay.unit
+            )
 
 
 def _lines(trace: Trace | None) -> tuple[np.ndarray | None, np.ndarray | None]:

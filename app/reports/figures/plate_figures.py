@@ -6,7 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from analysis.catalogue import MILLIMETRE, SECOND, Unit
+from analysis.catalogue import MILLIMETRE, MILLIMETRES_PER_SECOND, SECOND, Unit
 from analysis.formatting import format_value
 from analysis.plate.friction import PlateFriction
 from analysis.plate.trends import (
@@ -18,7 +18,6 @@ from analysis.plate.trends import (
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigure, RunFigureData
 from app.reports.figures.style import DASHED, PLATE, SIMULATION, new_figure, place_legend_above
 
-_MILLIMETRES_PER_SECOND = Unit("mm/s", 1e3)
 _Trend = Callable[[PlateFriction, float], FrictionTrend]
 
 
@@ -68,7 +67,7 @@ PLATE_FIGURES: Final = (
         "fd-velocity",
         f"Dynamic friction against mean sliding velocity, from the plate alone. {_ENDS}",
         "sliding velocity",
-        _MILLIMETRES_PER_SECOND,
+        MILLIMETRES_PER_SECOND,
         Unit("100 mm/s", 0.1),
         lambda plate, _: trend_with_velocity(plate),
     ),

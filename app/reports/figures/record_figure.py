@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.catalogue import Place, Unit, definition
+from analysis.catalogue import Place, Unit, definition, reading_units
 from analysis.identification import Degree, Identification
 from analysis.record import Record
 from app.reports.figures.style import (
@@ -16,7 +16,6 @@ from app.reports.figures.style import (
     TABLE,
     decimate_for_print,
     print_style,
-    reading_units,
     save_figure,
 )
 

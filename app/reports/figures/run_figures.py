@@ -12,7 +12,15 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from analysis.campaign.contacts import ContactFriction
-from analysis.catalogue import ACCELERATION, METRES_PER_SECOND, MILLIMETRE, Place, Unit, definition
+from analysis.catalogue import (
+    ACCELERATION,
+    METRES_PER_SECOND,
+    MILLIMETRE,
+    Place,
+    Unit,
+    definition,
+    reading_units,
+)
 from analysis.identification import Identification
 from analysis.laws.stand_parts import model_law, simulate_fit
 from analysis.motion.two_mass import Motion, MotionSamples
@@ -27,7 +35,6 @@ from app.reports.figures.style import (
     decimate_for_print,
     new_figure,
     place_legend_above,
-    reading_units,
 )
 from config.schema import Stand
 

@@ -15,8 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.catalogue import MICROMETRE, MILLIMETRE, Unit
-
 TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
 """Colours of the channels and of the simulation, as in the window."""
 DASHED: Final = (0, (4, 2))
@@ -62,11 +60,6 @@ def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
     edges = np.arange(_STRETCHES + 1) * len(value) // _STRETCHES
     ends = np.fmin.reduceat(value, edges[:-1]), np.fmax.reduceat(value, edges[:-1])
     return np.repeat(time_s[(edges[:-1] + edges[1:]) // 2], 2), np.column_stack(ends).ravel()
-
-
-def reading_units(unit: str) -> tuple[Unit, Unit]:
-    """Units in which readings in `unit` and their residuals are drawn: metres as mm and µm."""
-    return (MILLIMETRE, MICROMETRE) if unit == "m" else (Unit(unit), Unit(unit))
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -14,6 +14,7 @@ from analysis.catalogue import (
     QuantityDefinition,
     Unit,
     definition,
+    reading_units,
 )
 from analysis.formatting import format_interval, format_uncertainty, typeset, typeset_sentence
 from analysis.identification import Degree, Identification
@@ -21,7 +22,7 @@ from analysis.plate.trends import velocity_statement
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from analysis.verdict_text import EFFECT_TITLES, describe_verdict, model_title
 from app.reports.figures.record_figure import record_figure
-from app.reports.figures.style import print_style, reading_units
+from app.reports.figures.style import print_style
 from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis

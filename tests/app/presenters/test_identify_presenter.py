@@ -12,6 +12,7 @@ from analysis.identification import Events
 from analysis.quantities import ResultWarning
 from app.presenters.analysed_run import AnalysisTask, Channel, Objective
 from app.presenters.base import Progress, Tone
+from app.presenters.identify.plot_data import measured_lines
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.result_tables import classical_rows
 from app.presenters.identify.state import Cursor, ManualFit, PlotLine, Span
@@ -56,11 +57,24 @@ def test_curves_begin_at_release_with_slip_marked_and_residual_in_micrometres(st
     assert curves is not None
     assert curves.time_s[0] == pytest.approx(-4.0)
     assert curves.slips == (pytest.approx((0.0, 2.5)),)
-    assert curves.noise_um == pytest.approx(20.0)
+    assert curves.noise == pytest.approx(20.0)
     table, relative = curves.channels
-    assert relative.residual_um is not None
-    assert np.std(relative.residual_um) == pytest.approx(20.0, rel=0.05)
-    np.testing.assert_allclose(table.record_mm, 1e3 * run.table.record_m)
+    assert relative.residual is not None
+    assert np.std(relative.residual) == pytest.approx(20.0, rel=0.05)
+    np.testing.assert_allclose(table.record, 1e3 * run.table.record_m)
+
+
+def test_readings_that_are_no_length_keep_their_unit(stage: Stage) -> None:
+    run = replace(analysed(), unit="V", relative=None)
+    stage.presenter.on_analysed(run)
+    curves = stage.presenter.state.curves
+    assert curves is not None
+    record, residual = measured_lines(curves)
+    assert (record.unit, residual.unit) == ("V", "V")
+    np.testing.assert_array_equal(record.values, run.table.record_m)
+    np.testing.assert_array_equal(residual.values, run.table.residual_m)
+    largest = np.nanmax(np.abs(run.table.record_m))
+    assert 10.0**-record.decimals <= 1e-3 * largest
 
 
 def test_slips_are_those_of_the_fitted_motion_where_there_is_one(stage: Stage) -> None:
@@ -82,7 +96,7 @@ def test_a_record_without_release_is_drawn_from_its_start(stage: Stage) -> None:
     stage.show(events=Events(), model=None, relative=None)
     curves = stage.presenter.state.curves
     assert curves is not None
-    assert (curves.time_s[0], curves.slips, curves.noise_um, len(curves.channels)) == (0.0, (), None, 1)
+    assert (curves.time_s[0], curves.slips, curves.noise, len(curves.channels)) == (0.0, (), None, 1)
 
 
 def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:

@@ -148,6 +148,13 @@ def test_no_dash_of_the_legend_is_parted_from_its_name(stage: Stage) -> None:
     ]
 
 
+def test_readings_are_drawn_in_the_unit_that_they_have(stage: Stage) -> None:
+    preview = stage.screen._preview
+    for unit in ("mm", "V"):
+        preview.show_overlay(Overlay((trace("one"),), "time, s", unit=unit))
+        assert all(plot.title.text.endswith(f", {unit}") for plot in preview._stack.plots)
+
+
 def test_selected_runs_are_drawn_over_one_another(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)
