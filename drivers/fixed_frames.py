@@ -7,7 +7,15 @@ import numpy as np
 
 from drivers.arrays import Counts, Ints, Records, UInt8s
 from drivers.compiled import compiled, inlined
-from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet, state_type
+from drivers.packets import (
+    MAX_GAP_S,
+    PACKET,
+    LossEstimator,
+    PacketDecoder,
+    count_estimated_packets,
+    frames_in,
+    state_type,
+)
 
 
 class FixedFrameDecoder(PacketDecoder):
@@ -48,8 +56,10 @@ class FixedFrameDecoder(PacketDecoder):
             gap = self._rows_since(arrival_ns, found)
             packets["damaged"][0] = min(gap, broken[0])
             packets["missing"][0] = gap - packets["damaged"][0]
+        count_estimated_packets(packets, self._state)
         if found:
-            count_packets(packets, self._state)
+            self._state["restarts"] += self._state["restarting"]
+            self._state["restarting"] = 0
         return packets, counts
 
     @abstractmethod
@@ -59,16 +69,6 @@ class FixedFrameDecoder(PacketDecoder):
     @abstractmethod
     def _read_frames(self, buffer: UInt8s, offsets: Ints) -> tuple[Counts, Ints]:
         """Counts (n, 2) and flags of `SampleStatus` (n,) of the frames at `offsets` (n,)."""
-
-
-@compiled
-def count_packets(packets: Records, states: Records) -> None:
-    """Add packets to the counts in `states` (1,)."""
-    state = states[0]
-    for packet in packets:
-        count_packet(state, packet, True)
-    state.restarts += state.restarting
-    state.restarting = 0
 
 
 def read_numbers(buffer: UInt8s, offsets: Ints, places: list[int], size: int) -> Ints:
@@ -136,9 +136,8 @@ def find_marked_frames(
         if at + span > len(buffer):
             break
         if _fits(buffer, at, span, pattern):
-            by_bytes = (2 * state.garbage + length) // (2 * length)
             offsets[found] = at
-            broken[found] = max(state.begun, by_bytes)
+            broken[found] = max(state.begun, frames_in(state.garbage, length))
             state.garbage = state.begun = 0
             state.in_step = 1
             found += 1

@@ -154,6 +154,20 @@ def count_packet(state: Record, packet: Record, is_estimated: bool) -> None:
     state.overloaded += packet.samples if packet.status else 0
 
 
+@compiled
+def count_estimated_packets(packets: Records, states: Records) -> None:
+    """Add packets whose missing rows are estimated to the counts in `states` (1,)."""
+    state = states[0]
+    for packet in packets:
+        count_packet(state, packet, True)
+
+
+@inlined
+def frames_in(size: int, length: int) -> int:
+    """Frames of `length` that `size` bytes without a good one stand for, rounded."""
+    return (2 * size + length) // (2 * length)
+
+
 @inlined
 def is_plausible_gap(state: Record, gap: int) -> bool:
     """Whether the host's clock agrees with the `gap` that a device reports after the connection broke."""

@@ -4,7 +4,9 @@ import operator
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
 
-from drivers.arrays import Counts, Floats, UInt8s
+import numpy as np
+
+from drivers.arrays import Counts, Flags, Floats, Ints, UInt8s
 
 
 class SampleStatus(IntFlag):
@@ -27,6 +29,15 @@ ABSENT_BY_GAUGE = (ABSENT | SampleStatus.TABLE_MISSING, ABSENT | SampleStatus.RE
 
 INCOMPLETE = SampleStatus.MISSING | SampleStatus.TABLE_MISSING | SampleStatus.RELATIVE_MISSING
 """Rows with one of these flags lack a reading that never arrived."""
+
+
+_OVERLOADS = np.array([SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE])
+
+
+def overload_status(is_over: Flags) -> Ints:
+    """Flags of `SampleStatus` (n,), from whether each gauge is overloaded (n, 2); (n, 1) for one gauge."""
+    flags: Ints = is_over @ _OVERLOADS[: is_over.shape[1]]
+    return flags
 
 
 @dataclass(frozen=True, eq=False, slots=True)

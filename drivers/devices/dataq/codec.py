@@ -12,19 +12,31 @@ import numpy as np
 from drivers.arrays import Counts, Int32s, Ints, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.devices.dataq.commands import MODELS, OVERFLOW
-from drivers.packets import MAX_GAP_S, PACKET, LossEstimator, PacketDecoder, count_packet, state_type
-from drivers.samples import SampleStatus
+from drivers.packets import (
+    MAX_GAP_S,
+    PACKET,
+    LossEstimator,
+    PacketDecoder,
+    count_estimated_packets,
+    frames_in,
+    state_type,
+)
+from drivers.samples import overload_status
 from messages.i18n import N_
 from messages.message import Message, message
 
 FOLLOWING = 3
 """Scans that must follow a good one until its readings are given."""
 HIGHEST = 2047 << 4
-"""Readings of this size and more are overload: the largest of 12 bits; 14 and 16 bits reach 15 further."""
+"""Readings of this size and more are overload: the largest of 12 bits. Those of 14 and 16 bits are 12 and 15
+larger."""
 LOWEST = -(1 << 15)
 _DIGITAL_KEPT_BYTES = 4096
 """Bytes without a scan for which the digital inputs are taken to be as they were; about a second."""
-_TABLE, _RELATIVE = int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE)
+_SURE_SHARE = 0.75
+"""Of the bytes, in good scans, of a stream whose layout is told by its fixed bits."""
+_TO_BE_ESTIMATED = -1
+_SIGN = 0x80
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +96,6 @@ def find_layout(data: bytes) -> ScanLayout | None:
         if decoder.inputs_are_open and bytes_of_scans >= _SURE_SHARE * (len(data) - held):
             return layout
     return None
-
-
-_SURE_SHARE = 0.75
 
 
 def left_justified(counts: Counts, bits: int) -> Ints:
@@ -157,7 +166,7 @@ class ScanDecoder(PacketDecoder):
         found = np.concatenate(packets)
         if len(found):
             self._add_gap(found, arrival_ns)
-            count_packets(found, self._state)
+            count_estimated_packets(found, self._state)
         return found, np.concatenate(counts)
 
     def _find_scans(self, data: bytes, counts: list[Int32s]) -> Records:
@@ -174,7 +183,7 @@ class ScanDecoder(PacketDecoder):
         packets = np.zeros(found, dtype=PACKET)
         packets["samples"] = 1
         packets["damaged"] = broken[:found]
-        packets["status"] = (np.abs(readings) >= HIGHEST) @ np.array([_TABLE, _RELATIVE])
+        packets["status"] = overload_status(np.abs(readings) >= HIGHEST)
         if is_first:
             packets["damaged"][:1] = 0
         elif found and self._state[0]["restarting"]:
@@ -190,9 +199,6 @@ class ScanDecoder(PacketDecoder):
         packets["missing"][restarted] = 0
         packets["missing"][restarted[:1]] = self._rows_since(arrival_ns, len(packets))
 
-
-_TO_BE_ESTIMATED = -1
-_SIGN = 0x80
 
 STATE = state_type("garbage is_aligned", "")
 """What the decoder keeps between calls: bytes since the last good scan, and whether the last of them show
@@ -227,7 +233,7 @@ def find_scans(
                     low = buffer[at + 2 * gauge] & ~(zeros[2 * gauge] | digital[2 * gauge])
                     high = np.int32(buffer[at + 2 * gauge + 1])
                     readings[found, gauge] = low + 256 * (high if high < _SIGN else high - 2 * _SIGN)
-                broken[found] = (2 * state.garbage + length) // (2 * length)
+                broken[found] = frames_in(state.garbage, length)
                 found += 1
             for k in range(length):
                 inputs[k] = buffer[at + k] & digital[k]
@@ -269,11 +275,3 @@ def _is_good(
         if not (is_same or is_new):
             return False
     return True
-
-
-@compiled
-def count_packets(packets: Records, states: Records) -> None:
-    """Add packets to the counts in `states` (1,)."""
-    state = states[0]
-    for packet in packets:
-        count_packet(state, packet, True)

@@ -11,7 +11,7 @@ import numpy as np
 from drivers.arrays import Int32s, Ints, Records, UInt8s
 from drivers.compiled import compiled, inlined
 from drivers.fixed_frames import FixedFrameDecoder
-from drivers.packets import MAX_GAP_S, state_type
+from drivers.packets import MAX_GAP_S, frames_in, state_type
 from drivers.samples import SampleStatus
 
 STX, ETX, DLE = 0x02, 0x03, 0x10
@@ -131,9 +131,8 @@ def find_frames(buffer: UInt8s, first: int, states: Records, offsets: Ints, brok
         if end == 0:
             break
         if end > 0 and not fault:
-            by_bytes = (2 * state.garbage + state.length) // (2 * state.length)
             offsets[found] = at
-            broken[found] = max(state.begun, by_bytes)
+            broken[found] = max(state.begun, frames_in(state.garbage, state.length))
             state.length = end - at
             state.garbage = state.begun = state.is_marked = 0
             found += 1

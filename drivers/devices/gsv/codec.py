@@ -10,7 +10,7 @@ from drivers.compiled import compiled, inlined
 from drivers.devices.gsv.commands import END, SYNC
 from drivers.errors import ProtocolError
 from drivers.fixed_frames import FixedFrameDecoder, read_numbers
-from drivers.packets import MAX_GAP_S, state_type
+from drivers.packets import MAX_GAP_S, frames_in, state_type
 from drivers.samples import SampleStatus
 from messages.i18n import N_
 
@@ -177,8 +177,7 @@ def find_frames(
         if is_begun and buffer[at + 2] & _KIND_BITS == pattern.kind:
             if _is_whole(buffer, at, pattern):
                 offsets[found] = at
-                by_bytes = (2 * state.garbage + pattern.length) // (2 * pattern.length)
-                broken[found] = max(state.begun, by_bytes)
+                broken[found] = max(state.begun, frames_in(state.garbage, pattern.length))
                 state.garbage = state.begun = 0
                 found += 1
                 at += pattern.length

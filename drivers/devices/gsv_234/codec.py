@@ -7,7 +7,7 @@ import numpy as np
 from drivers.arrays import Int32s, Ints, UInt8s
 from drivers.fixed_frames import FrameMarks, MarkedFrameDecoder, read_numbers
 from drivers.packets import MAX_GAP_S
-from drivers.samples import SampleStatus
+from drivers.samples import overload_status
 
 GSV_4, GSV_3, GSV_2 = "gsv-4", "gsv-3", "gsv-2"
 CHANNELS = 4  # of a GSV-4
@@ -94,13 +94,9 @@ class FrameDecoder(MarkedFrameDecoder):
     def _read_frames(self, buffer: UInt8s, offsets: Ints) -> tuple[Int32s, Ints]:
         layout = self._layout
         numbers = read_numbers(buffer, offsets, self._places, layout.size) - layout.zero
-        is_clipped = (numbers <= -layout.zero) | (numbers >= layout.max_count)
-        status = np.where(is_clipped[:, 0], int(SampleStatus.OVERLOAD_TABLE), 0)
         counts = np.zeros((len(offsets), 2), dtype=np.int32)
         counts[:, : numbers.shape[1]] = numbers
-        if numbers.shape[1] > 1:
-            status |= np.where(is_clipped[:, 1], int(SampleStatus.OVERLOAD_RELATIVE), 0)
-        return counts, status
+        return counts, overload_status((numbers <= -layout.zero) | (numbers >= layout.max_count))
 
 
 def count_frames(layout: FrameFormat, data: bytes) -> int:

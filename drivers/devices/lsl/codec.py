@@ -9,11 +9,11 @@ from drivers.packets import (
     MAX_GAP_S,
     PACKET,
     PacketDecoder,
-    count_packet,
+    count_estimated_packets,
     is_plausible_gap,
     state_type,
 )
-from drivers.samples import SampleStatus
+from drivers.samples import overload_status
 from drivers.stream_packets import DESCRIPTION, unpack_chunk
 
 CONFIRMED_S = 0.1
@@ -26,7 +26,6 @@ _SCATTERS = 8.0
 """Nor is a lateness below so many times the mean scatter of the stamps a gap."""
 _FIRST_SCATTER_S = 0.002
 """Scatter that is assumed before it is measured: that of stamps by a common computer's clock."""
-_TABLE, _RELATIVE = int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE)
 
 STATE = state_type("broken", "stamp_s scatter_s")
 """What the decoder keeps between calls: samples without a reading since the last good one, the smoothed stamp
@@ -62,9 +61,6 @@ class StreamDecoder(PacketDecoder):
     def unfinished_bytes(self) -> int:
         return self._unwrapper.unfinished_bytes
 
-    def expect_restart(self) -> None:
-        super().expect_restart()
-
     def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:
         stamps_s, values = self._unpack(data)
         if self._state[0]["restarting"]:
@@ -75,8 +71,8 @@ class StreamDecoder(PacketDecoder):
         self._held = (stamps_s[used:], values[used:])
         counts = values[:used][is_good[:used]]
         packets = packets[:found]
-        packets["status"] = (np.abs(counts) >= self._overload) @ np.array([_TABLE, _RELATIVE])
-        count_packets(packets, self._state)
+        packets["status"] = overload_status(np.abs(counts) >= self._overload)
+        count_estimated_packets(packets, self._state)
         return packets, counts
 
     def _unpack(self, data: bytes) -> tuple[Floats, Floats]:
@@ -178,11 +174,3 @@ def _restart(state: Record, packet: Record, stamp_s: float) -> None:
     state.restarting = 0
     packet.damaged = min(gap, state.broken)
     packet.missing = gap - packet.damaged
-
-
-@compiled
-def count_packets(packets: Records, states: Records) -> None:
-    """Add packets to the counts in `states` (1,)."""
-    state = states[0]
-    for packet in packets:
-        count_packet(state, packet, True)
