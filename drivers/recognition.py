@@ -7,7 +7,7 @@ from drivers.envelope import Unwrapper
 from drivers.registry import AVAILABLE, DRIVERS
 from drivers.source import LineSettings
 from messages.i18n import N_
-from messages.message import EMPTY, Message, message
+from messages.message import EMPTY, Message, message, option
 
 MIN_PACKETS = 3
 """Fewer frames or lines do not identify a protocol: one can be a coincidence, and the first is often cut."""
@@ -81,6 +81,12 @@ def unless_coincidence(found: Recognition, *, has_checksum: bool) -> Recognition
 def rate_from_count(samples: int, duration_s: float | None) -> float | None:
     """Samples a second to three digits, from how many came in `duration_s`; None where that is unknown."""
     return float(f"{(samples - 1) / duration_s:.3g}") if duration_s and samples > 1 else None
+
+
+def which_channels(channels: int) -> Message:
+    """Remark on a device that sends more channels than there are gauges."""
+    template = N_("of its {channels} channels say which the gauges are: {option} table=N {option} relative=N")
+    return message(template, option=option("--set"), channels=channels)
 
 
 def describe_unreadable(received: bytes, protocol: str, baud: int | None = None) -> Message:

@@ -240,6 +240,10 @@ class SampleSource(ABC):
             "the device sends and does not answer: check the line from this computer to the device"
         )
 
+    def no_rate_error(self) -> ProtocolError:
+        """Error for a device that was asked for its rate and tells none."""
+        return ProtocolError("the device does not tell its rate: switch it off and on, and try again")
+
     def no_data_error(self, received: bytes) -> NoDataError:
         what = describe_unreadable(received, self._identity.protocol, self._baud)
         _log.info("no good data: %s", what)

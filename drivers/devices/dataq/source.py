@@ -8,12 +8,12 @@ import numpy as np
 from drivers.devices.dataq import DRIVER, codec, commands
 from drivers.devices.dataq.codec import ScanDecoder, ScanLayout
 from drivers.devices.dataq.commands import MODELS, Divisors, Model
-from drivers.errors import ProtocolError, SettingsError
+from drivers.errors import ProtocolError
 from drivers.polling import drain
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import SampleSource, check_gauge_channels, parse_settings
+from drivers.stream import SampleSource, check_gauge_channels, check_rate, parse_settings
 from messages.i18n import N_
 from messages.message import Message, message
 
@@ -78,10 +78,9 @@ class DataqSource(SampleSource):
         drain(link)
         link.write(commands.START)
         header, layout = codec.header(model.name), codec.layout_of(model.name)
-        self._tail = b""
-        return header + self.await_stream(
-            link, lambda data: _has_scans(header + data, layout), self.timeout_s
-        )
+        first = self.await_stream(link, lambda data: _has_scans(header + data, layout), self.timeout_s)
+        self._tail = first[-len(commands.OVERFLOW) :]
+        return header + first
 
     def read(self, link: Link) -> bytes:
         data = super().read(link)
@@ -155,11 +154,8 @@ def _has_scans(data: bytes, layout: ScanLayout) -> bool:
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> DataqSource:
     """Source of the device. Raises SettingsError for a setting or rate that cannot be."""
-    parsed = parse_settings(DataqSettings, settings, DRIVER.name)
-    if rate_hz is not None and not 0 < rate_hz < commands.DIVIDEND_HZ:
-        template = N_("rate {rate_hz:g} Hz cannot be: give the instrument's, for example {usual_hz:g}")
-        raise SettingsError(template, rate_hz=rate_hz, usual_hz=RATE_HZ)
-    return DataqSource(parsed, rate_hz or RATE_HZ)
+    check_rate(rate_hz)
+    return DataqSource(parse_settings(DataqSettings, settings, DRIVER.name), rate_hz or RATE_HZ)
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:

@@ -9,12 +9,18 @@ from drivers.devices.gsv import DRIVER, codec, commands
 from drivers.devices.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.devices.gsv.commands import Code, InputType, Response
 from drivers.errors import ProtocolError
-from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
+from drivers.recognition import (
+    IdentityQuery,
+    Recognition,
+    rate_from_count,
+    unless_coincidence,
+    which_channels,
+)
 from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, parse_settings
 from messages.i18n import N_
-from messages.message import EMPTY, Message, message, option
+from messages.message import EMPTY, Message, message
 
 _TRIES = 2
 _CORNER_PER_RATE = 0.4
@@ -123,7 +129,7 @@ class GsvSource(SampleSource):
         response = self._ask(link, commands.encode_request(Code.READ_RATE))
         actual_hz = commands.rate_from_response(response) if response else None
         if actual_hz is None:
-            raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
+            raise self.no_rate_error()
         if not self.is_same_rate(actual_hz):
             template = N_(
                 "the device does not take {rate_hz:g} Hz and stays at {actual_hz:g} Hz: "
@@ -170,12 +176,8 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     layout = FrameLayout(channels, kind)
     frames = sum(map(len, FrameDecoder(layout, 1.0).feed(data, 0)))
     share = frames * layout.length / max(len(data), 1)
-    settings, remark = {} if kind is ValueKind.FLOAT32 else {"format": "device"}, EMPTY
-    if channels > DRIVER.channels:
-        template = N_(
-            "of its {channels} channels say which the gauges are: {option} table=N {option} relative=N"
-        )
-        remark = message(template, option=option("--set"), channels=channels)
+    settings = {} if kind is ValueKind.FLOAT32 else {"format": "device"}
+    remark = which_channels(channels) if channels > DRIVER.channels else EMPTY
     rate_hz = rate_from_count(frames, duration_s)
     found = Recognition(DRIVER.name, share, frames, settings=settings, rate_hz=rate_hz, remark=remark)
     return unless_coincidence(found, has_checksum=False)

@@ -9,7 +9,13 @@ from drivers.devices.gsv_234 import DRIVER, codec, commands
 from drivers.devices.gsv_234.codec import FORMATS, GSV_2, GSV_3, GSV_4, FrameDecoder
 from drivers.devices.gsv_234.commands import Code
 from drivers.errors import ProtocolError, SettingsError
-from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
+from drivers.recognition import (
+    IdentityQuery,
+    Recognition,
+    rate_from_count,
+    unless_coincidence,
+    which_channels,
+)
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_gauge_channels, check_rate, parse_settings
@@ -116,7 +122,7 @@ class Gsv234Source(SampleSource):
         answer = self._ask(link, commands.read_rate(self._model))
         actual_hz = commands.rate_from_answer(self._model, answer) if answer else None
         if actual_hz is None:
-            raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
+            raise self.no_rate_error()
         return actual_hz
 
 
@@ -146,12 +152,7 @@ def _recognise_model(model: str, data: bytes, duration_s: float | None) -> Recog
     layout = FORMATS[model]
     frames = codec.count_frames(layout, data)
     share = frames * layout.marks.length / max(len(data), 1)
-    remark = EMPTY
-    if model == GSV_4:
-        template = N_(
-            "of its {channels} channels say which the gauges are: {option} table=N {option} relative=N"
-        )
-        remark = message(template, option=option("--set"), channels=codec.CHANNELS)
+    remark = which_channels(codec.CHANNELS) if model == GSV_4 else EMPTY
     rate_hz = rate_from_count(frames + 1, duration_s)  # the last frame was left out
     settings = {} if model == GSV_4 else {"format": model}
     channels = len(layout.places) if len(layout.places) == 1 else DRIVER.channels

@@ -12,10 +12,8 @@ from drivers.samples import SampleStatus
 
 MAX_COUNT = 2**23 - 1
 """Of a value of three bytes; 5,120,000 at nominal load unless the device is scaled (NOV)."""
-OVERFLOWS = 0x07
-"""Bits of the status: net, gross and converter overflow."""
-_INCOHERENT = 0xC0  # value and status do not belong together
-_NOT_GOOD = OVERFLOWS | _INCOHERENT
+_NOT_GOOD = 0x07 | 0xC0
+"""Bits of the status: net, gross and converter overflow; value and status do not belong together."""
 _CR_LF = (0x0D, 0x0A)
 _SIGN_BITS = 1 << 24
 _VALUE_CHARACTERS = 8

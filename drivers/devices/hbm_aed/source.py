@@ -82,9 +82,7 @@ class HbmAedSource(SampleSource):
             DRIVER.name, f"HBM {identity.name}", identity.firmware, identity.serial_number
         )
         self._require(link, commands.set_format(self._output.code))
-        self.request(
-            link, commands.STATUS_IN_VALUES, commands.find_line
-        )  # refused by those that have no other
+        self.request(link, commands.STATUS_IN_VALUES, commands.find_line)  # some have no other, and refuse
         if self._settings.filter == "off":
             self._require(link, commands.FILTER_OFF)
         return self._start_at_rate(link)
@@ -99,49 +97,41 @@ class HbmAedSource(SampleSource):
 
     def _start_at_rate(self, link: Link) -> bytes:
         """Start, find out the rate, and start again where another one was asked for."""
-        asked_hz = self._rate_hz
         divider = self._read_divider(link)
         if self._full_hz is not None:
-            wanted = commands.find_divider(self._full_hz, self.rate_hz)
-            if wanted is not None and wanted != divider:
-                self._require(link, commands.set_divider(wanted))
-            return self._await_values(link)
+            return self._start_again(link, self._full_hz, divider)
         received, sent_hz = self._start_stream(link)
-        full_hz = commands.full_rate(sent_hz, divider) if sent_hz else None
-        if full_hz is None:
-            template = N_(
-                "the device sends {sent_hz:.3g} values a second at ICR{divider}, which is none of the rates"
-                " known of it ({rates} at ICR0): raise its baud rate"
-            )
-            rates = [f"{rate_hz:g}" for rate_hz in commands.FULL_RATES_HZ]
-            raise ProtocolError(template, sent_hz=sent_hz or 0.0, divider=divider, rates=rates)
-        if asked_hz is None:
-            self._full_hz, self._rate_hz = full_hz, full_hz / 2**divider
-            return received
-        wanted = commands.find_divider(full_hz, asked_hz)
-        if wanted is None:
-            template = N_("the device cannot send {rate_hz:g} Hz: give one of {rates}")
-            rates = [f"{full_hz / 2**n:g}" for n in range(commands.MAX_DIVIDER + 1)]
-            raise SettingsError(template, rate_hz=asked_hz, rates=rates)
-        if wanted == divider:
-            self._full_hz = full_hz
-            return received
-        self.silence(link)
-        self._require(link, commands.set_divider(wanted))
+        full_hz = _full_rate(sent_hz, divider)
+        wanted = divider if self._rate_hz is None else _divider_for(full_hz, self._rate_hz)
+        if wanted != divider:
+            self.silence(link)
+            received = self._start_divided(link, full_hz, wanted)
+        self._full_hz, self._rate_hz = full_hz, self._rate_hz or full_hz / 2**divider
+        return received
+
+    def _start_again(self, link: Link, full_hz: float, divider: int) -> bytes:
+        """Start a device that is back, whose full rate is known and whose divider may have been lost."""
+        wanted = _divider_for(full_hz, self.rate_hz)
+        if wanted != divider:
+            self._require(link, commands.set_divider(wanted))
+        return self._await_values(link)
+
+    def _start_divided(self, link: Link, full_hz: float, divider: int) -> bytes:
+        """Set the divider, start, and check the rate by the host's clock."""
+        self._require(link, commands.set_divider(divider))
         received, sent_hz = self._start_stream(link)
-        if sent_hz is None or commands.full_rate(sent_hz, wanted) != full_hz:
+        if sent_hz is None or commands.full_rate(sent_hz, divider) != full_hz:
             template = N_(
                 "the device was set to {rate_hz:g} Hz and sends {sent_hz:.3g} Hz: raise its baud rate, or ask"
                 " for a lower rate"
             )
-            raise ProtocolError(template, rate_hz=asked_hz, sent_hz=sent_hz or 0.0)
-        self._full_hz = full_hz
+            raise ProtocolError(template, rate_hz=self.rate_hz, sent_hz=sent_hz or 0.0)
         return received
 
     def _read_divider(self, link: Link) -> int:
         line = self.request(link, commands.READ_DIVIDER, commands.find_line)
         if line is None or not line.isdigit() or int(line) > commands.MAX_DIVIDER:
-            raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
+            raise self.no_rate_error()
         return int(line)
 
     def _start_stream(self, link: Link) -> tuple[bytes, float | None]:
@@ -171,6 +161,29 @@ class HbmAedSource(SampleSource):
                 "values come without line ends, so that a lost byte would not show: set format to ascii"
             )
         return self.no_data_error(received)
+
+
+def _full_rate(sent_hz: float | None, divider: int) -> float:
+    """Rate at ICR0 of a device that sends `sent_hz`. Raises ProtocolError if no known one does."""
+    full_hz = commands.full_rate(sent_hz, divider) if sent_hz else None
+    if full_hz is None:
+        template = N_(
+            "the device sends {sent_hz:.3g} values a second at ICR{divider}, which is none of the rates"
+            " known of it ({rates} at ICR0): raise its baud rate"
+        )
+        rates = [f"{rate_hz:g}" for rate_hz in commands.FULL_RATES_HZ]
+        raise ProtocolError(template, sent_hz=sent_hz or 0.0, divider=divider, rates=rates)
+    return full_hz
+
+
+def _divider_for(full_hz: float, rate_hz: float) -> int:
+    """The divider for a rate. Raises SettingsError if the device has not that rate."""
+    divider = commands.find_divider(full_hz, rate_hz)
+    if divider is None:
+        template = N_("the device cannot send {rate_hz:g} Hz: give one of {rates}")
+        rates = [f"{full_hz / 2**n:g}" for n in range(commands.MAX_DIVIDER + 1)]
+        raise SettingsError(template, rate_hz=rate_hz, rates=rates)
+    return divider
 
 
 def _until_steady(arrivals: ArrivalRate, frame_bytes: int) -> Callable[[bytes], bool]:

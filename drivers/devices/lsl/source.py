@@ -9,16 +9,15 @@ from drivers.devices.lsl import DRIVER
 from drivers.devices.lsl.codec import StreamDecoder
 from drivers.envelope import Unwrapper
 from drivers.errors import ProtocolError, SettingsError
-from drivers.recognition import Recognition
+from drivers.recognition import Recognition, which_channels
 from drivers.samples import DeviceIdentity
 from drivers.source import Link
-from drivers.stream import SampleSource, check_gauge_channels, parse_settings
+from drivers.stream import SampleSource, check_gauge_channels, check_rate, parse_settings
 from drivers.stream_packets import DESCRIBE, StreamDescription, find_description, pack_chunk, unpack_chunk
 from messages.i18n import N_
 from messages.message import Message, message, option
 
 _MAX_CHANNELS = 500
-_GAUGES = 2
 
 
 class LslSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -112,11 +111,8 @@ def _has_samples(data: bytes) -> bool:
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> LslSource:
     """Source of the stream. Raises SettingsError for a setting or rate that cannot be."""
-    parsed = parse_settings(LslSettings, settings, DRIVER.name)
-    if rate_hz is not None and not 0 < rate_hz < math.inf:
-        template = N_("rate {rate_hz:g} Hz cannot be: give that of the stream, or leave --rate out")
-        raise SettingsError(template, rate_hz=rate_hz)
-    return LslSource(parsed, rate_hz)
+    check_rate(rate_hz)
+    return LslSource(parse_settings(LslSettings, settings, DRIVER.name), rate_hz)
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:  # noqa: ARG001 - it tells its rate
@@ -126,7 +122,7 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:  # n
     if description is None or not samples:
         return None
     rate_hz = description.rate_hz or None
-    gauges = min(description.channels, _GAUGES)
+    gauges = min(description.channels, DRIVER.channels)
     return Recognition(
         DRIVER.name, 1.0, samples, gauges, rate_hz=rate_hz, needs_rate=rate_hz is None,
         remark=_channels_remark(description),
@@ -134,10 +130,8 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:  # n
 
 
 def _channels_remark(description: StreamDescription) -> Message:
-    template = N_("of its {channels} channels say which the gauges are: {option} table=N {option} relative=N")
+    if not description.labels:
+        return which_channels(description.channels)
     labels = ", ".join(f"{k} {label}" for k, label in enumerate(description.labels))
-    if labels:
-        template = N_(
-            "of its channels ({labels}) say which the gauges are: {option} table=N {option} relative=N"
-        )
-    return message(template, channels=description.channels, labels=labels, option=option("--set"))
+    template = N_("of its channels ({labels}) say which the gauges are: {option} table=N {option} relative=N")
+    return message(template, labels=labels, option=option("--set"))
