@@ -61,9 +61,9 @@ class SimulatedDevice:
 
     A stream starts by command, or when the port is opened; sample k is taken at k / rate of the device's own
     clock. The stand's own time begins with a session: a stream that is started afresh. A stream that is
-    started after the last one was interrupted (cable, power, or a reader that left without a command)
-    continues the session, because the stand does not wait. A stream that resumed by itself may be stopped and
-    started once within the session.
+    started after the last one was interrupted (cable, power, an overflow, or a reader that left without a
+    command) continues the session, because the stand does not wait. A stream that resumed by itself may be
+    stopped and started once within the session.
     """
 
     _NO_STREAM_S = 0.02
@@ -118,7 +118,10 @@ class SimulatedDevice:
             if self._transport.resets_device:
                 self._stream = None
             self._was_interrupted = self.is_streaming
-        return self._stream.send_due(now_ns, self._has_reader) if self._stream else self._NO_STREAM_S
+        wait_s = self._stream.send_due(now_ns, self._has_reader) if self._stream else self._NO_STREAM_S
+        if isinstance(self._stream, stream_sender.BufferedSender) and self._stream.is_over:
+            self._stream, self._was_interrupted = None, True
+        return wait_s
 
     def _time_s(self, now_ns: int) -> float:
         if self._session_ns is None:
@@ -188,7 +191,8 @@ class SimulatedDevice:
         clock = stream_sender.DeviceClock(
             device_rate_hz, self._setup.first_sequence, self._setup.first_time_s
         )
-        return StreamSender(self._output, signal, clock, self.log, now_ns)
+        kind = stream_sender.BufferedSender if self._protocol.buffer_bytes else StreamSender
+        return kind(self._output, signal, clock, self.log, now_ns)
 
 
 class PolledDevice(SimulatedDevice):

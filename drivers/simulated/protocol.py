@@ -59,6 +59,14 @@ class SimulatedProtocol(ABC):
     line_end = b""
     """What ends a frame; damage to its last byte damages the next frame too. b"" for frames of fixed form."""
     flags_overload = False  # whether a frame flags clipped readings
+    buffer_bytes = 0
+    """Room for what the port does not take, before the stream ends; 0: that is lost, as on a UART."""
+    packet_bytes = 1
+    """A device with a buffer sends no less at once, unless its stream has ended."""
+
+    def overflow(self) -> bytes:
+        """Stop, because the buffer is full; returns the last bytes of the stream."""
+        return b""
 
     def open_transport(self, rate_hz: float) -> Transport | None:  # noqa: ARG002
         """Port of a device that has no serial one, at its rate (Hz); None for most."""

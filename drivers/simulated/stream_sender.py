@@ -155,7 +155,7 @@ class StreamSender:
         was_line_open = damager.is_line_open
         sent = list(map(self._output.distort, encoded, taken_s.tolist()))
         data = b"".join(part for part, _ in sent)
-        room = self._output.transport.send(data) if has_reader else 0
+        room = self._deliver(data) if has_reader else 0
         if room < len(data):
             ended = data[:room].endswith(protocol.line_end)
             damager.is_line_open = not ended if room else was_line_open and has_reader
@@ -168,3 +168,42 @@ class StreamSender:
             log.add(self._n, happened)
             if protocol.flags_overload and happened is None and row.any():
                 log.samples_flagged += self._n
+
+    def _deliver(self, data: bytes) -> int:
+        """Send; returns the number of bytes that are not lost."""
+        return self._output.transport.send(data)
+
+
+class BufferedSender(StreamSender):
+    """Sends whole packets, keeps what the port does not take, and ends where there is no room for more."""
+
+    def __init__(
+        self, output: WireOutput, signal: Signal, clock: DeviceClock, log: TransmissionLog, started_ns: int
+    ) -> None:
+        super().__init__(output, signal, clock, log, started_ns)
+        self._buffer = b""
+        self._has_overflowed = False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has overflowed, and all that was kept is sent."""
+        return self._has_overflowed and not self._buffer
+
+    def send_due(self, now_ns: int, has_reader: bool) -> float:
+        if not has_reader:
+            self._buffer = b""
+        if self._has_overflowed:
+            self._buffer = self._buffer[self._output.transport.send(self._buffer) :]
+            return self._STEP_S
+        return super().send_due(now_ns, has_reader)
+
+    def _deliver(self, data: bytes) -> int:
+        protocol = self._output.protocol
+        self._buffer += data
+        whole = len(self._buffer) - len(self._buffer) % protocol.packet_bytes
+        self._buffer = self._buffer[self._output.transport.send(self._buffer[:whole]) :]
+        lost = max(0, len(self._buffer) - protocol.buffer_bytes)
+        if lost:
+            self._has_overflowed = True
+            self._buffer = self._buffer[: protocol.buffer_bytes] + protocol.overflow()
+        return len(data) - lost

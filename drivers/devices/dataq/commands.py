@@ -15,6 +15,7 @@ STOP = b"stop\r"
 START = b"start 0\r"
 OVERFLOW = b"stop 01"
 """Last bytes of a stream whose instrument had no room left for readings (page 50)."""
+BUFFER_BYTES = 2048  # 1024 readings (page 50)
 DIVIDEND_HZ = 60_000_000
 """The rate is this by srate, dec and deca (page 48)."""
 MAX_SRATE = 65_535
@@ -22,7 +23,7 @@ MAX_DEC = 512
 MAX_DECA = 40_000
 DIGITAL_INPUTS = 8  # scan list word of the digital inputs (pages 41 to 46)
 PACKET_BYTES = 16  # of `ps 0`; each step doubles it (page 20)
-_MAX_PACKET = 7
+MAX_PACKET = 7  # its highest argument
 _PACKET_S = 0.005  # a packet is sent when it is full: it is to delay readings by no more
 
 
@@ -57,7 +58,7 @@ class Model:
 
 _WIDE_V = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
 _MODELS = (
-    Model("1100", 12, 4, lowest_srate=2000, has_dec=False, has_digital_word=False),  # of two channels
+    Model("1100", 12, 4, lowest_srate=2000, has_dec=False, has_digital_word=False),  # with two channels
     Model("1110", 12, 8, has_dec=False),
     Model("1120", 14, 4, _WIDE_V),
     Model("2108", 16, 8),
@@ -102,7 +103,7 @@ def divisors_for(model: Model, rate_hz: float, *, averages: bool, dividend_hz: f
 def packet_size(bytes_per_s: float) -> int:
     """Argument of `ps` for a stream: packets of 16 to 2048 bytes that are full after 5 ms, if possible."""
     packets = max(1.0, bytes_per_s * _PACKET_S / PACKET_BYTES)
-    return min(_MAX_PACKET, math.floor(math.log2(packets)))
+    return min(MAX_PACKET, math.floor(math.log2(packets)))
 
 
 def find_reply(received: bytes, command: str) -> str | None:

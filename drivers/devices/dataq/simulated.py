@@ -12,7 +12,7 @@ from drivers.stream import parse_settings
 MODEL = "2108"  # unless another is set
 FIRMWARE = "87"  # hexadecimal hundredths: 1.35
 SERIAL_NUMBER = "5A3C10E2"
-_VALUES = {"srate": 30_000, "dec": 1, "deca": 1, "ps": 0, "encode": 0, "eol": 0}
+_VALUES = {"srate": 30_000, "dec": 1, "deca": 1, "encode": 0, "eol": 0}
 """At power-on; the rate is the driver's usual one."""
 _DIVISORS = ("srate", "dec", "deca")
 _ECHOED = ("filter", "led", "endo", "dout", "reset")
@@ -24,11 +24,11 @@ _LINE_ENDS = ("\r", "\n", "\r\n")  # by `eol` (page 39)
 class SimulatedDataq(SimulatedProtocol):
     """Sends a scan a sample: the words of its scan list; an analog channel without a gauge reads 0.
 
-    The size of packets (`ps`) is answered, not simulated: a scan is sent when it is taken. While it scans,
-    all commands but `stop` are ignored. After `encode 1` it sends lines of volts.
+    While it scans, all commands but `stop` are ignored. After `encode 1` it sends lines of volts.
     """
 
     max_count = -codec.LOWEST - 1
+    buffer_bytes = commands.BUFFER_BYTES
 
     def __init__(self, settings: DataqSettings) -> None:
         self._model = MODELS[MODEL if settings.model == "auto" else settings.model]
@@ -36,8 +36,13 @@ class SimulatedDataq(SimulatedProtocol):
         self._volts_per_count = settings.range_v / -codec.LOWEST
         self.max_rate_hz = commands.DIVIDEND_HZ / self._model.lowest_srate
         self._values = dict(_VALUES)
+        self.packet_bytes = commands.PACKET_BYTES
         self._scan_list = [0]
         self._is_scanning = False
+
+    def overflow(self) -> bytes:
+        self._is_scanning = False
+        return commands.OVERFLOW
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
         *lines, rest = data.split(commands.END)
@@ -100,10 +105,12 @@ class SimulatedDataq(SimulatedProtocol):
                 facts = {0: "DATAQ", 1: self._model.name, 2: FIRMWARE, 6: SERIAL_NUMBER}
                 told = (facts | {9: str(commands.DIVIDEND_HZ)}).get(number, "")
             case "ps", []:
-                told = str(commands.PACKET_BYTES << self._values["ps"])
+                told = str(self.packet_bytes)
+            case "ps", [step] if step <= commands.MAX_PACKET:
+                self.packet_bytes = commands.PACKET_BYTES << step
             case "slist", [place, word] if place <= len(self._scan_list):
                 self._scan_list[place:] = [word]
-            case (("ps" | "encode" | "eol"), [value]):
+            case (("encode" | "eol"), [value]):
                 self._values[name] = value
             case _, [] if name in _DIVISORS:
                 told = str(self._values[name])

@@ -97,16 +97,16 @@ def test_an_instrument_that_overflowed_is_started_again():
 
 
 @pytest.mark.parametrize(
-    ("settings", "rate_hz", "model", "fault"),
+    ("settings", "model", "fault"),
     [
-        ({"model": "1110"}, None, "2108", "DI-2108, and 1110 can be read: choose its port"),
-        ({"table": "5"}, None, "1100", "DI-1100 has channels 0 to 3, and a gauge is to be on 5"),
-        ({"range_v": "5"}, None, "2108", "DI-2108 has no range of 5 V: set range_v to one of 10"),
+        ({"model": "1110"}, "2108", "DI-2108, and 1110 can be read: choose its port"),
+        ({"table": "5"}, "1100", "DI-1100 has channels 0 to 3, and a gauge is to be on 5"),
+        ({"range_v": "5"}, "2108", "DI-2108 has no range of 5 V: set range_v to one of 10"),
     ],
 )
-def test_what_the_model_cannot_is_said(settings, rate_hz, model, fault):
+def test_what_the_model_cannot_is_said(settings, model, fault):
     with pytest.raises(ProtocolError, match=fault):
-        make_source(settings, rate_hz).start(ScriptedLink(Firmware(model)))
+        make_source(settings, None).start(ScriptedLink(Firmware(model)))
 
 
 def test_a_model_that_is_not_read_is_named():

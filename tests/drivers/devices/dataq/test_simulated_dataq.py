@@ -81,7 +81,9 @@ def test_what_the_manual_says_is_answered(wire):
         "srate 375", "filter 1 2", "deca 3",
     ]  # fmt: skip
     assert ask(device, wire, "srate 374", "dec 513", "deca 0", "nonsense") == ""
-    assert ask(device_on(Wire(), "1110"), wire, "dec 2") == ""
+    without_dec = Wire()
+    device = device_on(without_dec, "1110")
+    assert ask(device, without_dec, "dec 2", "deca 2", "ps 8") == "deca 2\r"
 
 
 def test_while_it_scans_it_obeys_stop_alone(wire):
@@ -94,6 +96,43 @@ def test_while_it_scans_it_obeys_stop_alone(wire):
     assert set(bytes(wire.sent[before:])) <= set(scan)
     assert ask(device, wire, "stop") == "stop\r"
     assert ask(device, wire, "srate") == "srate 30000\r"
+
+
+def test_a_packet_is_sent_when_it_is_full(wire):
+    device = device_on(wire, "2108")
+    ask(device, wire, "ps 2", "slist 0 0", "slist 1 1", "slist 2 8")
+    before = len(wire.sent)
+    ask(device, wire, "start 0")
+    sizes = []
+    for time_ms in range(1, 60):
+        device.step(time_ms * 1_000_000)
+        sizes.append(len(wire.sent) - before)
+    assert {size % 64 for size in sizes} == {0}
+    assert sizes[-1] == 118 * 6 // 64 * 64
+
+
+def test_an_instrument_that_is_not_read_stops_when_1024_readings_wait(wire):
+    device = device_on(wire, "2108")
+    ask(device, wire, "slist 0 0", "slist 1 1", "slist 2 8")
+    wire.empty()
+    before, wire.room = len(wire.sent), 600
+    ask(device, wire, "start 0")
+    end_ns = run_for(device, 0.5)
+    assert len(wire.sent) - before == 600
+    wire.room = 10**6
+    end_ns = run_for(device, 0.1, end_ns)
+    scans, rest = divmod(600 + 2048, 6)
+    scan = encode_scans(WITH_DIGITAL, np.array([[3200, -6400]])).tobytes()
+    assert bytes(wire.sent[before:]) == scan * scans + scan[:rest] + b"stop 01"
+    assert device.log.samples - device.log.samples_lost == scans
+    assert not device.is_streaming
+    assert ask(device, wire, "srate") == "srate 30000\r"
+    wire.inbox = b"start 0\r"
+    run_for(device, 0.1, end_ns)
+    assert bytes(wire.sent).endswith(
+        b"srate 30000\r" + scan * (200 * 6 // 16 * 16 // 6) + scan[: 200 * 6 // 16 * 16 % 6]
+    )
+    assert len(device.earlier_logs) == 1  # the stand went on
 
 
 def test_text_is_volts(wire):
