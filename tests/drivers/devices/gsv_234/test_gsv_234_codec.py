@@ -134,7 +134,6 @@ def test_rows_stand_for_the_time_of_a_broken_connection():
     decoder = FrameDecoder(FORMATS[GSV_4], RATE_HZ)
     list(decoder.feed(b"".join(frames(GSV_4, 11)), 10**9))
     decoder.expect_restart()
-    block = join([*decoder.feed(b"", 0)])
     (block, *_) = decoder.feed(b"".join(frames(GSV_4, 11, first=60)), 1_500_000_000)
     assert block.first_index == 10
     assert np.count_nonzero(block.status == MISSING) == decoder.losses.missing_estimated

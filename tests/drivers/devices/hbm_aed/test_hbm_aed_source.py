@@ -194,3 +194,4 @@ def test_the_simulated_device_answers_and_sends_when_it_is_asked():
     np.testing.assert_array_equal(block.counts[:, 0], np.arange(len(block)))
     assert len(block) == device.log.samples >= 119
     assert ask(device, wire, b";STP;", now_ns=100_000_000) == b""
+    assert ask(device, wire, b"", now_ns=200_000_000) == b""
