@@ -86,10 +86,12 @@ class DeviceDriver:
 
     @property
     def identity_queries(self) -> "tuple[IdentityQuery, ...]":
-        """The questions that ask a silent device who it is; `IDENTITY_QUERIES` where there are several."""
+        """The questions that ask a silent device who it is; `identity_queries()` where there are several."""
         source = self._source()
-        one = getattr(source, "IDENTITY_QUERY", None)
-        return getattr(source, "IDENTITY_QUERIES", (one,) if one else ())
+        several, one = (getattr(source, name, None) for name in ("identity_queries", "IDENTITY_QUERY"))
+        if several is not None:
+            return cast("tuple[IdentityQuery, ...]", several())
+        return () if one is None else (one,)
 
     def explain(self, received: bytes) -> Message | None:
         """Why the device sent `received` instead of samples, where its own bytes show it."""

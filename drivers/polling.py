@@ -49,6 +49,10 @@ class PollRequest(Protocol):
     def is_complete(self, received: bytes) -> bool:
         """Whether as much came as the response has; it may still be wrong."""
 
+    @property
+    def is_repeated(self) -> bool:
+        """Whether the response is the request itself, from which an echo does not differ."""
+
 
 def sample_period_ns(rate_hz: float) -> int:
     """Time between two samples (ns); their grid begins at 0 of the host's clock."""
@@ -76,9 +80,11 @@ def quasi_static_note(rate_hz: float) -> Message:
 class Transaction:
     """A request on the wire, and what came after it."""
 
-    data: bytes  # all that came; b"" after a time-out
+    data: bytes  # all that came, without an echo of the request; b"" after a time-out
     sent_ns: int  # host's time before the request was written
     received_ns: int  # host's time after the last byte was read
+    has_echo: bool = False
+    """Whether the line sent the request back, as two-wire adapters do that listen while they send."""
 
     @property
     def measured_ns(self) -> int:
@@ -94,22 +100,25 @@ class Transaction:
         return (self.received_ns - self.sent_ns) / _NS
 
 
-def transact(link: Link, request: PollRequest, timeout_s: float) -> Transaction:
+def transact(link: Link, request: PollRequest, timeout_s: float, *, has_echo: bool = False) -> Transaction:
     """Send a request and read its response; may raise DeviceLostError.
 
     Reading ends when the response is complete, after `timeout_s`, or in an incomplete response after one read
-    without bytes (50 ms on a port).
+    without bytes (50 ms on a port). `has_echo`: the line is known to send back what is written to it.
     """
+    sent = request.encode()
+    echo = sent if has_echo or not request.is_repeated else b""
     received = b""
     sent_ns = host_ns()
     deadline_s = time.monotonic() + timeout_s
-    link.write(request.encode())
-    while not request.is_complete(received) and time.monotonic() < deadline_s:
+    link.write(sent)
+    while not request.is_complete(received.removeprefix(echo)) and time.monotonic() < deadline_s:
         data = link.read()
-        if received and not data:
+        if received not in (b"", echo) and not data:
             break
         received += data
-    return Transaction(received, sent_ns, host_ns())
+    is_echoed = bool(echo) and received.startswith(echo)
+    return Transaction(received.removeprefix(echo), sent_ns, host_ns(), is_echoed)
 
 
 def drain(link: Link) -> bytes:

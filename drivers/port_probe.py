@@ -32,7 +32,7 @@ _SURE_SHARE = 0.9
 _MAX_BYTES = 1 << 18
 _ANSWER_S = 0.4
 """How long an answer is waited for; serial devices answer within 100 ms."""
-
+_ECHO_TEST = b"\0\xff\0"  # no known device takes it for a command
 _REOPEN_S = 0.5  # until a device that takes one connection has noticed that the last one was closed
 
 _USUAL_BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
@@ -169,9 +169,8 @@ def query_identity(
                 on_progress(message(template, protocol=protocol, line_settings=settings))
                 remark = _query_once(link, query, settings, clock)
                 if remark is not None:
-                    found = Recognition(
-                        protocol, 1.0, 1, DRIVERS[protocol].channels, query.settings, remark=remark
-                    )
+                    channels = query.channels or DRIVERS[protocol].channels
+                    found = Recognition(protocol, 1.0, 1, channels, query.settings, remark=remark)
                     return ListenResult(found, settings)
     return None
 
@@ -222,7 +221,24 @@ def _query_once(
     received = b""
     while clock() < deadline_s:
         received += link.read()
+        if received.startswith(query.data):
+            return _parse_behind_echo(link, query, received, clock)
         remark = query.parse(received)
         if remark is not None:
             return remark
     return None
+
+
+def _parse_behind_echo(
+    link: Link, query: IdentityQuery, received: bytes, clock: Callable[[], float]
+) -> Message | None:
+    """Answer to a query that came back: an eNod4 repeats it, a two-wire adapter repeats all that is sent."""
+    link.write(_ECHO_TEST)
+    deadline_s = clock() + _ANSWER_S
+    more = b""
+    while clock() < deadline_s:
+        more += link.read()
+    answer = received + more
+    if _ECHO_TEST in more:
+        answer = answer.removeprefix(query.data).replace(_ECHO_TEST, b"")
+    return query.parse(answer)

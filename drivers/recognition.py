@@ -64,6 +64,7 @@ class IdentityQuery:
     """Settings to record with from a device that answers."""
     is_network: bool = False
     """Whether only network addresses are asked, on a connection that no other question has spoilt."""
+    channels: int = 0  # gauges of a device that answers; 0: as many as its protocol has
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:

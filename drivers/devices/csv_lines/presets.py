@@ -1,7 +1,7 @@
 """Presets: settings of known devices, read from TOML."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,17 @@ COLUMNS, OPENSCALE = "columns", "openscale"
 """Formats that are no preset."""
 _SHIPPED = files("drivers.devices.csv_lines").joinpath("presets")
 _TEXTS = ("title", "source", "peer", "caution")
-_ABOUT = (*_TEXTS, "baud")
+_ABOUT = (*_TEXTS, "baud", "identity")
+
+
+@dataclass(frozen=True, slots=True)
+class PresetIdentity:
+    """How a device tells who it is."""
+
+    query: str  # with escapes, as `poll`
+    pattern: str  # regular expression of the answer, whose first group is shown
+    answer: str
+    """Of the simulated device, with escapes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +37,7 @@ class Preset:
     caution: str  # note for every run that is read by it; "" for none
     baud: int
     settings: dict[str, str]
+    identity: PresetIdentity | None = None
 
 
 def shipped_presets() -> list[str]:
@@ -51,7 +62,22 @@ def read_preset(name: str) -> Preset:
     if not isinstance(baud, int):
         raise SettingsError("format {name}: baud = {baud!r} is no whole number", name=name, baud=baud)
     texts = {key: str(content.get(key, "")) for key in _TEXTS}
-    return Preset(**texts | {"title": texts["title"] or name}, baud=baud, settings=settings)
+    return Preset(
+        **texts | {"title": texts["title"] or name},
+        baud=baud,
+        settings=settings,
+        identity=_identity(name, content.get("identity")),
+    )
+
+
+def _identity(name: str, given: Any) -> PresetIdentity | None:
+    if given is None:
+        return None
+    wanted = [field.name for field in fields(PresetIdentity)]
+    if not isinstance(given, dict) or set(given) != set(wanted):
+        template = N_("format {name}: [identity] is incomplete: give {keys}, or leave it out")
+        raise SettingsError(template, name=name, keys=wanted)
+    return PresetIdentity(**{key: str(value) for key, value in given.items()})
 
 
 def with_preset(given: Mapping[str, str]) -> tuple[dict[str, str], Preset | None]:

@@ -6,7 +6,7 @@ from drivers.arrays import Floats, Int32s, UInt8s
 from drivers.devices.csv_lines import DRIVER
 from drivers.devices.csv_lines.codec import encode_lines
 from drivers.devices.csv_lines.columns import LineFormat
-from drivers.devices.csv_lines.source import Commands, read_csv_settings
+from drivers.devices.csv_lines.source import Commands, read_csv_settings, unescape
 from drivers.simulated.protocol import Command, CommandKind, PolledProtocol, SimulatedProtocol
 
 _BITS_PER_BYTE = 10
@@ -42,23 +42,27 @@ class PolledCsv(PolledProtocol):
 
     turnaround_s = _TURNAROUND_S
 
-    def __init__(self, layout: LineFormat, commands: Commands, baud: int) -> None:
+    def __init__(
+        self, layout: LineFormat, commands: Commands, baud: int, query: bytes = b"", identity: bytes = b""
+    ) -> None:
         self._layout = layout
-        self._poll = commands.poll
+        self._poll, self._query, self._identity = commands.poll, query, identity
         self.byte_s = _BITS_PER_BYTE / baud
         self.line_end = layout.line_end.encode("ascii")
         self._counts, self._status = np.zeros((1, 2), dtype=np.int32), np.zeros(1, dtype=np.uint8)
 
     def find_commands(self, data: bytes) -> tuple[list[Command], int]:
-        return find_texts(data, {self._poll: CommandKind.OTHER})
+        return find_texts(data, {self._poll: CommandKind.OTHER, self._query: CommandKind.IDENTIFY})
 
-    def request_bytes(self, command: Command) -> int:  # noqa: ARG002 - there is only one
-        return len(self._poll)
+    def request_bytes(self, command: Command) -> int:
+        return len(self._query if command.kind is CommandKind.IDENTIFY else self._poll)
 
     def store_sample(self, counts: Int32s, status: int) -> None:
         self._counts, self._status = counts[None], np.array([status], dtype=np.uint8)
 
     def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        if command.kind is CommandKind.IDENTIFY:
+            return self._identity
         return encode_lines(self._layout, np.zeros(1), self._counts, status=self._status)[0]
 
 
@@ -87,5 +91,8 @@ def make_protocol(settings: dict[str, str]) -> SimulatedProtocol:
     parsed, preset = read_csv_settings(settings)
     commands = parsed.commands()
     if commands.poll:
-        return PolledCsv(parsed.layout(), commands, (preset.baud if preset else 0) or DRIVER.default_baud)
+        baud = (preset.baud if preset else 0) or DRIVER.default_baud
+        told = preset.identity if preset else None
+        texts = (unescape("identity", text) for text in ((told.query, told.answer) if told else ()))
+        return PolledCsv(parsed.layout(), commands, baud, *texts)
     return SimulatedCsv(parsed.layout(), commands)

@@ -1,10 +1,11 @@
 """A device that sends lines of values, as a `SampleSource`."""
 
 import math
+import re
 import time
 from collections import deque
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 import msgspec
@@ -19,7 +20,7 @@ from drivers.devices.csv_lines.inference import (
     infer_columns,
 )
 from drivers.devices.csv_lines.line_parser import LineParser
-from drivers.devices.csv_lines.presets import Preset, shipped_presets, with_preset
+from drivers.devices.csv_lines.presets import Preset, read_preset, shipped_presets, with_preset
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.polling import (
     TOO_BUSY,
@@ -32,9 +33,9 @@ from drivers.polling import (
     quasi_static_note,
     transact,
 )
-from drivers.recognition import Recognition, rate_from_count, unless_coincidence
+from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
-from drivers.source import Link
+from drivers.source import LineSettings, Link
 from drivers.stream import SampleSource, check_rate, parse_settings
 from messages.i18n import N_
 from messages.message import EMPTY, Message, joined, message
@@ -249,6 +250,7 @@ class LineRequest:
     """Asks for one line."""
 
     data: bytes
+    is_repeated = False
 
     def encode(self) -> bytes:
         return self.data
@@ -416,6 +418,28 @@ def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
     candidates += _presets_with_status()
     found = [_recognise_lines(candidate, data, duration_s) for candidate in candidates]
     return max(filter(None, found), key=lambda one: one.share, default=None)
+
+
+def identity_queries() -> tuple[IdentityQuery, ...]:
+    """Questions of the presets whose device tells who it is."""
+    presets = {name: read_preset(name) for name in shipped_presets()}
+    return tuple(
+        IdentityQuery(
+            6,
+            unescape("query", preset.identity.query),
+            (LineSettings(preset.baud),),
+            partial(_parse_identity, preset.identity.pattern),
+            {"format": name},
+            channels=make_source({"format": name}, 1.0).channels,
+        )
+        for name, preset in presets.items()
+        if preset.identity is not None
+    )
+
+
+def _parse_identity(pattern: str, received: bytes) -> Message | None:
+    found = re.search(pattern + r"\s*[\r\n]", received.decode("ascii", "replace"))
+    return message("{identity}", identity=found[1].strip()) if found else None
 
 
 @cache

@@ -77,6 +77,10 @@ class Request:
         return _HEAD + 2 * self.count if self.function in READ_FUNCTIONS else _ECHO_BYTES
 
     @property
+    def is_repeated(self) -> bool:
+        return self.function is Function.WRITE_SINGLE
+
+    @property
     def is_numbered(self) -> bool:
         """Whether a response shows which request it answers."""
         return False

@@ -102,6 +102,7 @@ class ModbusSource(SampleSource):
         self._response_overdue = False
         """The last request got no response: it may still come."""
         self._was_invalid = False  # what came last was no response
+        self._has_echo = False  # the line sends back what is written to it
         self._warnings: deque[Message] = deque()
         self._was_busy = False
 
@@ -196,7 +197,8 @@ class ModbusSource(SampleSource):
 
     def _ask(self, link: Link, planned: Request) -> Exchange:
         request = planned.numbered(next(self._numbers))
-        transaction = transact(link, request, self._settings.timeout_s)
+        transaction = transact(link, request, self._settings.timeout_s, has_echo=self._has_echo)
+        self._has_echo = self._has_echo or transaction.has_echo
         earlier, data = request.split(transaction.data)
         return Exchange(transaction, earlier, data, request.parse_response(data))
 
@@ -357,12 +359,8 @@ def _tcp_query(unit: int) -> IdentityQuery:
     )
 
 
-IDENTITY_QUERIES = (
-    *map(_tcp_query, _TCP_UNITS),
-    IdentityQuery(
-        4,
-        _QUERY.encode(),
-        tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
-        partial(_parse_response, _QUERY),
-    ),
-)
+def identity_queries() -> tuple[IdentityQuery, ...]:
+    """Questions over TCP, and on a serial line."""
+    lines = tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE")
+    on_line = IdentityQuery(4, _QUERY.encode(), lines, partial(_parse_response, _QUERY))
+    return (*map(_tcp_query, _TCP_UNITS), on_line)

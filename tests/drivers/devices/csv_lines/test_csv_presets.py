@@ -64,6 +64,10 @@ def test_a_preset_of_your_own(tmp_path):
         (None, "cannot be read (No such file or directory): check its path"),
         ("columns = = 1", "is no TOML"),
         ("baud = 'fast'", "baud = 'fast' is no whole number"),
+        (
+            "[identity]\nquery = 'I2'",
+            "[identity] is incomplete: give query, pattern, answer, or leave it out",
+        ),
         ("colour = 'red'", "setting 'colour' is not known to csv: allowed are format, columns"),
     ],
 )

@@ -56,7 +56,7 @@ class Transmitter:
         self._listener = CommandParser(self.registers.find_commands)
         self.waiting = b""
         self.sent: list[bytes] = []
-        self.is_lost = False
+        self.is_lost = self.has_echo = False
         self.on_wire: Callable[[bytes], bytes] = lambda answer: answer
 
     def read(self) -> bytes:
@@ -70,6 +70,7 @@ class Transmitter:
         if self.is_lost:
             raise DeviceLostError("the transmitter is gone")
         self.sent.append(data)
+        self.waiting += data if self.has_echo else b""
         for command in self._listener.feed(data):
             self.waiting += self.on_wire(self.registers.respond(command, True, 0.0))
 

@@ -184,6 +184,19 @@ def test_a_refused_zero_command(clock):
         started(link, settings)
 
 
+def test_behind_an_adapter_that_repeats_what_is_sent_nothing_is_taken_for_an_answer(clock):
+    zero = {"zero_register": "5", "zero_value": "8", "zero": "true"}
+    link = Transmitter(clock, **zero)
+    link.has_echo = True
+    source = started(link, zero)
+    link.registers.store_sample(COUNTS + 3, 0)
+    block = rows(source, polls(source, link, 5))
+    np.testing.assert_array_equal(block.counts, np.tile([3, 3], (5, 1)))
+    assert source.losses == Losses(samples=5)
+    with pytest.raises(ProtocolError, match="not set to zero: illegal data value"):
+        started(link, zero | {"zero_value": "7"})
+
+
 def test_a_damaged_answer_costs_its_own_row_only(clock):
     link = Transmitter(clock)
     source = started(link)
