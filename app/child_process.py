@@ -31,6 +31,9 @@ Decoded = TypeVar("Decoded")
 
 READ_BYTES = 1 << 16  # of one read: what a pipe holds on Linux
 
+START_S = 60.0
+"""Longest time that a child takes to start, on a computer that is busy."""
+_STOP_S = 5.0
 _KILLED_S = 5.0
 """Wait for a killed process no longer: one that is blocked by a dead disk does not end even then."""
 _POLL_S = 0.1
@@ -185,6 +188,68 @@ class ChildProcess(Generic[Command, Event]):
         self._on_exit(code)
         self._has_ended.set()
         self._put(None, 0.0)  # a thread that is busy writing ends with its pipe
+
+
+class RequestProcess(Generic[Command, Event]):
+    """Child process that answers requests one after another, started when it is needed.
+
+    Its first event says that it takes requests. Its stderr is discarded: the caller reports a crash.
+    """
+
+    def __init__(self, module: str, decode: Callable[[bytes], Event]) -> None:
+        self._module = module
+        self._decode = decode
+        self._child: ChildProcess[Command, Event] | None = None
+        self._events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self._is_ready = False
+
+    @property
+    def pid(self) -> int | None:
+        return self._child.pid if self._child else None
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process ended by itself and was not stopped."""
+        return self._child is not None and self._child.has_ended
+
+    def start(self) -> None:
+        """Start the process, if there is none, without waiting for it. Raises OSError."""
+        if self._child is None:
+            events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+            process = spawn(self._module, discard_stderr=True)
+            self._child = ChildProcess(
+                process, encode_line, self._decode, events.put, lambda _: events.put(None)
+            )
+            self._events, self._is_ready = events, False
+
+    def send(self, request: Command) -> bool:
+        """Send a request. False where the process does not start. Raises OSError."""
+        self.start()
+        if not self._is_ready:
+            with contextlib.suppress(TimeoutError):
+                self._is_ready = self.receive(START_S) is not None
+        return self._is_ready and self._child is not None and self._child.send(request)
+
+    def receive(self, timeout_s: float) -> Event | None:
+        """Return the next event, None where the process has ended. Raises TimeoutError.
+
+        Without an event the process is stopped; the next request starts another.
+        """
+        try:
+            event = self._events.get(timeout=timeout_s)
+        except queue.Empty:
+            self.stop()
+            raise TimeoutError from None
+        if event is None:
+            self.stop()
+        return event
+
+    def stop(self) -> None:
+        """Kill the process, if there is one."""
+        if self._child:
+            self._child.kill()
+            self._child.stop(_STOP_S)
+            self._child = None
 
 
 class CommandReader(Generic[Command]):

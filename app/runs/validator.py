@@ -5,7 +5,6 @@ import contextlib
 import faulthandler
 import functools
 import math
-import queue
 import signal
 import sys
 import tempfile
@@ -18,7 +17,7 @@ import h5py
 import msgspec
 
 from app import child_process
-from app.child_process import ChildProcess, CommandReader, EventSender
+from app.child_process import CommandReader, EventSender, RequestProcess
 from app.log import start_log
 from app.runs import errors
 from app.runs.summary import RunSummary, summarize_file
@@ -26,8 +25,6 @@ from app.runs.validation import validate_file
 from messages.i18n import N_
 from messages.message import Message
 
-_START_S = 60.0
-_STOP_S = 5.0
 _REPLY_S = 60.0
 """For a slow disk, or a computer that is too busy; over a file that hangs HDF5 the process ends itself."""
 _MEMORY_BYTES = 2 << 30
@@ -62,71 +59,46 @@ class Validator:
     """Validates files, one after another, for several threads. A file that crashes the process is damaged."""
 
     def __init__(self) -> None:
-        self._child: ChildProcess[str, ValidatorEvent] | None = None
-        self._replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
-        self._is_ready = False
+        self._process: RequestProcess[str, ValidatorEvent] = RequestProcess(
+            "app.runs.validator", decode_validator_event
+        )
         self._turn = threading.Lock()
 
     @classmethod
     def start(cls) -> Self:
         validator = cls()
-        validator._started()
+        validator._process.start()
         return validator
 
     def validate(self, path: Path) -> RunSummary:
         """Validate a file as `app.runs.validation` says, and return its summary. Raises RunError."""
         with self._turn:
-            reply = self._ask(self._started(), path)
+            reply = self._ask(path)
         if reply.summary is None:
             raise _ERRORS[reply.fault](reply.message)
         return reply.summary
 
     @property
     def pid(self) -> int | None:
-        return self._child.pid if self._child else None
+        return self._process.pid
 
     def stop(self) -> None:
-        if self._child:
-            self._child.kill()
-            self._child.stop(_STOP_S)
-            self._child = None
+        self._process.stop()
 
-    def _started(self) -> "ChildProcess[str, ValidatorEvent]":
-        if self._child is None:
-            replies: queue.SimpleQueue[ValidatorEvent | None] = queue.SimpleQueue()
-            process = child_process.spawn(
-                "app.runs.validator", discard_stderr=True
-            )  # a crash becomes a fault of the file
-            self._child = ChildProcess(
-                process,
-                child_process.encode_line,
-                decode_validator_event,
-                replies.put,
-                lambda _: replies.put(None),
-            )
-            self._replies, self._is_ready = replies, False
-        return self._child
-
-    def _ask(self, child: "ChildProcess[str, ValidatorEvent]", path: Path) -> ValidationReply:
-        if not self._is_ready:
-            with contextlib.suppress(queue.Empty):
-                self._is_ready = isinstance(self._replies.get(timeout=_START_S), ValidatorReady)
-        if not self._is_ready:
+    def _ask(self, path: Path) -> ValidationReply:
+        if not self._process.send(str(path)):
             raise errors.RunError(
                 "the process that examines run files does not start. Run `slipstand doctor`"
             )
-        child.send(str(path))
         try:
-            reply = self._replies.get(timeout=_REPLY_S)
-        except queue.Empty:
-            self.stop()
+            reply = self._process.receive(_REPLY_S)
+        except TimeoutError:
             template = N_(
                 "{path} was not validated within {timeout:g} s: this computer or the file's disk is"
                 " too busy. Try again later"
             )
             raise errors.ValidationTimeoutError(template, path=path, timeout=_REPLY_S) from None
         if not isinstance(reply, ValidationReply):
-            self.stop()
             template = N_(
                 "{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
             )

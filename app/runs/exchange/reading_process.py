@@ -8,7 +8,6 @@ import contextlib
 import functools
 import importlib
 import math
-import queue
 import sys
 import tempfile
 import threading
@@ -20,7 +19,7 @@ import msgspec
 import numpy as np
 
 from app import child_process
-from app.child_process import ChildProcess, CommandReader, EventSender
+from app.child_process import START_S, CommandReader, EventSender, RequestProcess
 from app.log import start_log
 from app.runs.errors import ExtraMissingError, ImportFileError, RunError
 from app.runs.exchange.foreign_files import find_format
@@ -32,8 +31,6 @@ from messages.message import Message, Option, Value
 MEMORY_BYTES = 1 << 30
 PROGRESS_S = 10.0
 """A reader that shows no progress for so long hangs. It reports at least every few megabytes."""
-_START_S = 60.0
-_STOP_S = 5.0
 _IDLE_S = 60.0
 _OPTION, _FLOAT = "\0option", "\0float"
 """Templates of an `Option` and of a float that is not finite, which JSON does not keep."""
@@ -95,8 +92,7 @@ class ReadingProcess:
     """Reads files, one after another, for several threads."""
 
     def __init__(self) -> None:
-        self._child: ChildProcess[Request, Event] | None = None
-        self._events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self._process: RequestProcess[Request, Event] = RequestProcess(__name__, _decode_event)
         self._turn = threading.Lock()
 
     @contextlib.contextmanager
@@ -126,52 +122,33 @@ class ReadingProcess:
         return answer.preview
 
     def stop(self) -> None:
-        if self._child:
-            self._child.kill()
-            self._child.stop(_STOP_S)
-            self._child = None
+        self._process.stop()
 
     def _ask(self, request: Request, path: Path, report: Callable[[float], object]) -> Event:
         with self._turn:
-            self._start()
-            if self._child is None or not self._child.send(request):
-                raise _crashed(path)
+            if self._process.has_ended:  # since the last file, so not over this one
+                self._process.stop()
+            if not self._process.send(request):
+                raise RunError("the process that reads foreign files does not start. Run `slipstand doctor`")
             timeout_s = PROGRESS_S
             while isinstance(event := self._next(timeout_s, path), ReadingProgress):
-                timeout_s = _START_S if event.is_loading else PROGRESS_S
+                timeout_s = START_S if event.is_loading else PROGRESS_S
                 report(event.share)
         if isinstance(event, ReadingFault):
             kind: type[RunError] = ExtraMissingError if event.is_extra_missing else ImportFileError
             raise kind(_unpacked(event.message))
         return event
 
-    def _start(self) -> None:
-        if self._child is not None and not self._child.has_ended:
-            return
-        events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
-        process = child_process.spawn(__name__, discard_stderr=True)  # a crash becomes a fault of the file
-        self._events = events
-        self._child = ChildProcess(
-            process, child_process.encode_line, _decode_event, events.put, lambda _: events.put(None)
-        )
-        with contextlib.suppress(queue.Empty):
-            if isinstance(events.get(timeout=_START_S), ReaderReady):
-                return
-        self.stop()
-        raise RunError("the process that reads foreign files does not start. Run `slipstand doctor`")
-
     def _next(self, timeout_s: float, path: Path) -> Event:
         try:
-            event = self._events.get(timeout=timeout_s)
-        except queue.Empty:
-            self.stop()
+            event = self._process.receive(timeout_s)
+        except TimeoutError:
             template = N_(
                 "{path}: reading it shows no progress for {seconds:g} s. The file is damaged, or its disk too"
                 " slow: copy it to this computer and try again"
             )
             raise ImportFileError(template, path=path, seconds=timeout_s) from None
         if event is None:
-            self.stop()
             raise _crashed(path)
         return event
 

@@ -44,17 +44,17 @@ def test_a_good_run_passes_with_its_summary(run_path, metadata, validator):
 
 
 def test_without_a_validator_one_is_started_and_stopped(run_path, monkeypatch):
-    started = []
+    stopped = []
 
-    class Counted(Validator):
-        def _started(self):
-            started.append(self)
-            return super()._started()
+    class Watched(Validator):
+        def stop(self):
+            assert self.pid is not None
+            super().stop()
+            stopped.append(self.pid)
 
-    monkeypatch.setattr(reader, "Validator", Counted)
+    monkeypatch.setattr(reader, "Validator", Watched)
     assert len(open_run(run_path)) == 9000
-    assert started
-    assert {validator.pid for validator in started} == {None}
+    assert stopped == [None]
 
 
 def test_what_is_no_run_is_told_in_one_line(tmp_path, validator):
