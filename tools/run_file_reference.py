@@ -19,54 +19,47 @@ that wrote the field first.
 """
 
 
+_USER_GROUPS = (
+    (schema.OTHER_CONDITIONS, "NXcollection", "further conditions, one text each, named by the user"),
+    (f"{schema.STAND}/geometry", "NXcollection", "geometry of the stand, one number each"),
+    (schema.TRUTH, "NXcollection", "parameters of a simulated run, as attributes"),
+    (f"{schema.HISTORY}/change_NNN", "NXnote", "one edit: its new values as JSON in `description`"),
+    (f"{schema.ENTRY}/{schema.ANALYSIS_PREFIX}NNN", "NXprocess", "an analysis, as JSON in `document`"),
+)
+_READINGS = {
+    "table_displacement": "gauge 1, calibrated; named by what was measured",
+    "relative_displacement": (
+        "gauge 2, calibrated; `plate_...` where it measures the plate against the base"
+    ),
+}
+_COLUMNS = (
+    schema.TIME_COLUMN,
+    *(
+        Column(f"{schema.MOTION}/{name}", description, "float64", {"units": "m"})
+        for name, description in _READINGS.items()
+    ),
+    schema.STATUS_COLUMN,
+    *(
+        Column(
+            schema.count_path(gauge), f"gauge {gauge + 1} as received", "int32 or float64", {"units": "count"}
+        )
+        for gauge in range(len(schema.GAUGES))
+    ),
+    *schema.WIRE_COLUMNS,
+)
+
+
 def reference() -> str:
     """Text of the page."""
-    columns = [
-        schema.TIME_COLUMN,
-        Column(
-            f"{schema.MOTION}/table_displacement",
-            "gauge 1, calibrated; named by what was measured",
-            "float64",
-            {"units": "m"},
-        ),
-        Column(
-            f"{schema.MOTION}/relative_displacement",
-            "gauge 2, calibrated; `plate_...` where it measures the plate against the base",
-            "float64",
-            {"units": "m"},
-        ),
-        schema.STATUS_COLUMN,
-        *(
-            Column(
-                schema.count_path(gauge),
-                f"gauge {gauge + 1} as received",
-                "int32 or float64",
-                {"units": "count"},
-            )
-            for gauge in range(len(schema.GAUGES))
-        ),
-        *schema.WIRE_COLUMNS,
-    ]
-    user_groups = (
-        (schema.OTHER_CONDITIONS, "NXcollection", "further conditions, one text each, named by the user"),
-        (f"{schema.STAND}/geometry", "NXcollection", "geometry of the stand, one number each"),
-        (schema.TRUTH, "NXcollection", "parameters of a simulated run, as attributes"),
-        (f"{schema.HISTORY}/change_NNN", "NXnote", "one edit: its new values as JSON in `description`"),
-        (
-            f"{schema.ENTRY}/{schema.ANALYSIS_PREFIX}NNN",
-            "NXprocess",
-            "an analysis, as JSON in `document`",
-        ),
-    )
     return "\n".join(
         [
             _INTRODUCTION,
             "## Groups\n",
             *_table(("group", "class"), [(f"`{path}`", kind) for path, kind in schema.GROUPS.items()]),
             "\nOnly where there is something in them:\n",
-            *_table(("group", "class", "holds"), [(f"`{path}`", *rest) for path, *rest in user_groups]),
+            *_table(("group", "class", "holds"), [(f"`{path}`", *rest) for path, *rest in _USER_GROUPS]),
             "\n## Columns\n",
-            *_table(("dataset", "type", "unit", "is"), map(_column, columns)),
+            *_table(("dataset", "type", "unit", "is"), map(_column, _COLUMNS)),
             "\n`entry/run/crc32` holds the CRC-32 of each column (uint32), written when the run is closed.\n",
             "## Known at the start\n",
             *_fields(schema.RUN_FIELDS),
