@@ -17,10 +17,12 @@ from app.runs.exchange.import_run import ImportedRun, free_path, import_csv
 from app.runs.exchange.importing import CsvImport
 from config.files import load_stand
 
+_HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
+
 
 def import_record(options: ImportOptions) -> None:
     files, plan = _files(options.files), _plan(options.source)
-    facts = {
+    metadata = {
         "series": options.masses.series,
         "plate_mass_kg": options.masses.plate_mass,
         "table_mass_kg": options.masses.table_mass,
@@ -29,17 +31,28 @@ def import_record(options: ImportOptions) -> None:
         "conditions": checked_conditions(options.conditions),
     }
     if len(files) == 1 and not options.output.expanduser().is_dir():
-        if options.output.suffix != ".h5":
-            raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")
-        output = out.output_file(options.output, options.force)
-        run = _import(files[0], plan, output, options.force, facts)
-        print_mass_overrides(options.masses)
-        _print_notes(run)
-        if options.as_json:
-            out.print_json(_document(run))
-        else:
-            out.print_line(f"{run.run}: {run.samples} samples, {', '.join(_row(run)[1:])}")
-        return
+        _import_one(files[0], plan, options, metadata)
+    else:
+        _import_many(files, plan, options, metadata)
+
+
+def _import_one(file: Path, plan: CsvImport, options: ImportOptions, metadata: dict[str, Any]) -> None:
+    if options.output.suffix != ".h5":
+        raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")
+    output = out.output_file(options.output, options.force)
+    run = _import(file, plan, output, options.force, metadata)
+    print_mass_overrides(options.masses)
+    _print_notes(run)
+    if options.as_json:
+        out.print_json(_document(run))
+    else:
+        out.print_line(f"{run.run}: {run.samples} samples, {', '.join(filter(None, _row(run)[1:]))}")
+
+
+def _import_many(
+    files: list[Path], plan: CsvImport, options: ImportOptions, metadata: dict[str, Any]
+) -> None:
+    """Import files into a folder; one that fails does not stop the rest."""
     folder = _folder(options.output)
     print_mass_overrides(options.masses)
     runs: list[ImportedRun] = []
@@ -47,7 +60,7 @@ def import_record(options: ImportOptions) -> None:
     for file in files:
         try:
             output = folder / f"{file.stem}.h5" if options.force else free_path(folder, file.stem)
-            run = _import(file, plan, output, options.force, facts)
+            run = _import(file, plan, output, options.force, metadata)
         except RunError as error:
             out.print_status(f"error: {error}")
             documents.append({"file": str(file), "error": str(error)})
@@ -63,12 +76,11 @@ def import_record(options: ImportOptions) -> None:
         raise typer.Exit(1)
 
 
-_HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
-
-
-def _import(file: Path, plan: CsvImport, output: Path, replace: bool, facts: dict[str, Any]) -> ImportedRun:
+def _import(
+    file: Path, plan: CsvImport, output: Path, replace: bool, metadata: dict[str, Any]
+) -> ImportedRun:
     with out.progress_bar(f"reading {file.name}", total=1.0) as update:
-        return import_csv(file, plan, output, load_stand(), replace=replace, report=update, **facts)
+        return import_csv(file, plan, output, load_stand(), replace=replace, report=update, **metadata)
 
 
 def _files(given: list[Path]) -> list[Path]:

@@ -10,6 +10,7 @@ from app.presenters import number_text
 from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES, parse_conditions
 from app.runs.errors import ConditionError, MetadataError
 from messages.i18n import N_, gettext, translate
+from messages.message import Message, message
 
 GAIN = "gain"  # choice of `unit` for a gain instead
 Form = Mapping[str, str]  # texts as typed, or chosen values, by name of the field
@@ -155,6 +156,13 @@ RARE_GROUPS = {
 }
 """Groups under a fold."""
 FIELDS = {field.name: field for group in (GROUPS | RARE_GROUPS).values() for field in group}
+OPTION_FIELDS = {field.option: field.name for field in FIELDS.values() if field.option}
+OPTION_LABELS = {
+    field.option: message("“{label}”", label=Message(field.title))
+    for field in FIELDS.values()
+    if field.option
+}
+"""What the window shows for an option that a message names."""
 COLUMN_FIELDS = ("time", "table", "second", "date")
 """Names of columns, as in `FilePreview.columns`."""
 GAIN_FIELDS = ("gain", "offset", "unit_name")  # fields that hold only where `unit` is `GAIN`

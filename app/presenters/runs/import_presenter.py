@@ -9,8 +9,9 @@ from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.import_form import (
-    FIELDS,
     LINE_FIELDS,
+    OPTION_FIELDS,
+    OPTION_LABELS,
     PER_FILE_FIELDS,
     Form,
     make_form,
@@ -20,7 +21,7 @@ from app.presenters.runs.import_form import (
 from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import N_, gettext, ngettext
-from messages.message import Message, message, options_in, replace_options
+from messages.message import Message, options_in, replace_options
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
@@ -30,8 +31,6 @@ else:
 
 _CELL = 16
 """Width of a column of the first rows, in characters."""
-_OPTIONS = {field.option: field for field in FIELDS.values() if field.option}
-_LABELS = {option: message("“{label}”", label=Message(field.title)) for option, field in _OPTIONS.items()}
 _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
 
 
@@ -211,7 +210,7 @@ class ImportPresenter(Presenter[ImportState]):
         return False
 
     def _show_fault(self, fault: Message) -> None:
-        words = sentence(replace_options(fault, _LABELS))
+        words = sentence(replace_options(fault, OPTION_LABELS))
         self._update(faults=dict.fromkeys(_named_fields(fault), words), message=Chip(words, Tone.BAD))
 
     def _show_columns(self, found: "FilePreview") -> None:
@@ -227,7 +226,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._surveyed = _line_texts(form)
         self._update(
             busy="", columns=found.columns, column_labels=found.titles, first_rows=_format_rows(found),
-            is_text=bool(found.rows), form=form,
+            is_text=options.delimiter is not None, form=form,
         )  # fmt: skip
         if not self.state.faults:
             self._read(is_survey=False)
@@ -258,7 +257,7 @@ def _line_texts(form: Form) -> Form:
 
 def _named_fields(fault: Message) -> set[str]:
     """Name of the field that a message names, if it names exactly one."""
-    named = {_OPTIONS[option].name for option in options_in(fault) if option in _OPTIONS}
+    named = {OPTION_FIELDS[option] for option in options_in(fault) if option in OPTION_FIELDS}
     if "field" in fault.values:
         named.add(str(fault.values["field"]))
     return named if len(named) == 1 else set()

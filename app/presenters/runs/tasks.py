@@ -16,7 +16,15 @@ from app.presenters.base import Progress, ReportProgress, batch_progress
 from app.presenters.conditions import parse_conditions
 from app.presenters.number_text import format_fixed
 from app.presenters.results import sentence
-from app.presenters.runs.import_form import FIELDS, GAIN, PER_FILE_FIELDS, Form, parse_pairs, parse_time
+from app.presenters.runs.import_form import (
+    FIELDS,
+    GAIN,
+    OPTION_LABELS,
+    PER_FILE_FIELDS,
+    Form,
+    parse_pairs,
+    parse_time,
+)
 from app.presenters.runs.state import (
     ANALYSING,
     BatchOutcome,
@@ -41,7 +49,7 @@ from app.runs.validator import shared_validator
 from config.files import load_stand
 from config.schema import ConfigError, SeriesError
 from messages.i18n import N_, gettext, ngettext, translate
-from messages.message import MessageError
+from messages.message import Message, MessageError, replace_options
 
 MAX_OVERLAID_RUNS = 8  # more curves over one another cannot be told apart by eye
 _DRAWN_SPANS = 1500  # extremes are kept for so many intervals of time: at least one a pixel of the preview
@@ -167,7 +175,7 @@ def preview_import(path: str, form: Form) -> ImportPreview:
     with shared_reading_process().read(Path(path), plan) as record:
         importing.check_length(Path(path), record)
         trace = _imported_trace(Path(path).stem, record, plan.measures, scale)
-        told = [_record_summary(record), *(sentence(note) for note in record.facts.notes)]
+        told = [_record_summary(record), *map(_in_window, record.facts.notes)]
     return ImportPreview(Overlay((trace,), gettext("time, s"), unit), ". ".join(told))
 
 
@@ -218,7 +226,7 @@ def _import(path: str, form: Form, folder: str, report: ReportProgress) -> impor
 
 
 def import_files(paths: tuple[str, ...], form: Form, folder: str, report: ReportProgress) -> ImportOutcome:
-    """Import files alike; what is stated of one test alone goes to the first. One that fails is told."""
+    """Import files alike; what is stated of one test holds for the first. A fault stops no other file."""
     runs: list[import_run.ImportedRun] = []
     faults: list[str] = []
     for number, path in enumerate(paths):
@@ -229,9 +237,13 @@ def import_files(paths: tuple[str, ...], form: Form, folder: str, report: Report
         try:
             runs.append(_import(path, form, folder, on_progress))
         except (RunError, ConfigError) as error:
-            faults.append(f"{Path(path).name}: {sentence(error.message)}")
-        form = {**form, **dict.fromkeys(PER_FILE_FIELDS, "")}
+            faults.append(f"{Path(path).name}: {_in_window(error.message)}")
+        form = {**form, **dict.fromkeys(PER_FILE_FIELDS, ""), "header": form["header"]}
     return ImportOutcome(tuple(run.run for run in runs), tuple(map(_result_row, runs)), tuple(faults))
+
+
+def _in_window(text: Message) -> str:
+    return sentence(replace_options(text, OPTION_LABELS))
 
 
 def _result_row(run: import_run.ImportedRun) -> str:

@@ -1,7 +1,7 @@
 """Columns of numbers out of a foreign file, of whatever kind it is."""
 
 import datetime
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +13,9 @@ from messages.i18n import N_
 from messages.message import Message, message
 
 Floats = NDArray[np.float64]
+ReportShare = Callable[[float], object]
+"""Is called with the share of a file that has been read, 0 where that is not known, at least every few
+seconds."""
 
 
 @dataclass(eq=False, slots=True)
@@ -51,6 +54,11 @@ class ForeignColumns:
 
     def fault(self, row: int, column: int, fault: Message) -> ImportFileError:
         return cell_fault(self.path, self.row_label(row), self.names[column], fault)
+
+    def leave_out(self, values: Iterable[float]) -> None:
+        """Make readings of these values absent ones."""
+        for value in values:
+            self.cells = [np.where(cells == value, np.nan, cells) for cells in self.cells]
 
     def check(self) -> None:
         """Refuse what cannot be a record. Raises ImportFileError."""

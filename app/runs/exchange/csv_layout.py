@@ -1,5 +1,7 @@
 """Layout of a text file with columns of numbers: delimiter, decimal sign, header, units; found or given."""
 
+import contextlib
+import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -12,8 +14,9 @@ import msgspec
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import DATE, SECOND, TABLE, TIME
 from app.runs.exchange.stamps import DateOrder, find_form
+from app.runs.exchange.tables import SHOWN_ROWS
 from app.runs.exchange.text_files import HEAD_BYTES, TextFile, open_text
-from app.runs.exchange.units import parse_unit
+from app.runs.exchange.units import parse_unit, unit_in_name
 from messages.i18n import N_
 from messages.message import Message, option
 
@@ -29,7 +32,6 @@ _CANDIDATES = ("\t", ";", ",", "|", " ")
 _DECIMALS: tuple[Decimal, ...] = (".", ",")
 _SAMPLE_LINES = 40  # of the head, the middle and the end each
 _HEAD_LINES = 1000
-_FIRST_ROWS = 8
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -67,6 +69,16 @@ class CsvOptions(msgspec.Struct, frozen=True):
             yield SECOND, self.second
 
     @property
+    def marks(self) -> frozenset[str]:
+        """Cells of an absent reading, in small letters."""
+        return frozenset((*MISSING_MARKS, *(mark.lower() for mark in self.missing)))
+
+    @property
+    def missing_values(self) -> list[float]:
+        """Numbers that stand for an absent reading, however they are written."""
+        return [to_number(mark, ".") for mark in self.missing if is_number(mark, ".")]
+
+    @property
     def least_numbers(self) -> int:
         """Numbers that a row has at least."""
         return 1 if self.rate_hz is not None else 2
@@ -99,13 +111,18 @@ class CsvText:
     def path(self) -> Path:
         return self.file.path
 
+    def unit(self, at: int) -> str:
+        """Unit of a column, from a row of units or its name; "" without one."""
+        of_row = self.units[at] if at < len(self.units) else ""
+        return of_row or (unit_in_name(self.names[at]) if at < len(self.names) else "")
+
     @property
     def first_rows(self) -> tuple[tuple[str, ...], ...]:
-        return tuple(map(tuple, self.sample[:_FIRST_ROWS]))
+        return tuple(map(tuple, self.sample[:SHOWN_ROWS]))
 
     @property
     def width(self) -> int:
-        return max(len(self.names), *(len(row) for row in self.sample[:_FIRST_ROWS]))
+        return max(len(self.names), *(len(row) for row in self.sample[:SHOWN_ROWS]))
 
 
 class _Format(NamedTuple):
@@ -120,6 +137,9 @@ class _Format(NamedTuple):
         return "".join(_kind(cell, self.decimal) for cell in self.cells(line))
 
 
+_COMMAS, _DECIMAL_COMMAS = _Format(",", "."), _Format(" ", ",")
+
+
 def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
     """Read a text file as far as its first row. Raises ImportFileError.
 
@@ -131,23 +151,32 @@ def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
     given = layout.delimiter or separator
     more = [line for place in (0.5, 0.9) for line in file.tail_lines(place, _SAMPLE_LINES) if is_data(line)]
     sample = [*(line.text for line in lines[-_SAMPLE_LINES:]), *more]
-    made = _format(path, layout, given, lines, sample)
-    pattern = _pattern(made, sample, layout)
-    first = _first_row(path, layout, made, lines, pattern)
-    names, units = _names(path, layout, made, lines, first, pattern, comments)
+    form = _format(path, layout, given, lines, sample)
+    pattern = _pattern(form, sample, layout)
+    first = _first_row(path, layout, form, lines, pattern)
+    names, units = _names(path, layout, form, lines, first, pattern, comments)
     rows = [
-        made.cells(line) for line in (*(line.text for line in lines[first : first + _SAMPLE_LINES]), *more)
+        form.cells(line) for line in (*(line.text for line in lines[first : first + _SAMPLE_LINES]), *more)
     ]
-    return CsvText(file, lines[first].number, made.delimiter, made.decimal, names, units, rows)
+    return CsvText(file, lines[first].number, form.delimiter, form.decimal, names, units, rows)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
     """Cells of a line, without quotes, blanks at their ends, and empty cells at its end."""
-    cells = line.split() if delimiter == " " else line.split(delimiter)
-    cells = [cell.strip().strip('"').strip() for cell in cells]
+    cells = [cell.strip().strip('"').strip() for cell in split_quoted(line, delimiter)]
     while cells and not cells[-1]:
         cells.pop()
     return cells
+
+
+def split_quoted(line: str, delimiter: str) -> list[str]:
+    """Cells of a line as they are; a delimiter between quotes separates none."""
+    if delimiter == " ":
+        return line.replace('"', "").split()
+    if '"' in line:
+        with contextlib.suppress(csv.Error):  # a cell of more than 128 kB
+            return next(csv.reader([line], delimiter=delimiter))
+    return line.split(delimiter)
 
 
 def is_number(cell: str, decimal: str) -> bool:
@@ -210,9 +239,9 @@ def _format(
     decimals = _DECIMALS if layout.decimal is None else (layout.decimal,)
     delimiters: Sequence[str] = _CANDIDATES
     if given:
-        told = _WORDS.get(given, given)
-        decimals = tuple(sign for sign in decimals if sign != told)
-        if len(told) != 1 or told in '\n"' or not decimals:
+        character = _WORDS.get(given, given)
+        decimals = tuple(sign for sign in decimals if sign != character)
+        if len(character) != 1 or character in '\n"' or not decimals:
             raise ImportFileError(
                 "{option} {delimiter!r} cannot be. Give tab, space, or a character other"
                 " than the decimal sign {decimal}",
@@ -220,19 +249,43 @@ def _format(
                 delimiter=given,
                 decimal=layout.decimal or ".",
             )
-        delimiters = (told,)
-    formats = [_Format(d, s) for s in decimals for d in delimiters if d != s]
-    scores = {made: _score(made, sample, layout.least_numbers) for made in formats}
-    best = max(formats, key=lambda made: scores[made])
+        delimiters = (character,)
+    # Between quotes a decimal comma stands beside commas as delimiters.
+    is_quoted = any('"' in line for line in sample)
+    formats = [_Format(d, s) for s in decimals for d in delimiters if d != s or is_quoted]
+    scores = {form: _score(form, sample, layout.least_numbers) for form in formats}
+    best = max(formats, key=lambda form: scores[form])
     if not scores[best] and (not given or layout.decimal is None):
         raise _no_numbers(path, layout, lines)
+    if best == _COMMAS and _DECIMAL_COMMAS in formats:
+        return _one_or_two(path, layout, lines, sample)
     return best
 
 
-def _score(made: _Format, sample: Sequence[str], least: int) -> int:
+def _one_or_two(path: Path, layout: CsvOptions, lines: Sequence[Line], sample: Sequence[str]) -> _Format:
+    """Format of rows such as `1,25` without times: one number where the line above them has no comma.
+
+    Raises ImportFileError where none stands above.
+    """
+    ones = [line for line in sample if _DECIMAL_COMMAS.kinds(line) == "n"]
+    if layout.least_numbers > 1 or 2 * len(ones) < len(sample):
+        return _COMMAS
+    above = [line for line in lines if _DECIMAL_COMMAS.kinds(line.text) != "n"]
+    if layout.header and above:
+        return _COMMAS if "," in above[-1].text else _DECIMAL_COMMAS
+    raise ImportFileError(
+        "{path}: {text!r} may be one number or two. Add {decimal_option} , or {delimiter_option} ,",
+        path=path,
+        text=ones[0],
+        decimal_option=option("--decimal"),
+        delimiter_option=option("--delimiter"),
+    )
+
+
+def _score(form: _Format, sample: Sequence[str], least: int) -> int:
     score = 0
     for line in sample:
-        kinds = made.kinds(line)
+        kinds = form.kinds(line)
         numbers = kinds.count("n") + kinds.count("s")
         if numbers >= least:
             score += max(numbers - kinds.count("x"), 1)
@@ -256,9 +309,9 @@ def _no_numbers(path: Path, layout: CsvOptions, lines: Sequence[Line]) -> Import
     )
 
 
-def _pattern(made: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
+def _pattern(form: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
     """Kinds of the cells of a row, as in most of the lines that have numbers."""
-    rows = [made.kinds(line) for line in sample]
+    rows = [form.kinds(line) for line in sample]
     rows = [kinds for kinds in rows if kinds.count("n") + kinds.count("s") >= layout.least_numbers]
     width = max(map(len, rows), default=0)
     return "".join(
@@ -266,40 +319,36 @@ def _pattern(made: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
     )
 
 
-def _first_row(path: Path, layout: CsvOptions, made: _Format, lines: Sequence[Line], pattern: str) -> int:
+def _first_row(path: Path, layout: CsvOptions, form: _Format, lines: Sequence[Line], pattern: str) -> int:
     """Index of the first line whose cells are those of rows."""
-    numeric = [at for at, kind in enumerate(pattern) if kind in "ns"]
     if not layout.header:
         return 0
+    numeric = [at for at, kind in enumerate(pattern) if kind in "ns"]
+
+    def alike(line: Line) -> list[int]:
+        kinds = form.kinds(line.text)
+        return [at for at in numeric if at < len(kinds) and kinds[at] == pattern[at]]
+
     for index, line in enumerate(lines):
-        kinds = made.kinds(line.text)
-        alike = [at for at in numeric if at < len(kinds) and kinds[at] == pattern[at]]
-        if (
-            alike
-            and alike[0] == numeric[0]
-            and (
-                len(alike) >= layout.least_numbers or _width(made, line.text) == _width(made, lines[-1].text)
-            )
-        ):
-            # A row with a fault right below the names is a row all the same: the fault is to be named.
-            above = made.kinds(lines[index - 1].text) if index > 1 else ""
-            wrong = [at for at in numeric if at < len(above) and above[at] == pattern[at]]
-            return (
-                index - 1
-                if wrong and _width(made, lines[index - 1].text) == _width(made, line.text)
-                else index
-            )
+        at, width = alike(line), _width(form, line.text)
+        if not at or at[0] != numeric[0]:
+            continue
+        if len(at) < layout.least_numbers and width != _width(form, lines[-1].text):
+            continue
+        # A row with a fault right below the names is a row all the same: the fault is to be named.
+        above = lines[index - 1]
+        return index - 1 if index > 1 and alike(above) and _width(form, above.text) == width else index
     raise _no_numbers(path, layout, lines)
 
 
-def _width(made: _Format, line: str) -> int:
-    return len(line.split()) if made.delimiter == " " else line.count(made.delimiter)
+def _width(form: _Format, line: str) -> int:
+    return len(line.split()) if form.delimiter == " " else line.count(form.delimiter)
 
 
 def _names(
     path: Path,
     layout: CsvOptions,
-    made: _Format,
+    form: _Format,
     lines: Sequence[Line],
     first: int,
     pattern: str,
@@ -311,14 +360,14 @@ def _names(
     block: list[list[str]] = []
     least = min(len(pattern), max(2, sum(kind in "ns" for kind in pattern)))
     for line in reversed(lines[:first]):
-        cells = made.cells(line.text)
+        cells = form.cells(line.text)
         if len(cells) < least:
             break
         block.insert(0, cells)
     if not block:
         above = [line for line in comments if line.number < lines[first].number]
-        names = made.cells(above[-1].text) if above else []
-        if len(names) == len(made.cells(lines[first].text)):
+        names = form.cells(above[-1].text) if above else []
+        if len(names) == len(form.cells(lines[first].text)):
             return names, []
         raise ImportFileError(
             "{path}, line {number}: {text!r} is data, not column names. Add {option} and give columns by"

@@ -5,7 +5,7 @@ import gzip
 import importlib
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError, RunError, one_line
-from app.runs.exchange.columns import DATE, TIME, ForeignColumns, find_columns
+from app.runs.exchange.columns import DATE, TIME, ForeignColumns, ReportShare, find_columns
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.csv_reading import read_columns
 from app.runs.exchange.formats import FORMATS, Format
-from app.runs.exchange.stamps import to_datetime
+from app.runs.exchange.stamps import NS, no_date_beside, to_datetime, unwrap_times
 from app.runs.exchange.tables import Table, TimeAxis
 from messages.i18n import N_
 from messages.message import Message, option
 
-ReportShare = Callable[[float], object]
 _GZIP = b"\x1f\x8b"
 _PIECE_BYTES = 1 << 22
 _UNPACKED_MOST_BYTES = 2 << 30
@@ -32,22 +31,23 @@ def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _:
     """Read columns of a file. Raises RunError. `report` gets the share that is done."""
     found = find_format(path)
     if found is None:
-        return read_columns(path, layout, report)
-    _check_layout(path, found, layout)
-    with _faults_named(path, found):
-        table = _open(found, path, layout)
-        columns = _read(path, table, layout, report)
-    columns.check()
+        columns = read_columns(path, layout, report)
+    else:
+        _check_layout(path, found, layout)
+        with _faults_named(path, found):
+            columns = _read(path, _open(found, path, layout, report), layout, report)
+        columns.check()
+    columns.leave_out(layout.missing_values)
     return columns
 
 
-def list_columns(path: Path, layout: CsvOptions) -> Table:
-    """Open a file that is no plain text for the names of its columns. Raises RunError."""
+def open_foreign(path: Path, layout: CsvOptions) -> Table:
+    """Open a file that is no plain text. Raises RunError."""
     found = find_format(path)
     if found is None:
         raise ImportFileError("{path} is plain text", path=path)
     with _faults_named(path, found):
-        return _open(found, path, layout)
+        return _open(found, path, layout, lambda _: None)
 
 
 def is_csv(path: Path) -> bool:
@@ -56,7 +56,7 @@ def is_csv(path: Path) -> bool:
 
 
 def has_own_time(path: Path) -> bool:
-    """Tell whether a file is of a format that keeps times beside its columns."""
+    """Tell whether a file is of a format that always keeps times beside its columns."""
     found = find_format(path)
     return found is not None and found.has_own_time
 
@@ -112,9 +112,9 @@ def find_format(path: Path) -> Format | None:
     return next((one for one in FORMATS if suffix in one.suffixes), None)
 
 
-def _open(found: Format, path: Path, layout: CsvOptions) -> Table:
+def _open(found: Format, path: Path, layout: CsvOptions, report: ReportShare) -> Table:
     module: Any = importlib.import_module(f"app.runs.exchange.formats.{found.module}")
-    table: Table = module.open_table(path, layout)
+    table: Table = module.open_table(path, layout, report)
     return table
 
 
@@ -141,13 +141,12 @@ def _faults_named(path: Path, found: Format) -> Iterator[None]:
 
 
 def _check_layout(path: Path, found: Format, layout: CsvOptions) -> None:
-    if layout.delimiter is not None or layout.decimal is not None:
-        raise ImportFileError(
-            "{name} is no text: leave out {delimiter_option} and {decimal_option}",
-            name=path.name,
-            delimiter_option=option("--delimiter"),
-            decimal_option=option("--decimal"),
-        )
+    of_text = {"--delimiter": layout.delimiter, "--decimal": layout.decimal, "--encoding": layout.encoding}
+    for name, value in of_text.items():
+        if value is not None:
+            raise ImportFileError(
+                "{name} is no text: leave out {option}", name=path.name, option=option(name)
+            )
     if not found.has_rows and (layout.skip or not layout.header):
         raise ImportFileError(
             "{name} has no lines: leave out {skip_option} and {header_option}",
@@ -158,7 +157,7 @@ def _check_layout(path: Path, found: Format, layout: CsvOptions) -> None:
 
 
 def _read(path: Path, table: Table, layout: CsvOptions, report: ReportShare) -> ForeignColumns:
-    wanted = [(what, name) for what, name in layout.wanted if what != DATE]
+    wanted = list(layout.wanted)
     names = list(table.names)
     positions = find_columns(path, wanted, names, len(names))
     columns: list[NDArray[Any]] = []
@@ -166,11 +165,16 @@ def _read(path: Path, table: Table, layout: CsvOptions, report: ReportShare) -> 
         columns.append(table.column(at))
         report(number / (len(positions) + 1))
     shown = [names[at] or str(at) for at in positions]
-    units = [table.units[at] if at < len(table.units) else "" for at in positions]
+    units = [table.unit(at) for at in positions]
     if wanted[0][0] == TIME:
-        axis = _stamped(columns[0], has_zone=table.has_zone)
-        is_own = columns[0].dtype.kind in "mM"
-        columns = columns[1:]
+        time, date, columns = columns[0], None, columns[1:]
+        if wanted[1][0] == DATE:
+            date, columns = columns[0], columns[1:]
+            if (time.dtype.kind, date.dtype.kind) != ("m", "M"):
+                raise no_date_beside(path, *shown[:2])
+            del shown[1], units[1]
+        axis = _stamped(time, date, has_zone=table.has_zone)
+        is_own = time.dtype.kind in "mM"
     else:
         axis = _own_axis(path, table, layout, positions, len(columns[0]))
         shown, units, is_own = ["time", *shown], ["s", *units], True
@@ -184,15 +188,19 @@ def _read(path: Path, table: Table, layout: CsvOptions, report: ReportShare) -> 
     )
 
 
-def _stamped(column: NDArray[Any], *, has_zone: bool) -> TimeAxis:
-    """Times of a column of numbers, of date-times (since the first), or of times of day."""
-    if column.dtype.kind not in "mM":
-        return TimeAxis(np.array(column, np.float64))
-    stamps = column.astype("M8[ns]" if column.dtype.kind == "M" else "m8[ns]")
+def _stamped(time: NDArray[Any], date: NDArray[Any] | None, *, has_zone: bool) -> TimeAxis:
+    """Times of a column of numbers; of date-times or times of day, since the first."""
+    if time.dtype.kind not in "mM":
+        return TimeAxis(np.array(time, np.float64))
+    if date is not None:
+        time = date.astype("M8[ns]") + time
+    stamps = time.astype(f"{time.dtype.kind}8[ns]")
     absent, stamps_ns = np.isnat(stamps), stamps.astype(np.int64)
+    if stamps.dtype.kind == "m" and not absent.any():
+        stamps_ns = unwrap_times(stamps_ns)
     first_ns = int(stamps_ns[~absent][0]) if not absent.all() else 0
-    time_s = np.where(absent, np.nan, (stamps_ns - first_ns) / 1e9)
-    start = to_datetime(first_ns, has_zone=has_zone) if column.dtype.kind == "M" else None
+    time_s = np.where(absent, np.nan, (stamps_ns - first_ns) / NS)
+    start = to_datetime(first_ns, has_zone=has_zone) if stamps.dtype.kind == "M" else None
     return TimeAxis(time_s, start)
 
 

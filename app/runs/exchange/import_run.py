@@ -50,16 +50,16 @@ def import_csv(
     *,
     replace: bool = False,
     report: Callable[[float], object] = lambda _: None,
-    **facts: Any,
+    **metadata: Any,
 ) -> ImportedRun:
     """Make a run of a foreign file. Raises RunError, ConfigError.
 
-    `report` gets the share that is done. `facts` as for `importing.store_record`.
+    `report` gets the share that is done. `metadata` as for `importing.store_record`.
     """
     with shared_reading_process().read(path, plan, lambda share: report(_READ_SHARE * share)) as record:
-        stored, metadata = store_record(
+        stored, unit = store_record(
             path, record, plan, output, stand, replace=replace,
-            report=lambda share: report(_READ_SHARE + (1.0 - _READ_SHARE) * share), **facts,
+            report=lambda share: report(_READ_SHARE + (1.0 - _READ_SHARE) * share), **metadata,
         )  # fmt: skip
         return ImportedRun(
             file=str(path),
@@ -69,8 +69,8 @@ def import_csv(
             rate_hz=record.facts.rate_hz,
             start_time=record.facts.start,
             ranges=tuple(_ranges(record)),
-            unit=metadata.unit,
-            release_s=find_release(record) if metadata.quantity == "displacement" else None,
+            unit=unit,
+            release_s=find_release(record) if plan.quantity == "displacement" else None,
             notes=record.facts.notes,
         )
 

@@ -3,7 +3,7 @@
 import datetime
 import hashlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analysis.preparation.channels import SAMPLES_MIN
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import ForeignColumns
+from app.runs.exchange.columns import ForeignColumns, ReportShare
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
@@ -26,7 +26,6 @@ from app.runs.metadata import (
     QUANTITY_UNITS,
     EndMetadata,
     Quantity,
-    RunMetadata,
     SourceFile,
     create_metadata,
 )
@@ -38,15 +37,17 @@ from messages.i18n import N_
 from messages.message import Message, message, option
 
 Floats = NDArray[np.float64]
-ReportShare = Callable[[float], object]
 _TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _LENGTH_UNITS_M = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _EVEN = 0.01
 """Relative spread of the time steps up to which a record has a rate."""
 
 _LONGEST_S = 1e9
-_UNIX_S = (datetime.datetime(2001, 1, 1, tzinfo=datetime.UTC).timestamp(), 4102444800.0)
-"""Times (s) between these, 2001 and 2100, count from 1970: no clock that starts with a record gets there."""
+_EPOCHS = tuple(datetime.datetime(year, 1, 1, tzinfo=datetime.UTC) for year in (1970, 1904))
+"""From which Unix and LabVIEW count seconds."""
+_SINCE, _SPAN = datetime.datetime(2001, 1, 1, tzinfo=datetime.UTC), _EPOCHS[0] - _EPOCHS[1]
+"""Times are taken to count from an epoch if they lie in the 66 years from 2001 on: no clock that starts with
+a record gets there, and no times lie there from both epochs."""
 _BLOCK_ROWS = 1 << 19
 _HASHED_BYTES = 1 << 22
 
@@ -135,35 +136,36 @@ def store_record(
     *,
     replace: bool = False,
     report: ReportShare = lambda _: None,
-    **facts: Any,
-) -> tuple[StoredRun, RunMetadata]:
-    """Make a run of a foreign record. Raises RunError, ConfigError.
+    **metadata: Any,
+) -> tuple[StoredRun, str]:
+    """Make a run of a foreign record; return it and the unit of its readings. Raises RunError, ConfigError.
 
-    `facts` are those of `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
+    `metadata` as for `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
     """
     check_length(path, record)
-    told, length_s = record.facts, float(record.time_s[-1])
-    table = told.gauges[0]
-    metadata = create_metadata(
+    facts, length_s = record.facts, float(record.time_s[-1])
+    unit = plan.unit_name or QUANTITY_UNITS[plan.quantity]
+    run_metadata = create_metadata(
         stand,
-        Gauges(table=table, relative=told.gauges[-1].replace(measures=plan.measures)),
-        told.start,
+        Gauges(table=facts.gauges[0], relative=facts.gauges[-1].replace(measures=plan.measures)),
+        facts.start,
         device=DeviceIdentity(protocol=IMPORT_PROTOCOL, name=path.name),
-        rate_hz=told.rate_hz,
+        rate_hz=facts.rate_hz,
         quantity=plan.quantity,
-        unit=plan.unit_name or QUANTITY_UNITS[plan.quantity],
-        source=f"imported from {path.name}, time 0 is its {told.first_s!r} s",
-        source_file=told.source,
-        **facts,
+        unit=unit,
+        source=f"imported from {path.name}, time 0 is its {facts.first_s!r} s",
+        source_file=facts.source,
+        **metadata,
     )
     missing = int(np.count_nonzero(np.isnan(record.cells[0]) & np.isnan(record.cells[-1])))
     ending = EndMetadata(
         ended="imported",
-        end_time=told.start and told.start + datetime.timedelta(seconds=length_s),
+        end_time=facts.start and facts.start + datetime.timedelta(seconds=length_s),
         losses=Losses(samples=len(record), missing=missing),
-        time_base=TimeBase(scale_standard_uncertainty=told.interval_uncertainty),
+        time_base=TimeBase(scale_standard_uncertainty=facts.interval_uncertainty),
     )
-    return write_run(output, metadata, _reported(record, report), ending, replace=replace), metadata
+    stored = write_run(output, run_metadata, _reported(record, report), ending, replace=replace)
+    return stored, unit
 
 
 def check_length(path: Path, record: ForeignRecord) -> None:
@@ -252,7 +254,9 @@ def _with_time(path: Path, plan: CsvImport) -> CsvImport:
         return plan
     lines = ParseOptions(layout.delimiter, layout.decimal, layout.skip, layout.header, layout.encoding)
     found = preview_file(path, lines)
-    if not found.time or (not layout.header and found.time == layout.table):
+    if not found.time:
+        return plan
+    if {found.time, str(found.columns.index(found.time))} & {layout.table, layout.second}:
         raise ImportFileError(
             "{path}: no column of times is found. Add {time_option} COL, or {rate_option} HZ",
             path=path,
@@ -293,10 +297,12 @@ def _start(plan: CsvImport, columns: ForeignColumns) -> datetime.datetime | None
         return plan.begun if plan.begun.tzinfo else plan.begun.astimezone()
     if columns.start is not None:
         return columns.start + datetime.timedelta(seconds=float(columns.time[0]))
+    if columns.is_even:
+        return None
     first_s = float(columns.time[0])
-    if not columns.is_even and _UNIX_S[0] <= first_s <= _UNIX_S[1]:
-        return datetime.datetime.fromtimestamp(first_s, datetime.UTC)
-    return None
+    starts_s = {epoch: first_s - (_SINCE - epoch).total_seconds() for epoch in _EPOCHS}
+    epochs = [epoch for epoch, since_s in starts_s.items() if 0.0 <= since_s < _SPAN.total_seconds()]
+    return epochs[0] + datetime.timedelta(seconds=first_s) if epochs else None
 
 
 def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
@@ -316,7 +322,27 @@ def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
 
 
 def check_plan(plan: CsvImport) -> None:
-    """Refuse options that do not fit together. Raises ImportFileError."""
+    """Refuse options that do not fit together, and numbers that cannot be. Raises ImportFileError."""
+    _check_exclusions(plan)
+    gain = 1.0 if plan.gain is None else plan.gain
+    if not math.isfinite(gain) or gain == 0.0:
+        template = N_(
+            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
+        )
+        raise ImportFileError(template, option=option("--gain"), value=gain)
+    if not math.isfinite(plan.offset / gain):
+        template = N_("{option} {value:g} cannot be. Give a finite number")
+        raise ImportFileError(template, option=option("--offset"), value=plan.offset)
+    share, rate_hz = plan.gain_uncertainty, plan.layout.rate_hz
+    if share is not None and not (math.isfinite(share) and share >= 0.0):
+        template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
+        raise ImportFileError(template, option=option("--gain-uncertainty"), value=share)
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        template = N_("{option} {value:g} cannot be. Give samples a second, above 0")
+        raise ImportFileError(template, option=option("--rate"), value=rate_hz)
+
+
+def _check_exclusions(plan: CsvImport) -> None:
     if plan.gain is not None and plan.unit is not None:
         template = N_(
             "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them"
@@ -329,26 +355,9 @@ def check_plan(plan: CsvImport) -> None:
             gain_option=option("--gain"),
             unit_name=plan.unit_name,
         )
-    rate_hz = plan.layout.rate_hz
-    if rate_hz is not None and plan.layout.time:
+    if plan.layout.rate_hz is not None and plan.layout.time:
         template = N_("{time_option} and {rate_option} exclude each other. Give one of them")
         raise ImportFileError(template, time_option=option("--time"), rate_option=option("--rate"))
-    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        template = N_("{option} {value:g} cannot be. Give samples a second, above 0")
-        raise ImportFileError(template, option=option("--rate"), value=rate_hz)
-    gain = 1.0 if plan.gain is None else plan.gain
-    if not math.isfinite(gain) or gain == 0.0:
-        template = N_(
-            "{option} {value:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
-        )
-        raise ImportFileError(template, option=option("--gain"), value=gain)
-    if not math.isfinite(plan.offset / gain):
-        template = N_("{option} {value:g} cannot be. Give a finite number")
-        raise ImportFileError(template, option=option("--offset"), value=plan.offset)
-    share = plan.gain_uncertainty
-    if share is not None and not (math.isfinite(share) and share >= 0.0):
-        template = N_("{option} {value} cannot be. Give a finite share of the gain, 0 or above")
-        raise ImportFileError(template, option=option("--gain-uncertainty"), value=share)
 
 
 def _gauge(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) -> Gauge:
@@ -368,6 +377,9 @@ def _named_gain(path: Path, plan: CsvImport, columns: ForeignColumns, number: in
     name, named = columns.names[1 + number], columns.units[1 + number]
     unit = parse_unit(named) if named else None
     if unit is None:
+        note = N_("{name} names no unit: it is taken as {unit}. {option} states another")
+        named = QUANTITY_UNITS[plan.quantity]
+        columns.notes.append(message(note, name=name, unit=named, option=option("--unit")))
         return 1.0
     if unit.quantity is None:
         raise ImportFileError(

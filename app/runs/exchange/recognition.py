@@ -10,9 +10,9 @@ import msgspec
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_layout import CsvOptions, CsvText, is_number, survey_csv
-from app.runs.exchange.foreign_files import is_csv, list_columns, unpacked
-from app.runs.exchange.stamps import find_form
-from app.runs.exchange.units import parse_unit, unit_in_name
+from app.runs.exchange.foreign_files import is_csv, open_foreign, unpacked
+from app.runs.exchange.stamps import find_form, has_date, has_time
+from app.runs.exchange.units import parse_unit
 from messages.message import option
 
 _TIME = re.compile(r"^(t|time|times|zeit|temps|время|sekunden|seconds?)\b|^time|^t_", re.IGNORECASE)
@@ -20,6 +20,8 @@ _PLATE = re.compile(r"\bu_?2\b|plate|gauge.?2|ch(annel)?.?2", re.IGNORECASE)
 _RELATIVE = re.compile(r"rel|u_?2\s*[-−–]\s*u_?1", re.IGNORECASE)
 _TABLE = re.compile(r"\bu_?1\b|table|gauge.?1|ch(annel)?.?1|displacement|weg|перемещ", re.IGNORECASE)
 _DATE = re.compile(r"^(date|datum|дата)\b", re.IGNORECASE)
+_GROUPS = re.compile(r"^(?:[^\s/]+/)+(?=\S)|^\w+\.(?=\w)")
+"""Groups of HDF5 and TDMS, and structs of MATLAB, before a name."""
 _TIMES, _LENGTHS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}, {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 
 
@@ -38,7 +40,7 @@ class FilePreview:
     """What is in a file."""
 
     columns: tuple[str, ...]
-    """As `CsvLayout` asks for them: by name, by number where a name is missing or comes twice."""
+    """As `CsvOptions` asks for them: by name, by number where a name is missing or comes twice."""
     titles: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     """Cells of the first lines of a text; none of other files."""
@@ -67,9 +69,10 @@ def _preview(path: Path, given: ParseOptions) -> FilePreview:
     if is_csv(path):
         return _survey_text(path, given)
     has_header = given.header is not False
-    table = list_columns(path, CsvOptions("", "", skip=given.skip, header=has_header))
+    table = open_foreign(path, CsvOptions("", "", skip=given.skip, header=has_header))
     options = ParseOptions(skip=given.skip, header=has_header)
-    return _recognise(_Columns(table.names, table.units, has_axis=table.has_axis), options)
+    units = [table.unit(at) for at in range(len(table.names))]
+    return _recognise(_Columns(table.names, units, table.first_rows, table.has_axis), options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +81,13 @@ class _Columns:
 
     names: Sequence[str]
     units: Sequence[str]
-    rows: tuple[tuple[str, ...], ...] = ()
+    """Of all columns; "" where the file names none."""
+    rows: tuple[tuple[str, ...], ...]
     has_axis: bool = False
 
     def unit(self, number: int | None, known: dict[str, float]) -> str:
         """Unit of a column, if it is one of the known."""
-        if number is None or number >= len(self.names):
-            return ""
-        of_file = self.units[number] if number < len(self.units) else ""
-        unit = parse_unit(of_file or unit_in_name(self.names[number]))
+        unit = parse_unit(self.units[number]) if number is not None and number < len(self.units) else None
         if unit is None or (known is _TIMES) != unit.is_time:
             return ""
         return next((name for name, scale in known.items() if scale == unit.scale), "")
@@ -95,7 +96,14 @@ class _Columns:
         """Whether a column has dates, and whether it has times of day."""
         cell = next((row[number] for row in self.rows if number is not None and number < len(row)), "")
         form = find_form(cell)
-        return (False, False) if form is None else ("y" in form.groupindex, "H" in form.groupindex)
+        return (False, False) if form is None else (has_date(form), has_time(form))
+
+    def find(self, pattern: re.Pattern[str], taken: tuple[int | None, ...] = ()) -> int | None:
+        """First column that is not taken and whose name has a pattern, with or without its groups."""
+        for at, name in enumerate(self.names):
+            if at not in taken and (pattern.search(name) or pattern.search(_GROUPS.sub("", name))):
+                return at
+        return None
 
 
 def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
@@ -126,7 +134,8 @@ def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
 def _of_text(source: CsvText, given: ParseOptions) -> FilePreview:
     names = [*source.names, *[""] * (source.width - len(source.names))]
     found = ParseOptions(source.delimiter, source.decimal, given.skip, bool(source.names), given.encoding)
-    return _recognise(_Columns(names, source.units, source.first_rows), found)
+    units = [source.unit(at) for at in range(len(names))]
+    return _recognise(_Columns(names, units, source.first_rows), found)
 
 
 def _recognise(table: _Columns, given: ParseOptions) -> FilePreview:
@@ -137,10 +146,10 @@ def _recognise(table: _Columns, given: ParseOptions) -> FilePreview:
     )
     titles = tuple(name or f"column {number}" for number, name in enumerate(names))
     time, date = _time_and_date(table)
-    relative = _first(names, _RELATIVE, (time, date))
-    plate = _first(names, _PLATE, (time, date, relative)) if relative is None else None
+    relative = table.find(_RELATIVE, (time, date))
+    plate = table.find(_PLATE, (time, date, relative)) if relative is None else None
     second = relative if plate is None else plate
-    gauge = _first(names, _TABLE, (time, date, second))
+    gauge = table.find(_TABLE, (time, date, second))
     rest = [number for number in range(len(names)) if number not in (time, date, gauge, second)]
     if gauge is None and rest:
         gauge = rest.pop(0)
@@ -158,21 +167,17 @@ def _recognise(table: _Columns, given: ParseOptions) -> FilePreview:
 def _time_and_date(table: _Columns) -> tuple[int | None, int | None]:
     """Columns of time, None where the file has an axis of its own, and of dates beside times of day."""
     names = table.names
-    time = _first(names, _TIME, ()) if any(names) else None
-    if time is None and table.has_axis:
+    if table.has_axis:
         return None, None
+    time = table.find(_TIME)
     if time is None:
         stamped = (number for number in range(len(names)) if any(table.stamps(number)))
-        time = next(stamped, 0 if names else None)
-    date = _first(names, _DATE, (time,))
+        time = next(stamped, 0 if table.rows else None)
+    date = table.find(_DATE, (time,))
     if date is None and table.stamps(time) == (True, False):
         date, time = time, next((n for n in range(len(names)) if table.stamps(n) == (False, True)), time)
     is_beside = table.stamps(time) == (False, True) and table.stamps(date) == (True, False)
     return time, date if is_beside else None
-
-
-def _first(names: Sequence[str], pattern: re.Pattern[str], taken: tuple[int | None, ...]) -> int | None:
-    return next((i for i, name in enumerate(names) if i not in taken and pattern.search(name)), None)
 
 
 def _at(columns: tuple[str, ...], number: int | None) -> str:

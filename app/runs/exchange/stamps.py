@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
-from messages.message import option
+from messages.message import Message, message, option
 
 DateOrder = Literal["dmy", "mdy", "ymd"]
 NS = 1_000_000_000
-_DAY_NS = 86_400 * NS
+_HOUR_NS = 3600 * NS
+DAY_NS = 24 * _HOUR_NS
 _MONTHS = {
     name: number
     for number, names in enumerate(
@@ -30,7 +31,7 @@ _MONTHS = {
 _DATES = (
     r"(?P<y>\d{4})(?P<s>[-/.])(?P<m>\d{1,2})(?P=s)(?P<d>\d{1,2})",
     r"(?P<a>\d{1,2})(?P<s>[-/.])(?P<b>\d{1,2})(?P=s)(?P<y>\d{4}|\d{2})(?!\d)",
-    r"(?P<d>\d{1,2})[- ](?P<n>[^\W\d_]{3})[^\W\d_]*\.?[- ,]+(?P<y>\d{4}|\d{2})(?!\d)",
+    r"(?P<d>\d{1,2})[-/. ](?P<n>[^\W\d_]{3})[^\W\d_]*[-/. ,]+(?P<y>\d{4}|\d{2})(?!\d)",
     r"(?P<n>[^\W\d_]{3})[^\W\d_]*\.? (?P<d>\d{1,2}),? (?P<y>\d{4})",
     r"(?P<y>\d{4})(?P<m>\d\d)(?P<d>\d\d)",
 )
@@ -47,11 +48,14 @@ _FORMS = tuple(
     for date, gap, time in (
         *((date, r"(?:[T_,;]|\s|,\s)\s*", _TIME) for date in _DATES),
         (_DATES[-1], "[T_ ]", _COMPACT_TIME),
+        (r"(?P<n>[^\W\d_]{3}) {1,2}(?P<d>\d{1,2})", " ", _TIME + r" (?P<y>\d{4})"),  # of `ctime` in C
         ("", "", _TIME),
+        ("", "", r"(?P<M>\d{1,2}):(?P<S>\d\d)[.,](?P<f>\d{1,9})"),  # mm:ss.0 of Excel
         *((date, "", "") for date in _DATES[:-1]),
     )
 )
 _NUMBERS = "ymdabHMSf"
+_SHOWN = 40  # characters of a cell in a message
 
 
 def find_form(cell: str) -> re.Pattern[str] | None:
@@ -79,24 +83,36 @@ def date_order(cells: Iterable[str]) -> DateOrder | None:
     return None if either else "ymd"
 
 
+def has_date(form: re.Pattern[str]) -> bool:
+    """Tell whether cells of a form have a date."""
+    return "y" in form.groupindex
+
+
+def has_time(form: re.Pattern[str]) -> bool:
+    """Tell whether cells of a form have a time of day."""
+    return "M" in form.groupindex
+
+
 class StampError(ValueError):
     """A cell is no stamp of the form that the column has."""
 
 
-class StampColumn:
-    """Turns cells of one column into nanoseconds, piece by piece.
+def stamp_fault(cell: str) -> Message:
+    """Fault of a cell that is no stamp of the form that the column has."""
+    return message("{cell!r} is no time like those above. Correct it or delete the line", cell=cell[:_SHOWN])
 
-    Times of day that pass midnight go on; a date beside them is added by the caller.
-    """
+
+class StampColumn:
+    """Turns cells of one column into nanoseconds, piece by piece."""
 
     def __init__(self, form: re.Pattern[str], order: DateOrder) -> None:
         self._form = form
         self._order = order
         self._days: dict[tuple[str, ...], int] = {}
-        self._last_ns: int | None = None
-        self._added_ns = 0
-        self.has_date = "y" in form.groupindex
-        self.has_time = "H" in form.groupindex
+        self.has_date = has_date(form)
+        self.has_time = has_time(form)
+        self.period_ns = DAY_NS if "H" in form.groupindex else _HOUR_NS
+        """After which times without a date begin anew."""
         self.has_zone = False
 
     def parse(self, cell: str) -> int:
@@ -108,7 +124,7 @@ class StampColumn:
         day = self._day(texts) if self.has_date else 0
         offset_min = _offset_min(texts.get("o"))
         self.has_zone |= bool(texts.get("z") or texts.get("o"))
-        return day * _DAY_NS + (_time_of_day_ns(texts) if self.has_time else 0) - offset_min * 60 * NS
+        return day * DAY_NS + (_time_of_day_ns(texts) if self.has_time else 0) - offset_min * 60 * NS
 
     def parse_all(self, cells: Sequence[str | bytes]) -> NDArray[np.int64]:
         """Nanoseconds (n,) of cells. Raises StampError."""
@@ -141,17 +157,6 @@ class StampColumn:
         except StampError:
             return None  # cell by cell it is named
 
-    def going_on(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Times of day that go on after midnight, from those that begin anew. Stamps with a date are kept."""
-        if self.has_date or not len(stamps):
-            return stamps
-        before = stamps[0] if self._last_ns is None else self._last_ns
-        self._last_ns = int(stamps[-1])
-        steps = np.diff(stamps, prepend=before)
-        added = self._added_ns + np.cumsum(np.where(steps < -_DAY_NS // 2, _DAY_NS, 0))
-        self._added_ns = int(added[-1])
-        return np.asarray(stamps + added, np.int64)
-
     def _day(self, texts: dict[str, str | None]) -> int:
         """Days since 1970 of a date. Raises StampError."""
         key = tuple(texts.get(name) or "" for name in "ymdabn")
@@ -173,10 +178,10 @@ class StampColumn:
                     for name in "ymdab"
                     if name in spans
                 }
-                total[start:end] = self._day({**constant, **row}) * _DAY_NS
+                total[start:end] = self._day({**constant, **row}) * DAY_NS
         if self.has_time:
-            hours, minutes = numbers["H"], numbers["M"]
-            seconds = numbers.get("S", np.zeros_like(hours))
+            minutes = numbers["M"]
+            hours, seconds = (numbers.get(name, np.zeros_like(minutes)) for name in "HS")
             half = constant.get("p")
             if half:
                 hours = hours % 12 + (12 if half in "pP" else 0)
@@ -190,6 +195,12 @@ class StampColumn:
         return total - _offset_min(constant.get("o")) * 60 * NS
 
 
+def unwrap_times(times_ns: NDArray[np.int64], period_ns: int = DAY_NS) -> NDArray[np.int64]:
+    """Times (n,) in nanoseconds that go on rising where they begin anew after a period, as at midnight."""
+    steps = np.diff(times_ns, prepend=times_ns[:1])
+    return np.asarray(times_ns + np.cumsum(np.where(steps < -period_ns // 2, period_ns, 0)), np.int64)
+
+
 def ambiguous_date(path: object, cell: str) -> ImportFileError:
     """Error for dates whose day and month cannot be told apart."""
     return ImportFileError(
@@ -197,6 +208,18 @@ def ambiguous_date(path: object, cell: str) -> ImportFileError:
         path=path,
         cell=cell,
         option=option("--date-order"),
+    )
+
+
+def no_date_beside(path: object, time: str, date: str) -> ImportFileError:
+    """Error for columns that are not times of day and their dates."""
+    return ImportFileError(
+        "{path}: {option} takes dates beside times of day such as 14:03:00, and {time} and {date}"
+        " are not that. Leave it out",
+        path=path,
+        option=option("--date"),
+        time=time,
+        date=date,
     )
 
 
@@ -219,7 +242,7 @@ def _days(key: tuple[str, ...], order: DateOrder) -> int:
 
 
 def _time_of_day_ns(texts: dict[str, str | None]) -> int:
-    hours, minutes, seconds = (int(texts[name] or 0) for name in "HMS")
+    hours, minutes, seconds = (int(texts.get(name) or 0) for name in "HMS")
     if texts.get("p"):
         hours = hours % 12 + (12 if (texts["p"] or "") in "pP" else 0)
     if hours > 23 or minutes > 59 or seconds > 60:

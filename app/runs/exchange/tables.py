@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.exchange.units import unit_in_name
 from messages.message import Message, message
 
+SHOWN_ROWS = 8
 LARGEST_BYTES = 4 << 30  # a file that unpacks to more than this is refused before it is unpacked
 
 
@@ -53,9 +55,15 @@ class Table:
     """Reads a column (n,) by its number: float64, datetime64 or timedelta64. Raises ImportFileError."""
     row_label: Callable[[int], Message] = row_label
     units: Sequence[str] = ()
-    """Of the columns, as the file names them; "" or absent where it does not."""
+    """Of the columns, as the file names them beside their names; "" or absent where it does not."""
     axis: Callable[[int], TimeAxis | None] = no_axis
     """Reads the times that the format keeps beside a column."""
     has_axis: bool = False
     has_zone: bool = False
     """Whether date-times are in UTC; else they are in the zone of this computer."""
+    first_rows: tuple[tuple[str, ...], ...] = ()
+    """Cells of the first rows as text; none of a format that has no rows."""
+
+    def unit(self, at: int) -> str:
+        """Unit of a column, beside its name or in it; "" without one."""
+        return (self.units[at] if at < len(self.units) else "") or unit_in_name(self.names[at])

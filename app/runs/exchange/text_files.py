@@ -1,6 +1,7 @@
 """Text files of any size, encoding and line end, as pieces of whole lines."""
 
 import codecs
+import contextlib
 import io
 import re
 from collections.abc import Iterator
@@ -102,14 +103,22 @@ def open_text(path: Path, encoding: str | None = None) -> TextFile:
         size = file.seek(0, io.SEEK_END)
     bom, found = next(((bom, name) for bom, name in _BOMS if head.startswith(bom)), (b"", ""))
     if encoding is not None:
-        try:
-            found = codecs.lookup(encoding).name.replace("utf-16", found or "utf-16-le")
-            found = found.replace("utf-8-sig", "utf-8")
-            "0".encode(found)
-        except (LookupError, UnicodeError):
-            template = N_("{option} {encoding!r} is not known. Give for example utf-8, cp1251 or cp1252")
-            raise ImportFileError(template, option=option("--encoding"), encoding=encoding) from None
+        found = _known_encoding(encoding, found)
     return TextFile(path, found or _guess(path, head), size, len(bom))
+
+
+def _known_encoding(name: str, by_bom: str) -> str:
+    """Name as Python has it, of UTF-16 and of encodings whose digits are ASCII. Raises ImportFileError."""
+    found, is_known = "", False
+    with contextlib.suppress(LookupError, UnicodeError):
+        found = codecs.lookup(name).name.removesuffix("-sig")
+        is_known = found.startswith("utf-16") or "0\n".encode(found) == b"0\n"
+    if not is_known:
+        template = N_("{option} {encoding!r} is not known. Give for example utf-8, cp1251 or cp1252")
+        raise ImportFileError(template, option=option("--encoding"), encoding=name)
+    if found == "utf-16":
+        return by_bom if by_bom.startswith(found) else "utf-16-le"
+    return found
 
 
 def _open(path: Path) -> BinaryIO:

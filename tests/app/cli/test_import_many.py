@@ -57,6 +57,14 @@ def test_a_pattern_is_expanded_and_a_table_told(slipstand: Any, folder: Path) ->
         assert "no release found" in rows[1]
 
 
+def test_one_file_is_told_in_a_line(slipstand: Any, folder: Path) -> None:
+    outcome = slipstand("import", folder / "b.csv", "--table", 1, "-o", folder / "b.h5")
+    assert outcome.code == 0
+    told = outcome.out.rpartition(": ")[2].strip()
+    assert told.split(", ")[:3] == ["3000 samples", "5.998 s", "500 Hz"]
+    assert all(told.split(", "))
+
+
 def test_several_files_need_a_folder(slipstand: Any, folder: Path) -> None:
     outcome = slipstand("import", folder / "a.csv", folder / "b.csv", "--table", 1, "-o", folder / "x.h5")
     assert outcome.code == 1

@@ -213,6 +213,20 @@ def test_files_alike_become_runs_with_a_line_each(path: Path) -> None:
     assert shares[-1] == 1.0
 
 
+def test_files_without_names_above_are_imported_alike(tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("a.csv", "b.csv")]
+    for path, sign in zip(paths, ",;", strict=True):
+        path.write_text("".join(f"{row}{sign}{row / 8}\n" for row in range(60)), encoding="utf-8")
+    outcome = import_files(tuple(map(str, paths)), filled(paths[0]), str(tmp_path), lambda _: None)
+    assert outcome.faults == ()
+    named = filled(paths[0], header="yes")
+    assert (
+        "Add “Names above”" in import_files((str(paths[0]),), named, str(tmp_path), lambda _: None).faults[0]
+    )
+    assert "“Unit” states another" in preview_import(str(paths[0]), filled(paths[0])).summary
+    assert [len(open_run(run, trusted=True)) for run in outcome.runs] == [60, 60]
+
+
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:
     form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.055")
     preview = preview_import(str(path), form)

@@ -10,22 +10,22 @@ class Format:
     name: str
     suffixes: tuple[str, ...]
     module: str
-    """Module below `app.runs.exchange.formats` whose `open_table` reads it."""
+    """Module below `app.runs.exchange.formats`; its `open_table(path, layout, report)` opens the file."""
     magic: bytes = b""
     """First bytes of such a file, where they tell it."""
     reader: str = ""
-    """Module of other people that reads it, which may take long to load."""
+    """Library that reads it, which may take long to load."""
     has_rows: bool = False
     """Whether it has lines and a header, as a sheet has."""
     has_own_time: bool = False
-    """Whether it keeps times or a rate beside the columns."""
+    """Whether it always keeps times or a rate beside the columns."""
 
 
 FORMATS = (
     Format("MATLAB", (".mat",), "matlab", b"MATLAB ", "scipy.io"),
     Format("Excel", (".xlsx",), "excel", reader="openpyxl", has_rows=True),
     Format("Parquet", (".parquet",), "parquet", b"PAR1", "pyarrow.parquet"),
-    Format("TDMS", (".tdms",), "tdms", b"TDSm", "nptdms", has_own_time=True),
+    Format("TDMS", (".tdms",), "tdms", b"TDSm", "nptdms"),
     Format("LVM", (".lvm",), "labview", b"LabVIEW Measurement", "lvm_read", has_own_time=True),
     Format("UFF 58", (".uff", ".unv", ".uff58"), "universal", b"    -1", "pyuff", has_own_time=True),
     Format("MDF", (".mf4", ".mdf"), "mdf", b"MDF ", "asammdf", has_own_time=True),

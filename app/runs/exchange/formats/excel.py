@@ -2,8 +2,12 @@
 
 import contextlib
 import datetime
+import functools
+import itertools
 import math
 import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,79 +15,165 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import cell_fault
+from app.runs.exchange.columns import ReportShare, cell_fault
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import MISSING_MARKS, CsvOptions
-from app.runs.exchange.tables import LARGEST_BYTES, Table
+from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.stamps import (
+    StampColumn,
+    StampError,
+    ambiguous_date,
+    date_order,
+    find_form,
+    stamp_fault,
+    to_datetime,
+)
+from app.runs.exchange.tables import LARGEST_BYTES, SHOWN_ROWS, Table
 from app.runs.exchange.units import parse_unit
 from messages.i18n import N_
 from messages.message import Message, message, option
 
-_Rows = list[tuple[Any, ...]]
+_Row = tuple[Any, ...]
+_REPORT_ROWS = 10_000
+_SHOWN = 40  # characters of a cell in a message
+_NAT_NS = np.iinfo(np.int64).min
+_MICROSECOND, _NO_OFFSET = datetime.timedelta(microseconds=1), datetime.timedelta(0)
+_MIDNIGHT = datetime.datetime(1970, 1, 1)  # noqa: DTZ001 - a time of day counts from it
 
 
-def open_table(path: Path, layout: CsvOptions) -> Table:
+def open_table(path: Path, layout: CsvOptions, report: ReportShare) -> Table:
     """Columns of the first sheet that has those asked for. Raises ImportFileError, ExtraMissingError."""
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > LARGEST_BYTES:
             raise ImportFileError("{path} unpacks to more than can be loaded. Export it as CSV", path=path)
-    book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
-    with contextlib.closing(book):
-        sheet, header, rows = _sheet(path, book, layout)
-    first = layout.skip + (2 if layout.header else 1)
-    units: list[str] = []
-    if layout.header and len(rows) > 1 and _is_unit_row(rows[0]):
-        units, first = ["" if cell is None else str(cell).strip("[]() ") for cell in rows.pop(0)], first + 1
-    width = max(len(header), *(len(row) for row in rows))
-    names = [*header, *[""] * (width - len(header))]
+    with _open_book(path) as book:
+        sheet = _find_sheet(path, book, layout)
+    reader = _Reader(path, sheet, layout, report)
+    return Table(sheet.names, reader.column, reader.row_label, sheet.units, first_rows=sheet.first_rows)
 
-    def row_label(row: int) -> Message:
-        return message("sheet {sheet}, row {row}", sheet=sheet, row=first + row)
 
-    def number(row: int, at: int) -> float:
-        cell = rows[row][at] if at < len(rows[row]) else None
-        if cell is None or (isinstance(cell, str) and cell.strip().lower() in MISSING_MARKS):
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    title: str
+    names: list[str]
+    units: list[str]
+    first_row: int
+    """Number of the first row of numbers, from 1."""
+    first_rows: tuple[tuple[str, ...], ...]
+
+
+class _Reader:
+    """Reads the rows of a sheet when the first column is asked for."""
+
+    def __init__(self, path: Path, sheet: _Sheet, layout: CsvOptions, report: ReportShare) -> None:
+        self._path = path
+        self._sheet = sheet
+        self._layout = layout
+        self._report = report
+
+    @functools.cached_property
+    def _rows(self) -> list[_Row]:
+        rows: list[_Row] = []
+        with _open_book(self._path) as book:
+            for row in _rows(book[self._sheet.title], self._sheet.first_row):
+                rows.append(row)
+                if len(rows) % _REPORT_ROWS == 0:
+                    self._report(0.0)
+        while rows and _is_blank(rows[-1]):
+            rows.pop()
+        return rows
+
+    def row_label(self, row: int) -> Message:
+        return message("sheet {sheet}, row {row}", sheet=self._sheet.title, row=self._sheet.first_row + row)
+
+    def column(self, at: int) -> NDArray[Any]:
+        cells = [row[at] if at < len(row) else None for row in self._rows]
+        present = [cell for cell in cells if cell is not None]
+        kinds = {type(cell) for cell in present}
+        if kinds == {datetime.datetime}:
+            return np.array(cells, "M8[us]")
+        if kinds == {datetime.time}:
+            since = [cell and datetime.datetime.combine(_MIDNIGHT, cell) - _MIDNIGHT for cell in cells]
+            return np.array(since, "m8[us]")
+        if kinds == {datetime.timedelta}:
+            return np.array(cells, "m8[us]")
+        if kinds == {str} and (form := find_form(present[0])) is not None:
+            order = self._layout.date_order or date_order(present)
+            if order is None:
+                raise ambiguous_date(self._path, present[0])
+            return self._stamps(StampColumn(form, order), cells, at)
+        return np.array([self._number(cell, row, at) for row, cell in enumerate(cells)], np.float64)
+
+    def _stamps(self, stamps: StampColumn, cells: list[str | None], at: int) -> NDArray[Any]:
+        times_ns = np.full(len(cells), _NAT_NS)
+        for row, cell in enumerate(cells):
+            if cell is not None:
+                try:
+                    times_ns[row] = stamps.parse(cell)
+                except StampError:
+                    raise self._fault(row, at, stamp_fault(cell)) from None
+        if stamps.has_zone:  # those of a workbook have none: they count as local
+            is_there = times_ns != _NAT_NS
+            begin = to_datetime(int(times_ns[is_there][0]), has_zone=True).astimezone()
+            times_ns[is_there] += (begin.utcoffset() or _NO_OFFSET) // _MICROSECOND * 1000
+        return times_ns.view("M8[ns]" if stamps.has_date else "m8[ns]")
+
+    def _number(self, cell: Any, row: int, at: int) -> float:
+        if cell is None or (isinstance(cell, str) and cell.strip().lower() in self._layout.marks):
             return math.nan
         if isinstance(cell, bool) or not isinstance(cell, int | float):
             remedy = message("Correct it, or leave the cell empty if there is no reading")
-            fault = message("{cell!r} is not a number. {remedy}", cell=str(cell)[:40], remedy=remedy)
-            raise cell_fault(path, row_label(row), names[at] or str(at), fault)
+            fault = message("{cell!r} is not a number. {remedy}", cell=str(cell)[:_SHOWN], remedy=remedy)
+            raise self._fault(row, at, fault)
         return float(cell)
 
-    def column(at: int) -> NDArray[Any]:
-        cells: list[Any] = [row[at] if at < len(row) else None for row in rows]
-        if all(isinstance(cell, datetime.datetime) for cell in cells):
-            return np.array(cells, "M8[us]")
-        if all(isinstance(cell, datetime.time) for cell in cells):
-            midnight = datetime.date(1970, 1, 1)
-            return np.array([datetime.datetime.combine(midnight, cell) for cell in cells], "M8[us]").astype(
-                "m8[us]"
-            )
-        return np.array([number(row, at) for row in range(len(rows))])
-
-    return Table(names, column, row_label, units)
+    def _fault(self, row: int, at: int, fault: Message) -> ImportFileError:
+        return cell_fault(self._path, self.row_label(row), self._sheet.names[at] or str(at), fault)
 
 
-def _is_unit_row(row: tuple[Any, ...]) -> bool:
-    texts = [cell for cell in row if cell is not None]
-    return bool(texts) and all(isinstance(cell, str) and parse_unit(cell) is not None for cell in texts)
+def _open_book(path: Path) -> contextlib.closing[Any]:
+    book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
+    return contextlib.closing(book)
 
 
-def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], _Rows]:
-    """Name, header and rows of the first sheet that has the columns, or of the first one."""
-    found: list[tuple[str, list[str], _Rows]] = []
-    for sheet in book.worksheets:
-        rows = list(sheet.iter_rows(min_row=layout.skip + 1, values_only=True))
-        head = rows[0] if layout.header and rows else ()
-        header = ["" if cell is None else str(cell).strip() for cell in head]
-        rows = rows[1:] if layout.header else rows
-        while rows and all(cell is None for cell in rows[-1]):
-            rows.pop()
-        if rows:
-            found.append((str(sheet.title), header, rows))
-        if rows and all(name.strip() in header for _, name in layout.wanted):
-            return found[-1]
-    if not found:
+def _rows(sheet: Any, first_row: int) -> Iterator[_Row]:
+    sheet.reset_dimensions()  # some programs write wrong ones, beyond which nothing would be read
+    rows: Iterator[_Row] = sheet.iter_rows(min_row=first_row, values_only=True)
+    return rows
+
+
+def _find_sheet(path: Path, book: Any, layout: CsvOptions) -> _Sheet:
+    """The first sheet that has the columns, else the first one with rows. Raises ImportFileError."""
+    sheets = [found for sheet in book.worksheets if (found := _open_sheet(sheet, layout)) is not None]
+    if not sheets:
         template = N_("{path} holds no rows. Give a workbook with numbers, and check {option}")
         raise ImportFileError(template, path=path, option=option("--skip"))
-    return found[0]
+    wanted = {name.strip() for _, name in layout.wanted}
+    return next((sheet for sheet in sheets if wanted <= set(sheet.names)), sheets[0])
+
+
+def _open_sheet(sheet: Any, layout: CsvOptions) -> _Sheet | None:
+    """Names and units of a sheet; None of one without rows."""
+    rows = _rows(sheet, layout.skip + 1)
+    header = next(rows, ()) if layout.header else ()
+    first_row = layout.skip + 1 + layout.header
+    first = next(rows, ())
+    units: list[str] = []
+    if layout.header and _is_unit_row(first):
+        units = ["" if cell is None else str(cell).strip("[]() ") for cell in first]
+        first, first_row = next(rows, ()), first_row + 1
+    shown = [first, *itertools.islice(rows, SHOWN_ROWS - 1)]
+    if all(map(_is_blank, itertools.chain(shown, rows))):
+        return None
+    names = ["" if cell is None else str(cell).strip() for cell in header]
+    names += [""] * (len(first) - len(names))
+    first_rows = tuple(tuple("" if cell is None else str(cell) for cell in row) for row in shown)
+    return _Sheet(str(sheet.title), names, units, first_row, first_rows)
+
+
+def _is_blank(row: _Row) -> bool:
+    return all(cell is None for cell in row)
+
+
+def _is_unit_row(row: _Row) -> bool:
+    texts = [cell for cell in row if cell is not None]
+    return bool(texts) and all(isinstance(cell, str) and parse_unit(cell) is not None for cell in texts)

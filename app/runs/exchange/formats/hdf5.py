@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.tables import Table
 
-_COLUMNS_MOST = 256  # a matrix with more is no table of channels
+COLUMNS_MOST = 256
+"""Columns of a matrix: where there are more, its rows are the channels."""
 _UNIT_ATTRIBUTES = ("units", "unit", "Unit", "Units", "UNIT")
 _MATLAB_OWN = "#"  # begins the names of groups that MATLAB keeps for itself
 _MATLAB_TEXT = "MATLAB_int_decode"
@@ -26,7 +28,7 @@ class _Column(NamedTuple):
     read: Callable[[h5py.File], NDArray[Any]]
 
 
-def open_table(path: Path, _layout: CsvOptions) -> Table:
+def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
     """Datasets by their paths, columns of a matrix as `path:0`, fields of a compound as `path.field`."""
     with h5py.File(path, "r", locking=False) as file:
         if "slipstand_schema" in file.attrs:
@@ -96,9 +98,9 @@ def _of_matrix(dataset: h5py.Dataset, name: str, unit: str, *, is_by_column: boo
     if 1 in shape:
         yield _Column(name, unit, partial(_read_vector, path))
         return
-    for at in range(shape[0 if is_by_column else 1]):
-        if at == _COLUMNS_MOST:
-            return
+    if shape[0 if is_by_column else 1] > COLUMNS_MOST:
+        is_by_column = not is_by_column
+    for at in range(min(shape[0 if is_by_column else 1], COLUMNS_MOST)):
         if is_by_column:
             yield _Column(f"{name}:{at}", unit, partial(_read_row, path, at))
         else:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.tables import Table, TimeAxis, even_axis
 
 
-def open_table(path: Path, _layout: CsvOptions) -> Table:
+def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
     """Channels of the first segment by their names, with its time column or its `Delta_X`."""
     # Its pickle beside the file may hold any code, and is neither read nor written.
     content: dict[Any, Any] = import_optional("lvm_read", "LVM").read(

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.csv_layout import CsvOptions
-from app.runs.exchange.formats.hdf5 import open_matlab
+from app.runs.exchange.formats.hdf5 import COLUMNS_MOST, open_matlab
 from app.runs.exchange.tables import LARGEST_BYTES, Table
 
 
-def open_table(path: Path, _layout: CsvOptions) -> Table:
+def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
     from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
 
@@ -37,4 +38,5 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
         if value.ndim == 1 or 1 in value.shape:
             yield name, value.ravel().astype(np.float64)
         else:
-            yield from ((f"{name}:{i}", value[:, i].astype(np.float64)) for i in range(value.shape[1]))
+            columns = value.T if value.shape[1] <= COLUMNS_MOST else value[:COLUMNS_MOST]
+            yield from ((f"{name}:{i}", column.astype(np.float64)) for i, column in enumerate(columns))

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.stamps import to_datetime
 from app.runs.exchange.tables import Table, TimeAxis, even_axis
 
 
-def open_table(path: Path, _layout: CsvOptions) -> Table:
+def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
     """Channels as `group/channel`, by the channel alone where one group has it; times of their waveform."""
     module = import_optional("nptdms", "TDMS")
     with module.TdmsFile.open(path) as file:
@@ -39,7 +40,8 @@ def open_table(path: Path, _layout: CsvOptions) -> Table:
         )
 
     units = [str(told.get("unit_string", "")) for told in properties]
-    return Table(names, column, units=units, axis=axis, has_axis=any("wf_increment" in p for p in properties))
+    has_axis = any("wf_increment" in one for one in properties)
+    return Table(names, column, units=units, axis=axis, has_axis=has_axis, has_zone=True)
 
 
 def _start(value: Any) -> datetime.datetime | None:

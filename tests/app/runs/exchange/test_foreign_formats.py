@@ -4,6 +4,8 @@ import datetime
 import gzip
 import os
 import struct
+import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 from app.runs.errors import ImportFileError
 from app.runs.exchange import reading_process
 from app.runs.exchange.csv_layout import CsvOptions
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.importing import CsvImport, read_record
 from app.runs.exchange.reading_process import ReadingProcess, shared_reading_process
 from app.runs.exchange.recognition import ParseOptions
 
@@ -133,6 +135,145 @@ def test_a_file_of_another_program_is_read_to_the_last_bit(tmp_path, name):
     found = shared_reading_process().preview(path, ParseOptions())
     assert (found.time == "") == (layout.time == "")
     assert {layout.table, layout.second} <= set(found.columns)
+
+
+def write_workbook(path, rows):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.save(path)
+    book.close()
+
+
+MAY_4 = datetime.datetime(2019, 5, 4)  # noqa: DTZ001 - a workbook has no zones
+LATE = MAY_4 + datetime.timedelta(hours=23, minutes=59, seconds=59.5)
+LATE_STAMPS = [LATE + datetime.timedelta(seconds=row / 4) for row in range(60)]
+
+
+@pytest.mark.parametrize(
+    ("names", "cells", "start"),
+    [
+        (["t"], [[one] for one in LATE_STAMPS], LATE.astimezone()),
+        (["t"], [[one.time()] for one in LATE_STAMPS], None),
+        (["t"], [[one - MAY_4] for one in LATE_STAMPS], None),
+        (["t"], [[f"{one:%d.%m.%Y %H:%M:%S},{one.microsecond // 1000:03d}"] for one in LATE_STAMPS],
+         LATE.astimezone()),
+        (["t"], [[f"{one.isoformat()}+02:00"] for one in LATE_STAMPS],
+         LATE.replace(tzinfo=datetime.timezone(datetime.timedelta(hours=2)))),
+        (["t", "Date"], [[one.time(), MAY_4.replace(day=one.day)] for one in LATE_STAMPS],
+         LATE.astimezone()),
+    ],
+)  # fmt: skip
+def test_a_workbook_has_times_in_many_forms(tmp_path, names, cells, start):
+    path = tmp_path / "log.xlsx"
+    write_workbook(path, [[*names, "u1"], *([*cell, row] for row, cell in enumerate(cells))])
+    plan = CsvImport(CsvOptions("t", "u1", date="Date" if "Date" in names else None))
+    with shared_reading_process().read(path, plan) as record:
+        assert record.time_s == pytest.approx(np.arange(60) / 4, abs=1e-9)
+        assert record.facts.start == start
+
+
+def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path, monkeypatch):
+    """Some programs write a wrong size of the sheet, beyond which openpyxl reads nothing."""
+    whole, path = tmp_path / "whole.xlsx", tmp_path / "log.xlsx"
+    marks = ["OVL", "N/A", -9999]
+    write_workbook(
+        whole, [["t", "u1"], ["s", "mm"], *([row / 4, (marks + [row] * 60)[row]] for row in range(60))]
+    )
+    with zipfile.ZipFile(whole) as given, zipfile.ZipFile(path, "w") as made:
+        for name in given.namelist():
+            made.writestr(name, given.read(name).replace(b'<dimension ref="A1:B62"', b'<dimension ref="A1"'))
+    shares = []
+    monkeypatch.setattr("app.runs.exchange.formats.excel._REPORT_ROWS", 10)
+    record = read_record(path, CsvImport(CsvOptions("t", "u1", missing=("ovl", "-9999"))), shares.append)
+    assert np.isnan(record.cells[0][:3]).all()
+    assert list(record.cells[0][3:]) == list(range(3, 60))
+    assert record.facts.gauges[0].gain_m_per_count == 1e-3
+    assert shares.count(0.0) == 6
+
+
+@pytest.mark.parametrize("suffix", [".xlsx", ".parquet", ".mat", ".h5"])
+def test_units_and_times_are_found_in_the_names_of_any_format(tmp_path, suffix):
+    columns = {"Test/Time (ms)": np.arange(60.0), "Test/u1_mm": np.arange(60.0)}
+    path = tmp_path / f"log{suffix}"
+    if suffix == ".xlsx":
+        write_workbook(path, [list(columns), *np.column_stack(list(columns.values())).tolist()])
+    elif suffix == ".parquet":
+        parquet = pytest.importorskip("pyarrow.parquet")
+        parquet.write_table(pytest.importorskip("pyarrow").table(columns), path)
+    elif suffix == ".mat":
+        from scipy.io import savemat
+
+        columns = {"t_ms": np.arange(60.0), "u1_mm": np.arange(60.0)}
+        savemat(path, columns)
+    else:
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            file["at first"] = -np.arange(60.0)
+            for name, values in columns.items():
+                file[name] = values
+    with shared_reading_process().read(path, CsvImport(CsvOptions("", list(columns)[1]))) as record:
+        assert record.time_s == pytest.approx(1e-3 * np.arange(60))
+        assert record.facts.gauges[0].gain_m_per_count == 1e-3
+
+
+def test_date_times_of_a_table_are_its_times_whatever_their_name(tmp_path, monkeypatch):
+    """As pandas keeps the index of a frame."""
+    pandas = pytest.importorskip("pandas")
+    index = pandas.date_range("2025-11-23 14:03:07", periods=60, freq="2ms", tz="UTC")
+    path = tmp_path / "frame.parquet"
+    pandas.DataFrame({"u1 [mm]": np.arange(60.0)}, index=index).to_parquet(path)
+    record = read_record(path, CsvImport(CsvOptions("", "u1 [mm]")))
+    assert record.facts.start == datetime.datetime(2025, 11, 23, 14, 3, 7, tzinfo=datetime.UTC)
+    assert shared_reading_process().preview(path, ParseOptions()).rows[1][0] == "1.0"
+
+
+@pytest.mark.skipif(not hasattr(time, "tzset"), reason="the zone of the computer is changed")
+def test_a_channel_of_date_times_is_utc_in_tdms(tmp_path, monkeypatch):
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "stamped.tdms"
+    stamps = np.datetime64("2025-11-23T14:03:07", "us") + np.arange(60) * np.timedelta64(2000, "us")
+    with nptdms.TdmsWriter(path) as writer:
+        channels = {"Time": stamps, "u1": np.arange(60.0)}
+        writer.write_segment([nptdms.ChannelObject("g", name, data) for name, data in channels.items()])
+    monkeypatch.setenv("TZ", "Asia/Tokyo")
+    time.tzset()
+    try:
+        record = read_record(path, CsvImport(CsvOptions("", "u1")))
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert record.facts.start == datetime.datetime(2025, 11, 23, 14, 3, 7, tzinfo=datetime.UTC)
+    assert record.facts.rate_hz == pytest.approx(500.0)
+
+
+def test_options_of_texts_are_refused_for_other_files(tmp_path):
+    path = tmp_path / "log.xlsx"
+    write_workbook(path, [["t", "u1"], *([row, row] for row in range(60))])
+    assert (
+        fault_of(path, CsvOptions("t", "u1", encoding="cp1251"))
+        == "log.xlsx is no text: leave out --encoding"
+    )
+    with_dates = fault_of(path, CsvOptions("t", "u1", date="1"))
+    assert "is given for" in with_dates
+
+
+@pytest.mark.parametrize("name", ["wide.mat", "wide.h5"])
+def test_rows_are_channels_where_a_matrix_has_too_many_columns(tmp_path, name):
+    import h5py
+    from scipy.io import savemat
+
+    path, wide = tmp_path / name, np.stack([np.arange(300.0), np.arange(300.0) / 7])
+    if name == "wide.mat":
+        savemat(path, {"x": wide})
+    else:
+        with h5py.File(path, "w") as file:
+            file["x"] = wide
+    with shared_reading_process().read(path, CsvImport(CsvOptions("x:0", "x:1"))) as record:
+        assert np.array_equal(record.time_s, wide[0])
+        assert np.array_equal(record.cells[0], wide[1])
 
 
 def test_a_sound_file_is_full_scale_times_a_gain(tmp_path):

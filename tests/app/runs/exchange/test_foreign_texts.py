@@ -10,6 +10,7 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.import_run import find_release, import_csv
 from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.text_files import TextFile
 from app.runs.reader import open_run
 from config.files import load_stand
 
@@ -39,7 +40,7 @@ BERLIN_WINTER = datetime.timezone(datetime.timedelta(hours=1))
     [
         "%Y-%m-%d %H:%M:%S.@", "%Y-%m-%dT%H:%M:%S.@", "%d.%m.%Y %H:%M:%S,@", "%m/%d/%Y %I:%M:%S.@ %p",
         "%Y/%m/%d %H:%M:%S.@", "%d-%b-%Y %H:%M:%S.@", "%Y%m%dT%H%M%S.@", "%b %d, %Y %H:%M:%S.@",
-        "%a %d.%m.%y %H:%M:%S:@", "%H:%M:%S.@",
+        "%a %d.%m.%y %H:%M:%S:@", "%d/%b/%Y %H:%M:%S.@", "%H:%M:%S.@", "%M:%S.@",
     ],
 )  # fmt: skip
 def test_date_times_are_times(tmp_path, pattern):
@@ -50,6 +51,12 @@ def test_date_times_are_times(tmp_path, pattern):
         assert record.facts.start == datetime.datetime(2025, 11, 23, 23, 59, 57).astimezone()
     else:
         assert record.facts.start is None
+
+
+def test_stamps_of_ctime_are_times(tmp_path):
+    record = record_of(tmp_path, "\n".join(stamped("%a %b %d %H:%M:%S %Y", step_ms=1000)) + "\n")
+    assert np.array_equal(record.time_s, np.arange(ROWS))
+    assert record.facts.start == datetime.datetime(2025, 11, 23, 23, 59, 57).astimezone()
 
 
 @pytest.mark.parametrize("zone", ["+01:00", "+0100", " +01:00"])
@@ -84,6 +91,30 @@ def test_seconds_since_1970_tell_the_start_and_begun_overrules(tmp_path):
     begun = datetime.datetime(2019, 5, 4, 14, 3, tzinfo=BERLIN_WINTER)
     later = record_of(tmp_path, text, CsvImport(BASIC, begun=begun, from_s=1763900000.25))
     assert later.facts.start == begun + datetime.timedelta(seconds=0.25)
+
+
+def test_seconds_since_1904_are_those_of_labview(tmp_path):
+    text = "t,u1\n" + "".join(f"{1763900000 + 2082844800 + row / 4},{row}\n" for row in range(ROWS))
+    assert record_of(tmp_path, text).facts.start == datetime.datetime.fromtimestamp(1763900000, datetime.UTC)
+
+
+def test_a_file_without_times_is_told_what_it_needs(tmp_path):
+    text = "u1,u2\n" + "".join(f"{row},{row}\n" for row in range(ROWS))
+    with pytest.raises(ImportFileError, match=r"no column of times is found. Add --time COL, or --rate HZ"):
+        record_of(tmp_path, text)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-8-sig", "UTF8", "cp866"])
+def test_a_text_is_read_in_the_encoding_that_is_given(tmp_path, encoding):
+    text = "Время;u1\n" + "".join(f"{row};{row}\n" for row in range(ROWS))
+    plan = CsvImport(CsvOptions("Время", "u1", encoding=encoding))
+    assert list(record_of(tmp_path, text, plan, encoding).cells[0]) == list(range(ROWS))
+
+
+@pytest.mark.parametrize("encoding", ["utf-32", "cp037", "hex", "none"])
+def test_an_encoding_in_which_digits_are_no_ascii_is_refused(tmp_path, encoding):
+    with pytest.raises(ImportFileError, match=f"--encoding '{encoding}' is not known"):
+        record_of(tmp_path, "t,u1\n0,1\n", CsvImport(CsvOptions("t", "u1", encoding=encoding)))
 
 
 @pytest.mark.parametrize(
@@ -134,6 +165,33 @@ def test_a_rate_stands_for_times(tmp_path):
         record_of(tmp_path, text, CsvImport(CsvOptions("0", "u1", rate_hz=1.0)))
 
 
+ONE_COLUMN = "".join(f"{row},50\n" for row in range(ROWS))
+
+
+def test_decimal_commas_of_one_column_are_no_second_column(tmp_path):
+    plan = CsvImport(CsvOptions("", "0", rate_hz=100.0))
+    assert list(record_of(tmp_path, "u1\n" + ONE_COLUMN, plan).cells[0]) == [row + 0.5 for row in range(ROWS)]
+    assert list(record_of(tmp_path, "u1,u2\n" + ONE_COLUMN, plan).cells[0]) == list(range(ROWS))
+    bare = CsvOptions("", "0", rate_hz=100.0, header=False)
+    with pytest.raises(ImportFileError, match=r"'20,50' may be one number or two. Add --decimal , or"):
+        record_of(tmp_path, ONE_COLUMN, CsvImport(bare))
+
+
+def test_decimal_commas_between_quotes_are_read(tmp_path):
+    text = '"t","u1"\n' + "".join(f'"{row},25","{row},5"\n' for row in range(ROWS))
+    record = record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1")))
+    assert list(record.cells[0]) == [row + 0.5 for row in range(ROWS)]
+
+
+def test_a_unit_that_is_not_named_is_told(tmp_path):
+    text = "t;u1 [mm];rel\n" + "".join(f"{row};{row};{row}\n" for row in range(ROWS))
+    notes = record_of(tmp_path, text, CsvImport(CsvOptions("t", "1", "2"))).facts.notes
+    assert list(map(str, notes)) == [
+        "'u1 [mm]' is in mm, as the file says",
+        "'rel' names no unit: it is taken as m. --unit states another",
+    ]
+
+
 def test_marks_of_absent_readings(tmp_path):
     marks = ["", "NaN", "N/A", "#N/A", "NULL", "-", "---", "1.#QNAN", "-1.#IND", "oops"]
     text = "t;u1\n" + "".join(f"{row};{mark}\n" for row, mark in enumerate([*marks, *range(60)]))
@@ -142,6 +200,14 @@ def test_marks_of_absent_readings(tmp_path):
     assert list(record.cells[0][len(marks) :]) == list(range(60))
     with pytest.raises(ImportFileError, match="line 11, column 'u1': 'oops' is not a number"):
         record_of(tmp_path, text)
+
+
+def test_a_mark_that_is_a_number_is_absent_however_it_is_written(tmp_path):
+    cells = ["-9999", "-9999.00", "-9.999e3", *map(str, range(60))]
+    text = "t;u1\n" + "".join(f"{row};{cell}\n" for row, cell in enumerate(cells))
+    record = record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1", missing=("-9999",))))
+    assert np.isnan(record.cells[0][:3]).all()
+    assert list(record.cells[0][3:]) == list(range(60))
 
 
 def test_rounded_stamps_of_an_even_logger_are_made_even(tmp_path):
@@ -169,6 +235,16 @@ def test_a_footer_is_left_out_and_told(tmp_path):
     assert "line 62" in str(record.facts.notes[0])
     with pytest.raises(ImportFileError, match="line 62, column 't': 'Mean'"):
         record_of(tmp_path, text + "60;60\n")
+
+
+def test_a_footer_is_looked_for_at_the_end_alone(tmp_path, monkeypatch):
+    decoded = []
+    decode = TextFile.decode
+    monkeypatch.setattr("app.runs.exchange.csv_reading.PIECE_BYTES", 64)
+    monkeypatch.setattr(TextFile, "decode", lambda file, data: decoded.append(data) or decode(file, data))
+    text = "t;u1\n" + "".join(f"{row};{row}\n" for row in range(1000)) + "Mean;29,5\n"
+    assert len(record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1")))) == 1000
+    assert sum(map(len, decoded)) < 2 * len(text)
 
 
 def test_a_run_keeps_its_file_and_what_is_known_of_its_start(tmp_path):
