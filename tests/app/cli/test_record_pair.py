@@ -89,37 +89,13 @@ def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) 
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("protocol", "format_", "rate_hz"),
-    [
-        ("csv", "mantracourt-dscusb", 300),
-        ("csv", "loadstar-iload", 500),
-        ("gsv-234", "gsv-3", 500),
-        ("gsv-234", "gsv-2", 500),
-        ("hbm-aed", "ascii", 600),
-    ],
-)
-def test_two_streams_without_time_find_the_true_friction(
-    slipstand: Any, tmp_path: Path, protocol: str, format_: str, rate_hz: int
-) -> None:
-    device = {"format": format_}
-    with two_stands(protocol=protocol, device=device, rate_hz=rate_hz, **QUICK) as (first, second):
-        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", protocol]
-        ports += ["--calibration", first.calibration] if first.calibration else []
-        wanted = [
-            "--rate",
-            rate_hz,
-            "--series",
-            "1FFM0",
-            "--pretrigger",
-            0.5,
-            "--duration",
-            4.5,
-            "--trigger-timeout",
-            60,
-            "--json",
-        ]
-        given = ["--set", f"format={format_}", "--directory", tmp_path]
+def test_two_streams_without_time_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
+    """Others are read by a clock of the test in `tests/app/simulated_stand/test_stand_over_port.py`."""
+    device = {"format": "loadstar-iload"}
+    with two_stands(protocol="csv", device=device, rate_hz=500.0, **QUICK) as (first, second):
+        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "csv", "--rate", 500]
+        wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        given = ["--set", "format=loadstar-iload", "--directory", tmp_path, "--trigger-timeout", 60]
         recorded = slipstand("record", *ports, *given, *wanted).json
         true = first.truth().stand.friction_dynamic
     if (uncertainty_s := recorded["skew_standard_uncertainty_s"]) > 2e-3:
