@@ -23,13 +23,19 @@ from config.files import settings_file
 from drivers.driver import GAUGES
 from drivers.samples import ABSENT_BY_GAUGE
 from tests.drills.sent import Sent
-from tests.drills.unplug import AWAY_S, DURATION_S, PULLED_WITHIN_S, UnplugReport, wait_for
+from tests.drills.unplug import (
+    AWAY_S,
+    DURATION_S,
+    PULLED_WITHIN_S,
+    RETURN_LIMIT_S,
+    UnplugReport,
+    wait_for,
+)
 from tests.drivers.examples import recording_examples
 
-ASKED_HZ = 100.0
 STARTS_S = 5.0
 """Both stands are ready before their common motion begins."""
-CELLS_OFF = 3.0
+OFF_LIMIT_S = 0.03
 
 
 def unplug_pair(
@@ -45,12 +51,13 @@ def unplug_pair(
     The run must go on with the other device alone, and each reading be what its stand took at that time.
     """
     device = recording_examples()[protocol]
-    rate_hz = device.unplugged_hz if device.is_pair else ASKED_HZ
+    rate_hz = device.polled_hz or device.unplugged_hz
     report, moments = UnplugReport(), random.Random(seed)
     starts_at_s = time.time() + STARTS_S
     options = [
         SimulatedStandOptions(
-            protocol=protocol, gauge=gauge, rate_hz=device.unplugged_hz, seed=number, decay_s=5.0,
+            protocol=device.protocol, device=device.settings, gauge=gauge, rate_hz=device.unplugged_hz,
+            seed=number, decay_s=5.0,
             tcp_port=0 if tcp else None, table_drift_m_per_s=1e-3, relative_drift_m_per_s=1e-3,
             start_at_unix_s=starts_at_s,
         )
@@ -59,7 +66,13 @@ def unplug_pair(
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
     with SimulatedStand.start(options[0]) as table, SimulatedStand.start(options[1]) as relative:
         stands, sent = (table, relative), (Sent(), Sent())
-        port = PortSettings(table.port, protocol, rate_hz=rate_hz, relative_url=relative.port)
+        port = PortSettings(
+            table.port,
+            device.protocol,
+            rate_hz=rate_hz,
+            device=device.settings,
+            relative_url=relative.port,
+        )
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
             time.sleep(max(0.0, starts_at_s - time.time()))
@@ -117,6 +130,8 @@ def _check(
     there = np.setdiff1d(np.arange(len(run)), gone[lost])
     again_s = began_s + run.time_s[there] - returned_s
     report.back_after_s.append(float(again_s[again_s > 0.0].min()))
+    if report.back_after_s[-1] > RETURN_LIMIT_S:
+        raise ValueError(f"back only {report.back_after_s[-1]:.2f} s after the return")
 
 
 def _check_gauge(
@@ -136,5 +151,5 @@ def _check_gauge(
         raise ValueError(f"row {row} of gauge {gauge + 1}, {counts[row, gauge]} counts, was never taken")
     farthest_s = float(off_s[np.argmax(np.abs(off_s - np.median(off_s)))] - np.median(off_s))
     report.estimate_off_s.append(farthest_s)
-    if abs(farthest_s) > CELLS_OFF / ASKED_HZ:
+    if abs(farthest_s) > OFF_LIMIT_S:
         raise ValueError(f"a reading of gauge {gauge + 1} was taken {farthest_s * 1e3:.0f} ms off its row")
