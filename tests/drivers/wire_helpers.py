@@ -1,11 +1,12 @@
-"""Shared by the driver tests: a scripted link, cuts of a byte string, and blocks put together."""
+"""Shared by the driver tests: a scripted link, refused settings, cuts of bytes, and blocks put together."""
 
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
-from drivers.errors import DeviceLostError
+from drivers.errors import DeviceLostError, SettingsError
 from drivers.samples import SampleBlock
 
 
@@ -29,6 +30,15 @@ class ScriptedLink:
             raise DeviceLostError("the scripted device is gone")
         self.sent.append(data)
         self._waiting += self._answer(data)
+
+
+def refusal(make: Callable[..., object], *given: object) -> str:
+    """The one line that refuses settings."""
+    with pytest.raises(SettingsError) as error:
+        make(*given)
+    said = str(error.value)
+    assert "\n" not in said
+    return said
 
 
 def cut_at(data: bytes, places: Iterable[int]) -> Iterator[bytes]:

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from wire_helpers import join, single_bytes
+from wire_helpers import join, refusal, single_bytes
 
 from drivers.devices.csv_lines.codec import LineDecoder, encode_line, encode_lines
 from drivers.devices.csv_lines.columns import Column, LineFormat
 from drivers.devices.csv_lines.source import make_source, read_csv_settings
-from drivers.errors import SettingsError
 from drivers.samples import Losses, SampleStatus
 
 GOOD, DAMAGED, OVERLOAD = SampleStatus.GOOD, SampleStatus.DAMAGED, SampleStatus.OVERLOAD_TABLE
@@ -157,7 +156,4 @@ def test_what_is_written_is_read_with_any_line_end(line_end):
     ],
 )
 def test_settings_are_checked(settings, fault):
-    with pytest.raises(SettingsError) as error:
-        make_source(settings, 10.0)
-    assert fault in str(error.value)
-    assert "\n" not in str(error.value)
+    assert fault in refusal(make_source, settings, 10.0)

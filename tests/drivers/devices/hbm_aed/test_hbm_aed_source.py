@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
-from wire_helpers import ScriptedLink, join
+from wire_helpers import ScriptedLink, join, refusal
 
 from drivers.devices.hbm_aed import commands
 from drivers.devices.hbm_aed.codec import Format, ValueDecoder, encode_frames
@@ -163,9 +163,7 @@ def test_the_identity_is_read_whole():
     [({"format": "cof2"}, "Invalid enum value 'cof2'"), ({"address": "90"}, "address 90 is none of a bus")],
 )
 def test_settings_are_checked(settings, fault):
-    with pytest.raises(SettingsError) as error:
-        make_source(settings, None)
-    assert fault in str(error.value)
+    assert fault in refusal(make_source, settings, None)
 
 
 # --- the simulated device ---------------------------------------------------------------------

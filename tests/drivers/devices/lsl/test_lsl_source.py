@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wire_helpers import ScriptedLink, join
+from wire_helpers import ScriptedLink, join, refusal
 
 from drivers import lsl_link
 from drivers.devices.lsl.source import LslSource, make_source, recognise
@@ -91,9 +91,7 @@ def test_a_stream_without_samples_is_silent():
     ],
 )
 def test_settings_are_checked(settings, rate_hz, fault):
-    with pytest.raises(SettingsError) as error:
-        make_source(settings, rate_hz)
-    assert fault in str(error.value)
+    assert fault in refusal(make_source, settings, rate_hz)
 
 
 def test_a_stream_is_recognised_by_its_description():

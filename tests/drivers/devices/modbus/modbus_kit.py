@@ -3,13 +3,15 @@
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import pytest
+from wire_helpers import join
 
 from drivers.devices.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.devices.modbus.frames import Request, encode_read_response
 from drivers.devices.modbus.maps import GAUGES
 from drivers.devices.modbus.registers import Poll, plan_poll
 from drivers.devices.modbus.simulated import make_protocol
-from drivers.devices.modbus.source import read_modbus_settings
+from drivers.devices.modbus.source import ModbusSource, read_modbus_settings
 from drivers.errors import DeviceLostError
 from drivers.samples import SampleBlock
 from drivers.simulated.protocol import CommandParser
@@ -33,6 +35,11 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_ns = 1_000_000_000_000
+
+    def install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("drivers.polling.host_ns", self.host_ns)
+        monkeypatch.setattr("drivers.polling.time", self)
+        monkeypatch.setattr("drivers.devices.modbus.source.time", self)
 
     def host_ns(self) -> int:
         return self.now_ns
@@ -89,6 +96,11 @@ def polled(
         wrap_response(0, round((cell + 0.5) * 1e9 / rate_hz), answer_of(request, *pair))
         for pair, cell in zip(counts, cells, strict=True)
     ]
+
+
+def rows(source: ModbusSource, reads: Iterable[bytes]) -> SampleBlock:
+    """The rows of some polls, of which none is left out."""
+    return join(block for data in reads for block in source.decode(data, 0))
 
 
 def decoded(decoder: ResponseDecoder, reads: Iterable[bytes]) -> list[SampleBlock]:

@@ -11,15 +11,15 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from serving_kit import serving
 from wire_helpers import join
 
 from drivers import port_probe
 from drivers.devices.modbus.source import make_source
 from drivers.errors import ProtocolError
 from drivers.port import open_port, port_info
-from drivers.registry import find_driver
 from drivers.samples import SampleBlock, SampleStatus
-from drivers.simulated.device import DeviceSetup, make_device
+from drivers.simulated.device import DeviceSetup
 from drivers.simulated.transport import Transport, open_pseudo_terminal, open_tcp_port
 
 ORDERS = {"ABCD": "BIG", "CDAB": "LITTLE_SWAP", "BADC": "BIG_SWAP", "DCBA": "LITTLE"}
@@ -37,23 +37,8 @@ class Still:
 @contextmanager
 def simulated(transport: Transport, settings: dict[str, str]) -> Iterator[str]:
     """The simulated device on a wire, in a thread."""
-    device = make_device(
-        transport, find_driver("modbus").make_simulated(settings), lambda *_: Still(), DeviceSetup(1000.0)
-    )
-    is_over = threading.Event()
-
-    def run() -> None:
-        while not is_over.is_set():
-            transport.wait(device.step(time.monotonic_ns()))
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
+    with serving(transport, "modbus", settings, lambda *_: Still(), DeviceSetup(1000.0)):
         yield transport.url
-    finally:
-        is_over.set()
-        thread.join()
-        transport.close()
 
 
 # --- pymodbus as transmitter -------------------------------------------------------------

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from modbus_kit import COUNTS, Clock, Transmitter
-from wire_helpers import join
+from modbus_kit import COUNTS, Clock, Transmitter, rows
 
 from drivers.devices.modbus.frames import Function, Response, exception_response
 from drivers.devices.modbus.simulated import find_tcp_commands
@@ -75,9 +74,7 @@ def test_a_listener_finds_requests_in_any_cut_and_behind_garbage():
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("drivers.polling.host_ns", clock.host_ns)
-    monkeypatch.setattr("drivers.polling.time", clock)
-    monkeypatch.setattr("drivers.devices.modbus.source.time", clock)
+    clock.install(monkeypatch)
     return clock
 
 
@@ -89,10 +86,6 @@ def started(link: Transmitter, rate_hz: float | None = 200.0, **settings: str) -
 
 def read(source: ModbusSource, link: Transmitter, calls: int) -> list[bytes]:
     return [data for _ in range(calls) if (data := source.read(link))]
-
-
-def rows(source: ModbusSource, reads: list[bytes]):
-    return join(block for data in reads for block in source.decode(data, 0))
 
 
 def test_the_conversation(clock):
