@@ -3,6 +3,7 @@
 import math
 import statistics
 import time
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,7 +17,7 @@ from messages.message import EMPTY, Message, message
 QUASI_STATIC_HZ = 500.0
 """Below it the run gets a note: a motion of 10 Hz has fewer than 50 samples a period."""
 TRIALS = 24  # trial polls before the stream; the slowest two in ten of them set the rate
-TOO_BUSY = N_(
+_TOO_BUSY = N_(
     "this computer is too busy to poll at {rate_hz:g} Hz, more than one poll in ten is left"
     " out: close other programs, or ask for a lower rate"
 )
@@ -141,8 +142,9 @@ class PollSchedule:
         self.tolerance_ns = max(round(_TOLERANCE * self._period_ns), _TOLERANCE_NS)
         self._window_ns = self.due_ns
         self._wakeups = self._late_wakeups = 0
-        self.is_computer_busy = False
-        """Whether this computer woke up too late for one poll in ten within the last seconds."""
+        self._rate_hz = rate_hz
+        self._is_computer_busy = False
+        self._warnings: deque[Message] = deque()
 
     @property
     def due_ns(self) -> int:
@@ -160,9 +162,16 @@ class PollSchedule:
             self._wakeups += 1
             self._late_wakeups += late_ns > self.tolerance_ns
         if late_ns >= 0 and self.due_ns - self._window_ns > _WINDOW_NS:
-            self.is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
+            was_busy = self._is_computer_busy
+            self._is_computer_busy = self._late_wakeups > _BUSY_SHARE * self._wakeups
+            if self._is_computer_busy and not was_busy:
+                self._warnings.append(message(_TOO_BUSY, rate_hz=self._rate_hz))
             self._window_ns, self._wakeups, self._late_wakeups = self.due_ns, 0, 0
         return 0 <= late_ns <= self.tolerance_ns
+
+    def take_warnings(self) -> list[Message]:
+        """Warnings since the last call that this computer wakes up too late for one poll in ten."""
+        return [self._warnings.popleft() for _ in range(len(self._warnings))]
 
     def mark_used(self, measured_ns: int) -> None:
         self._cell = max(self._cell, measured_ns // self._period_ns) + 1

@@ -3,7 +3,6 @@
 import math
 import re
 import time
-from collections import deque
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Literal
@@ -23,7 +22,6 @@ from drivers.devices.csv_lines.line_parser import LineParser
 from drivers.devices.csv_lines.presets import Preset, read_preset, shipped_presets, with_preset
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.polling import (
-    TOO_BUSY,
     TRIALS,
     PollSchedule,
     ResponseTiming,
@@ -284,8 +282,7 @@ class PolledLinesSource(CsvLinesSource):
         self._request = LineRequest(commands.poll)
         self._schedule: PollSchedule | None = None
         self._timing: ResponseTiming | None = None
-        self._warnings: deque[Message] = deque()
-        self._was_busy = self._answer_overdue = False
+        self._answer_overdue = False
 
     @property
     def run_note(self) -> Message:
@@ -319,11 +316,7 @@ class PolledLinesSource(CsvLinesSource):
         """Wait for the next poll and make it; b"" where it is not due within 50 ms, or nothing came."""
         if self._schedule is None or self._timing is None:
             raise ProtocolError("the device was not started: start it before it is read")
-        is_due = self._schedule.wait()
-        if self._schedule.is_computer_busy and not self._was_busy:
-            self._warnings.append(message(TOO_BUSY, rate_hz=self.rate_hz))
-        self._was_busy = self._schedule.is_computer_busy
-        if not is_due:
+        if not self._schedule.wait():
             return b""
         transaction = transact(link, self._request, self._answer_s)
         is_stale = self._answer_overdue or self._timing.is_stale(transaction)
@@ -338,7 +331,7 @@ class PolledLinesSource(CsvLinesSource):
         return b"".join(_lines(transaction.data)) if is_late else self._with_time(transaction)
 
     def take_warnings(self) -> list[Message]:
-        return [self._warnings.popleft() for _ in range(len(self._warnings))] + super().take_warnings()
+        return (self._schedule.take_warnings() if self._schedule else []) + super().take_warnings()
 
     def make_decoder(self, data: bytes) -> LineDecoder | None:  # noqa: ARG002 - the rate is that of the polls
         if self._layout is None or self._rate_hz is None:

@@ -2,7 +2,6 @@
 
 import itertools
 import time
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,7 +18,6 @@ from drivers.devices.modbus.tcp_frames import TcpRequest, find_tcp_exception
 from drivers.driver import GAUGES
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.polling import (
-    TOO_BUSY,
     TRIALS,
     PollSchedule,
     ResponseTiming,
@@ -103,8 +101,6 @@ class ModbusSource(SampleSource):
         """The last request got no response: it may still come."""
         self._was_invalid = False  # what came last was no response
         self._has_echo = False  # the line sends back what is written to it
-        self._warnings: deque[Message] = deque()
-        self._was_busy = False
 
     @property
     def skew_s(self) -> float:
@@ -155,11 +151,7 @@ class ModbusSource(SampleSource):
         schedule, timing = self._schedule, self._timing
         if schedule is None or timing is None:
             raise ProtocolError("the device was not started: start it before it is read")
-        is_due = schedule.wait()
-        if schedule.is_computer_busy and not self._was_busy:
-            self._warnings.append(message(TOO_BUSY, rate_hz=self.rate_hz))
-        self._was_busy = schedule.is_computer_busy
-        if not is_due:
+        if not schedule.wait():
             return b""
         wrapped, earlier, measured_ns = b"", b"", 0
         for number, planned in enumerate(self._poll.requests):
@@ -186,7 +178,7 @@ class ModbusSource(SampleSource):
         return wrapped
 
     def take_warnings(self) -> list[Message]:
-        return [self._warnings.popleft() for _ in range(len(self._warnings))]
+        return self._schedule.take_warnings() if self._schedule else []
 
     def make_decoder(self, data: bytes) -> ResponseDecoder:  # noqa: ARG002 - settings and rate are enough
         return self._decoder_at(self.rate_hz)
