@@ -51,8 +51,9 @@ from messages.message import message
 _EVIDENCE_MIN = 10.0
 """Fall of the BIC below which a friction law on an ideal stand is preferred to effects of the stand."""
 _NAMED_SHARE = 0.03
-"""Of what friction laws leave: what an effect explains to be named where not all is explained. With 0.2 fewer
-dominant effects are named in `benchmarks.study_real_stand` by 4 %, with 0.01 wrong ones more often by 0.4 %."""
+"""Of what friction laws leave: what an effect explains to be named where not all is explained. In the study
+`benchmarks.study_real_stand` the dominant effect is named less often by 4 % with 0.2, and a wrong one more
+often by 0.4 % with 0.01."""
 _LEFT_MAX = 0.1
 """Share of what no law explains that effects may leave: with more, others must be at work, and what these
 effects explain is theirs."""

@@ -1,4 +1,4 @@
-"""Compile the numerical code of `analysis` once, before processes that start together would each do it.
+"""Compile the numerical code once, before processes that start together would each do it.
 
 A record that no law on an ideal stand explains has all laws and effects of the stand tried.
 """
@@ -6,6 +6,7 @@ A record that no law on an ideal stand explains has all laws and effects of the 
 from analysis.identify import identify
 from analysis.laws.stand_parts import stand_displacements
 from analysis.synthetic import Truth, simulate_record
+from drivers.registry import AVAILABLE
 
 
 def main() -> None:
@@ -15,6 +16,8 @@ def main() -> None:
     motion = stand_displacements(truth.parameters(), effects, truth.duration_s + 1e-3)
     identify(simulate_record(truth, motion))
     identify(simulate_record(truth), model="stribeck+tilt")
+    for driver in AVAILABLE:
+        driver.make_source({}, 500.0).prepare()
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from analysis.laws.closed_form import (
     GaugeReadings,
     chi_squares,
     chi_squares_with_fitted_zero,
+    quadratic_model,
 )
 from analysis.laws.law import IDEAL_STAND, FrictionLaw, Gauge, StandPart
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, SHARED_PARAMETER_COUNT, Parameter
@@ -302,12 +303,15 @@ class GaussNewton:
         self._directions = law.directions(
             np.array([place for place in free if _moves(place)], dtype=np.int64)
         )
-        self._mean = problem.prior_mean[free]
+        self._readings, self._mean = problem.readings, problem.prior_mean[free]
         self._weight = problem.prior_weights(free)
         self._prior_normal = np.diag(self._weight)
 
     def evaluate(self, point: Floats) -> QuadraticModel:
         """Chi-square at `point` (p,), priors included, its descent and its curvature."""
+        if self.law.solver.is_closed_form:
+            known = self._readings, self._mean, self._weight
+            return QuadraticModel(*quadratic_model(point, self._free, self._directions, *known))
         systems = self.normal_equations(point)
         system = systems[0] if len(systems) == 1 else systems[0] + systems[1]
         last, away = len(self._free), self._mean - point[self._free]

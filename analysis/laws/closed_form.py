@@ -167,6 +167,32 @@ def _sum_moving(
 
 
 @compiled
+def quadratic_model(
+    point: Floats, free: Indices, directions: Floats, readings: GaugeReadings, mean: Floats, weight: Floats
+) -> tuple[float, Floats, Floats]:
+    """Chi-square at `point` with its descent (k,) and normal matrix (k, k) over the `free` places (k,).
+
+    `directions` (q, 10) are how the first q of them, which move the motion, move its parameters. `mean` and
+    `weight` (k,) are what is known of the places beforehand: values, and inverse variances.
+    """
+    table_time, table, relative_time, relative, noise, which = readings
+    parameters, last = point[:_MOTION].copy(), len(free)
+    end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
+    phases = events.integrate_events(parameters, max(DURATION_MIN_S, end - point[RELEASE]))
+    rows = sampling.phase_responses(parameters, phases, directions)
+    system = gauge_normal_equations(point, free, phases, rows, table_time, table, 0, noise[0])
+    if len(relative) > 0:
+        system += gauge_normal_equations(point, free, phases, rows, relative_time, relative, which, noise[1])
+    cost, descent, normal = system[last, last], system[:last, last].copy(), system[:last, :last].copy()
+    for k in range(last):
+        away = mean[k] - point[free[k]]
+        cost += weight[k] * away * away
+        descent[k] += weight[k] * away
+        normal[k, k] += weight[k]
+    return cost, descent, normal
+
+
+@compiled
 def gauge_normal_equations(
     point: Floats,
     free: Indices,
@@ -309,7 +335,7 @@ def _sum_products(block: Floats, count: int, moments: Floats, needed: int) -> No
 
 @compiled_part
 def _combine(system: Floats, slopes: Floats, moments: Floats, mixed: Floats, needed: int) -> None:
-    """Add slopes^T moments slopes, the part of a phase, and clear the moments."""
+    """Add the lower triangle of slopes^T moments slopes, the part of a phase, and clear the moments."""
     for i in range(needed):
         for e in range(len(mixed)):
             mixed[e] = 0.0
@@ -320,5 +346,6 @@ def _combine(system: Floats, slopes: Floats, moments: Floats, mixed: Floats, nee
                 mixed[e] += moment * slope[e]
         for d in range(len(mixed)):
             factor, row = slopes[i, d], system[d]
-            for e in range(len(mixed)):
-                row[e] += factor * mixed[e]
+            if factor != 0.0:
+                for e in range(len(mixed)):
+                    row[e] += factor * mixed[e]

@@ -306,7 +306,7 @@ _OWN_STEPS = {
     StandParameter.PRESLIDING: 1e-8,  # less is lost in the errors of integration
 }
 _FIRST_PRESLIDING_M = 5e-7
-"""Step from a contact that does not give way: records show about as much, and less takes long to integrate."""
+"""Step from a contact that does not give way: records show as much, and less takes long to integrate."""
 _ADDITIVE = frozenset((PULLBACK, TILT, RELEASE, FRICTION_DYNAMIC, FRICTION_STATIC))
 _ADDITIVE_STEP = 1e-7  # m, rad, s or a coefficient of friction
 
