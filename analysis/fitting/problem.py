@@ -54,7 +54,8 @@ class Minimum:
     steps: int
     """Evaluations."""
     converged: bool
-    """No step promised a lower chi-square. Otherwise the steps ran out, or all rose: at a jump."""
+    """No step promised a lower chi-square. Otherwise it was low enough, the steps ran out, or all rose: at a
+    jump."""
 
     @property
     def cost(self) -> float:
@@ -69,16 +70,17 @@ def minimise(
     free: NDArray[np.int64],
     steps_max: int = 30,
     cost: Callable[[Floats], float] | None = None,
+    enough: float = -math.inf,
 ) -> Minimum:
     """Minimise chi-square from `start` (p,) over the parameters at the places `free` (k,).
 
     `evaluate` gives chi-square with its quadratic form over them; `project` moves a point into the allowed
-    region. Where chi-square alone is far cheaper, `cost` gives it.
+    region. Where chi-square alone is far cheaper, `cost` gives it. The search ends below `enough`.
     """
     point = project(start)
     here = evaluate(point)
     damping, steps, settled = _FIRST_DAMPING, 1, False
-    while steps < steps_max and damping < _DAMPING_MAX:
+    while steps < steps_max and damping < _DAMPING_MAX and here.cost >= enough:
         move, promise = levenberg_marquardt_step(here.normal, here.descent, damping)
         if not promise >= _ACCURACY:  # nor when it is not a number
             settled = True
@@ -266,8 +268,15 @@ class FitProblem:
         return GaussNewton(self, law, free).normal_equations(parameters)
 
     def minimise(
-        self, start: Floats, law: FrictionLaw, steps_max: int = 30, *, fixed: int | None = None
+        self,
+        start: Floats,
+        law: FrictionLaw,
+        steps_max: int = 30,
+        *,
+        fixed: int | None = None,
+        enough: float = -math.inf,
     ) -> Minimum:
+        """Minimise chi-square over what `law` leaves free but for `fixed`, or until it is below `enough`."""
         free = self.free_parameters(law)
         free = free if fixed is None else free[free != fixed]
         if not len(self.table) or (self.relative is not None and not len(self.relative)):
@@ -277,7 +286,7 @@ class FitProblem:
             return self.project(parameters, law, free)
 
         cost = None if law.solver.is_closed_form else partial(self.cost, law=law)
-        return minimise(GaussNewton(self, law, free).evaluate, project, start, free, steps_max, cost)
+        return minimise(GaussNewton(self, law, free).evaluate, project, start, free, steps_max, cost, enough)
 
     def project(self, parameters: Floats, law: FrictionLaw, free: Indices) -> Floats:
         """The nearest point that law and stand allow, not far from what is known of the `free` parameters."""

@@ -134,7 +134,7 @@ def _small_basis(decay: float, angle: float) -> tuple[float, float]:
 
 
 @compiled_part
-def _uneven_basis(
+def rotating_basis(
     damping: float, frequency: float, start: float, times: Floats, cosines: Floats, sines: Floats
 ) -> None:
     """Write the basis at any rising times: where they are close, by rotation from one to the next."""
@@ -155,7 +155,7 @@ def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats
     start = phase[START] + parameters[RELEASE]
     cosines, sines = basis[0], basis[1]
     if len(tables) == 0:
-        _uneven_basis(damping, frequency, start, times, cosines, sines)
+        rotating_basis(damping, frequency, start, times, cosines, sines)
         return
     cosines[0], sines[0] = _basis_at(damping, frequency, times[0] - start)
     table = tables[0] if phase[SIGN] == 0.0 else tables[1]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
+from analysis.preparation.sums import cubic_weights, wave_amplitudes, windows
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError, StandMasses
 from messages.i18n import N_
@@ -302,7 +303,7 @@ def _spikes(channel: Channel) -> NDArray[np.bool_]:
     found = np.zeros(len(x), dtype=bool)
     if len(x) < _READINGS_MIN:
         return found
-    weights, widest_s = _cubic(channel.time_s)
+    weights, widest_s = cubic_weights(channel.time_s)
     even = widest_s < _GAP * float(np.median(np.diff(channel.time_s)))
     # What a kink in the motion (a slip that begins or ends) or a converter's step may look like.
     coarse = float(np.quantile(np.abs(np.diff(x, 2)), 0.9)) + 3.0 * quantisation_m(x)
@@ -328,20 +329,10 @@ def _spikes(channel: Channel) -> NDArray[np.bool_]:
 
 def _median_of_five(x: Floats) -> Floats:
     padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
-
-
-def _cubic(time_s: Floats) -> tuple[Floats, Floats]:
-    """Weights (4, n) of four neighbours in the cubic through them, and the widest interval among them (s)."""
-    widest_s = np.full(len(time_s), np.inf)
-    weights = np.zeros((4, len(time_s)))
-    windows = np.lib.stride_tricks.sliding_window_view(time_s, 5)
-    widest_s[2:-2] = np.diff(windows, axis=1).max(axis=1)
-    away = windows[:, (0, 1, 3, 4)] - windows[:, 2:3]
-    for j in range(4):
-        others = np.delete(away, j, axis=1)
-        weights[j, 2:-2] = np.prod(others / (others - away[:, j : j + 1]), axis=1)
-    return weights, widest_s
+    a, b, c, d, e = (padded[k : k + len(x)] for k in range(5))
+    low = np.maximum(np.minimum(a, b), np.minimum(d, e))
+    high = np.minimum(np.maximum(a, b), np.maximum(d, e))  # the median is that of `low`, `high` and c
+    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
 
 
 def _off_cubic(x: Floats, weights: Floats) -> Floats:
@@ -465,7 +456,8 @@ MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
 _HUM_BLOCK_S = 0.4  # whole cycles of 50, 60 and of all the frequencies beside them
 _BLOCKS = 25
-_REMAINING_POWER = (1.0 - np.sinc(np.array([*MAINS_HZ, *_BESIDE_HZ]) / MAINS_HZ[0])) ** 2
+_HUM_HZ = np.array([*MAINS_HZ, *_BESIDE_HZ])
+_REMAINING_POWER = (1.0 - np.sinc(_HUM_HZ / MAINS_HZ[0])) ** 2
 """What taking off means over a cycle, twice, leaves of each frequency."""
 _BLOCK_READINGS_MIN = 20
 _HUM_RATIO_MIN = 8.0  # mean power of the mains over that beside them
@@ -520,14 +512,13 @@ def _amplitudes(block: Channel) -> Floats | None:
     steps = np.diff(block.time_s)
     if len(block) < _BLOCK_READINGS_MIN or steps.max() > 0.1 * _HUM_BLOCK_S:
         return None
-    turns = np.exp(2j * np.pi * np.outer((*MAINS_HZ, *_BESIDE_HZ), block.time_s))
-    return np.asarray(2.0 / len(block) * np.abs(turns @ block.value_m)) / _REMAINING_POWER
+    return wave_amplitudes(block.time_s, block.value_m, _HUM_HZ) / _REMAINING_POWER
 
 
 def _means(channel: Channel, window_s: float) -> Floats:
     """Mean of the readings within half of `window_s` of each."""
     t, x = channel.time_s, channel.value_m
     half_s = 0.5 * window_s * (1.0 + 1e-6)  # even windows, whatever rounding does to times
-    first, last = np.searchsorted(t, t - half_s), np.searchsorted(t, t + half_s, "right")
+    first, last = windows(t, half_s)
     sums = np.concatenate(([0.0], np.cumsum(x - x.mean())))
     return np.asarray((sums[last] - sums[first]) / (last - first) + x.mean())

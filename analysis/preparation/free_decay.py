@@ -1,5 +1,6 @@
 """Finds the free decay in a record: release, end of slip, stick tail, noise, mounting of the gauges."""
 
+import contextlib
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
@@ -132,6 +133,7 @@ _MOUNTINGS = {
 
 
 TAIL_PERIODS_MIN = 2.0  # a shorter tail does not tell damping from a drift of the zero
+_SAME_PERIOD = 0.01  # relative difference: two stretches of one tail have the same period
 _RELEASE_MARGIN_S = 0.004
 """Uncertainty of the release as `find_releases` gives it: the half window of its slopes, rounded down."""
 _NEVER_SLIPS = 2.0  # residual of a damped cosine over noise above which there must have been slip
@@ -195,7 +197,7 @@ class FreeDecay(_Stretch):
 
     def with_tail_from(self, start_s: float | None) -> Self:
         """The same with the stick tail fitted from `start_s` on, or none."""
-        tail = fit_tail(self.table, start_s, self.period_s)
+        tail = fit_tail(self.table, start_s, self.period_s, self.tail)
         return replace(self, tail=tail, period_s=self.period_s if tail is None else tail.period_s)
 
 
@@ -246,8 +248,10 @@ def prepare(record: Record) -> FreeDecay:
     )
 
 
-def fit_tail(table: Channel, start_s: float | None, period_s: float) -> DampedCosine | None:
-    """Fit the stick tail from `start_s` to the end.
+def fit_tail(
+    table: Channel, start_s: float | None, period_s: float, near: DampedCosine | None = None
+) -> DampedCosine | None:
+    """Fit the stick tail from `start_s` to the end, beginning at a fit `near` it where there is one.
 
     None where it is too short or does not begin, or is no damped oscillation.
     """
@@ -257,6 +261,11 @@ def fit_tail(table: Channel, start_s: float | None, period_s: float) -> DampedCo
     length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
     if length_s < TAIL_PERIODS_MIN * period_s:
         return None
+    if near is not None:
+        with contextlib.suppress(RecordError):
+            found = oscillation.refit_damped_cosine(tail, near)
+            if abs(found.period_s / near.period_s - 1.0) < _SAME_PERIOD:
+                return found
     try:
         return oscillation.fit_damped_cosine(tail, period_s)
     except RecordError:

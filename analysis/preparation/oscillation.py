@@ -3,6 +3,7 @@
 import contextlib
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.preparation.channels import Channel, detect_hum, remove_hum
+from analysis.preparation.sums import windows
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
 from messages.i18n import N_
@@ -86,8 +88,8 @@ def local_slopes(channel: Channel, half_window_s: float) -> Floats:
     """Slope of the line through readings within +-half_window_s of each time (m/s); times may be uneven."""
     t, x = channel.time_s - channel.time_s[0], channel.value_m - channel.value_m.mean()
     index = np.arange(len(t))
-    first = np.minimum(np.searchsorted(t, t - half_window_s), np.maximum(index - 2, 0))
-    last = np.maximum(np.searchsorted(t, t + half_window_s, "right"), np.minimum(index + 3, len(t)))
+    first, last = windows(t, half_window_s)
+    first, last = np.minimum(first, np.maximum(index - 2, 0)), np.maximum(last, np.minimum(index + 3, len(t)))
     sums = [np.concatenate(([0.0], np.cumsum(y))) for y in (t, x, t * t, t * x)]
     s_t, s_x, s_tt, s_tx = (total[last] - total[first] for total in sums)
     count = last - first
@@ -281,7 +283,7 @@ def _disturbance(table: Channel, pivots: list[int]) -> int:
     whole = _away_from_gaps(table.time_s, pivots)
     counted = [index for index in range(len(swings)) if whole[index] and whole[index + 1]]
     for place, index in enumerate(counted[1:], start=1):
-        if swings[index] > _GROWTH * float(np.median(swings[counted[max(0, place - 3) : place]])):
+        if swings[index] > _GROWTH * median(swings[counted[max(0, place - 3) : place]].tolist()):
             return pivots[index]
     return len(table) - 1
 
@@ -529,7 +531,7 @@ def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
 
 
 def refit_damped_cosine(channel: Channel, before: DampedCosine) -> DampedCosine:
-    """Fit a channel that begins where an earlier fit began and has grown since."""
+    """Fit a channel whose decay an earlier fit has met, but for where it begins or ends."""
     return _finished(channel, _refine(channel, before.parameters[:2]))
 
 

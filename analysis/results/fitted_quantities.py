@@ -150,11 +150,6 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
     def end(parameters: Floats) -> float:
         return law.solver.final_relative(law.vector(project_to_bounds(parameters, law)), duration_s)
 
-    point = joint.chosen.parameters
-    value, shares = (
-        end(point),
-        joint.uncertainty.contributions(numerical_gradient(end, point, joint.chosen.free)),
-    )
     if (
         decay.relative is not None
         and decay.plateau is not None
@@ -163,11 +158,15 @@ def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> No
     ):
         gauge = joint.record.relative_gauge
         value, noise_m = _shift_of_gauge_2(decay.relative, decay.plateau, decay.slip_end_s, decay.noise_m[1])
-        shares = {
+        shares: dict[Source, float] = {
             BudgetSource.NOISE: noise_m,
             BudgetSource.GAUGE_2_GAIN: value * (gauge.gain_relative or 0.0),
             BudgetSource.GAUGE_2_NONLINEARITY: gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
         }
+    else:
+        point = joint.chosen.parameters
+        slopes = numerical_gradient(end, point, joint.chosen.free)
+        value, shares = end(point), joint.uncertainty.contributions(slopes)
     budget.add("residual_displacement_m", decay.relative_sign * value, shares)
 
 
@@ -360,7 +359,8 @@ def largest_static_friction(joint: JointFit) -> tuple[float, float]:
     def allows(static: float) -> bool:
         start = best.parameters.copy()
         start[Parameter.FRICTION_STATIC] = static
-        return some.minimise(start, law, _STEPS, fixed=Parameter.FRICTION_STATIC).cost < best.cost + limit
+        held = some.minimise(start, law, _STEPS, fixed=Parameter.FRICTION_STATIC, enough=best.cost + limit)
+        return held.cost < best.cost + limit
 
     near, step = likeliest, _FIRST_STEP * likeliest
     while allows(near + step) and near < _FARTHEST * likeliest:

@@ -144,6 +144,17 @@ def test_least_squares_find_the_bottom_of_a_bent_valley():
     assert found.cost < 1e-4
 
 
+def test_a_search_for_less_than_a_bound_ends_below_it():
+    start, free = np.array([-1.2, 1.0]), np.array([0, 1])
+    whole = minimise(rosenbrock, np.copy, start, free, 200)
+
+    found = minimise(rosenbrock, np.copy, start, free, 200, enough=1.0)
+
+    assert whole.cost < found.cost < 1.0
+    assert found.steps < whole.steps
+    assert not found.converged
+
+
 def test_a_damped_step_solves_the_normal_equations():
     columns = np.random.default_rng(2).standard_normal((4, 9)) * np.array([[1e-3], [1.0], [50.0], [1e4]])
     normal, descent = columns @ columns.T, columns @ np.ones(9)

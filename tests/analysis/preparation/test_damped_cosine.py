@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.preparation.channels import Channel
+from analysis.preparation.free_decay import fit_tail
 from analysis.preparation.oscillation import (
     damped_cosine,
     dominant_period,
@@ -54,6 +55,19 @@ def test_uneven_times_and_gaps_are_welcome():
     decay = fit_damped_cosine(Channel(whole.time_s[kept], whole.value_m[kept]), 0.32)
 
     assert decay.period_s == pytest.approx(0.32, abs=5.0 * decay.period_uncertainty_s)
+
+
+@pytest.mark.parametrize("near_s", [0.32, 0.35], ids=["near", "of another oscillation"])
+def test_a_tail_is_the_same_whatever_fit_it_began_at(near_s):
+    table, other = channel(2e-5), TRUE.copy()
+    other[1] = 2.0 * np.pi / near_s
+    near = fit_damped_cosine(channel(2e-5, seed=1, parameters=other), near_s)
+    cold = fit_tail(table, 3.0, 0.32)
+
+    tail = fit_tail(table, 3.0, 0.32, near)
+
+    assert tail.start_s == cold.start_s
+    assert tail.parameters == pytest.approx(cold.parameters, rel=1e-9)
 
 
 @pytest.mark.parametrize("period_s", [0.2, 0.47])
