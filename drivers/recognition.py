@@ -63,7 +63,7 @@ class IdentityQuery:
     settings: dict[str, str] = field(default_factory=dict)
     """Settings to record with from a device that answers."""
     is_network: bool = False
-    """Whether only network addresses are asked, on a connection that no other question has spoilt."""
+    """Whether only network addresses are asked, on a connection on which nothing else was asked."""
     channels: int = 0  # gauges of a device that answers; 0: as many as its protocol has
 
 

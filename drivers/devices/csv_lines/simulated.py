@@ -92,7 +92,7 @@ def make_protocol(settings: dict[str, str]) -> SimulatedProtocol:
     commands = parsed.commands()
     if commands.poll:
         baud = (preset.baud if preset else 0) or DRIVER.default_baud
-        told = preset.identity if preset else None
-        texts = (unescape("identity", text) for text in ((told.query, told.answer) if told else ()))
-        return PolledCsv(parsed.layout(), commands, baud, *texts)
+        identity = preset.identity if preset else None
+        texts = (identity.query, identity.answer) if identity else ()
+        return PolledCsv(parsed.layout(), commands, baud, *(unescape("identity", text) for text in texts))
     return SimulatedCsv(parsed.layout(), commands)

@@ -34,7 +34,7 @@ LOWEST = -(1 << 15)
 _DIGITAL_KEPT_BYTES = 4096
 """Bytes without a scan for which the digital inputs are taken to be as they were; about a second."""
 _SURE_SHARE = 0.75
-"""Of the bytes, in good scans, of a stream whose layout is told by its fixed bits."""
+"""Of the bytes, in good scans, of a stream whose layout is known by its fixed bits."""
 _TO_BE_ESTIMATED = -1
 _SIGN = 0x80
 

@@ -99,13 +99,13 @@ class SimulatedDataq(SimulatedProtocol):
 
     def _reply(self, name: str, numbers: list[int], line: str) -> bytes:
         """Echo of a command, and what it asks for; b"" for one that is not known."""
-        told = ""
+        answer = ""
         match name, numbers:
             case "info", [number]:
                 facts = {0: "DATAQ", 1: self._model.name, 2: FIRMWARE, 6: SERIAL_NUMBER}
-                told = (facts | {9: str(commands.DIVIDEND_HZ)}).get(number, "")
+                answer = (facts | {9: str(commands.DIVIDEND_HZ)}).get(number, "")
             case "ps", []:
-                told = str(self.packet_bytes)
+                answer = str(self.packet_bytes)
             case "ps", [step] if step <= commands.MAX_PACKET:
                 self.packet_bytes = commands.PACKET_BYTES << step
             case "slist", [place, word] if place <= len(self._scan_list):
@@ -113,10 +113,10 @@ class SimulatedDataq(SimulatedProtocol):
             case (("encode" | "eol"), [value]):
                 self._values[name] = value
             case _, [] if name in _DIVISORS:
-                told = str(self._values[name])
+                answer = str(self._values[name])
             case _ if name not in _ECHOED:
                 return b""
-        return " ".join([line, told]).strip().encode("ascii") + commands.END
+        return " ".join([line, answer]).strip().encode("ascii") + commands.END
 
 
 def make_protocol(settings: dict[str, str]) -> SimulatedDataq:

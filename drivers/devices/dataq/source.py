@@ -23,7 +23,7 @@ _TRIES = 2
 _CORNER_OF_MEAN = 0.443
 """Corner of a mean by its rate: where sin(pi x) / (pi x) is 1 / sqrt 2."""
 _FILTERS = {"last": 0, "average": 1}  # argument of `filter` (page 51)
-_MIN_UNTOLD_BYTES = 120
+_MIN_LAYOUT_BYTES = 120
 """Bytes that show the layout of a stream without a header."""
 
 
@@ -95,7 +95,7 @@ class DataqSource(SampleSource):
         layout = codec.layout_in_header(data)
         if layout is None and self._settings.model != "auto":
             layout = codec.layout_of(self._settings.model)
-        if layout is None and len(data) >= _MIN_UNTOLD_BYTES:
+        if layout is None and len(data) >= _MIN_LAYOUT_BYTES:
             layout = codec.find_layout(data)
         return ScanDecoder(layout, self.rate_hz) if layout else None
 

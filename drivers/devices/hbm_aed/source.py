@@ -201,7 +201,7 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> HbmAedSource
 
 
 def recognise(data: bytes, duration_s: float | None) -> Recognition | None:
-    """What `data` are; see `drivers.recognition.recognise`. A device sends by itself where it was told to."""
+    """What `data` are; see `drivers.recognition.recognise`. A device sends by itself once it is set to."""
     if is_text(data):
         return None
     frames = codec.count_frames(Format.BINARY, data)

@@ -1,4 +1,4 @@
-"""Samples of an LSL stream from packed chunks; gaps are told from the time stamps."""
+"""Samples of an LSL stream from packed chunks; gaps show in the time stamps."""
 
 import numpy as np
 

@@ -76,8 +76,8 @@ def test_whole_frames_in_any_cut(pieces):
 
 @given(st.binary(max_size=60), st.data())
 @settings(deadline=None, max_examples=40)
-def test_any_cut_gives_the_same(rubbish, data):
-    wire = b"".join([*frames()[:20], rubbish, *frames()[20:]])
+def test_any_cut_gives_the_same(garbage, data):
+    wire = b"".join([*frames()[:20], garbage, *frames()[20:]])
     whole, decoder = decode([wire])
     block, other = decode(cut_at(wire, data.draw(cuts(wire))))
     np.testing.assert_array_equal(block.counts, whole.counts)

@@ -74,8 +74,8 @@ def test_whole_frames_in_any_cut(model, pieces):
 @pytest.mark.parametrize("model", FORMATS)
 @given(st.binary(max_size=80), st.data())
 @settings(deadline=None, max_examples=40)
-def test_any_cut_gives_the_same(model, rubbish, data):
-    wire = b"".join([*frames(model, 15), rubbish, *frames(model, 15, first=15)])
+def test_any_cut_gives_the_same(model, garbage, data):
+    wire = b"".join([*frames(model, 15), garbage, *frames(model, 15, first=15)])
     whole, decoder = decode(model, [wire])
     block, other = decode(model, cut_at(wire, data.draw(cuts(wire))))
     np.testing.assert_array_equal(block.counts, whole.counts)

@@ -55,9 +55,9 @@ def test_whole_frames_in_any_cut(kind, pieces):
 @pytest.mark.parametrize("kind", Format)
 @given(st.binary(max_size=80), st.data())
 @settings(deadline=None, max_examples=40)
-def test_any_cut_gives_the_same(kind, rubbish, data):
+def test_any_cut_gives_the_same(kind, garbage, data):
     frames = encode_frames(kind, COUNTS)
-    wire = b"".join([*frames[:15], rubbish, *frames[15:]])
+    wire = b"".join([*frames[:15], garbage, *frames[15:]])
     whole, decoder = decode(kind, [wire])
     block, other = decode(kind, cut_at(wire, data.draw(cuts(wire))))
     np.testing.assert_array_equal(block.counts, whole.counts)
