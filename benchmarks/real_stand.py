@@ -315,7 +315,8 @@ class _Integration:
         p = self.stand
         if contact == PRESLIDING:
             share = y[BRISTLE] / p.presliding_m
-            return p.friction_dynamic * share + self.bristle_damping * (y[W] - abs(y[W]) * share)
+            breakaway = self._friction(0.0, y[REL], y[PATH])
+            return breakaway * share + self.bristle_damping * (y[W] - abs(y[W]) * share)
         return contact * self._friction(max(contact * y[W], 0.0), y[REL], y[PATH]) + self._asymmetry
 
     @property

@@ -219,10 +219,15 @@ def table_force(parameters: Floats, parts: Floats, time: float, state: Floats) -
 
 
 @compiled_part
-def presliding_friction(parameters: Floats, parts: Floats, slip: float, deflection: float) -> float:
-    """Coefficient of friction of a contact that is deflected but does not slide (Dahl, 1968)."""
+def presliding_friction(
+    breakaway: float, parameters: Floats, parts: Floats, slip: float, deflection: float
+) -> float:
+    """Coefficient of friction of a contact that is deflected but does not slide (Dahl, 1968).
+
+    `breakaway` is that of a slip which begins: from another one the contact would stick again at once.
+    """
     share = deflection / parts[PRESLIDING]
-    stiffness = parameters[FRICTION_DYNAMIC] / parts[PRESLIDING]
+    stiffness = breakaway / parts[PRESLIDING]
     damping = 2.0 * _PRESLIDING_DAMPING * math.sqrt(stiffness / parameters[GRAVITY])
     coefficient: float = stiffness * deflection + damping * (slip - abs(slip) * share)
     return coefficient
@@ -244,7 +249,9 @@ def slope(parameters: Floats, parts: Floats, phase: Phase, time: float, state: F
         rate = 0.0
     else:
         if sign == 0.0:
-            friction = presliding_friction(parameters, parts, slip, state[8])
+            side = math.copysign(1.0, state[8])
+            breakaway = friction_coefficient(0.0, parameters) * track_factor(parts, side, relative, path)
+            friction = presliding_friction(breakaway, parameters, parts, slip, state[8])
         else:
             speed = abs(slip)
             friction = friction_coefficient(speed, parameters) * (1.0 + parts[FILM] * speed)

@@ -217,6 +217,7 @@ class Profile:
     follow: Floats  # (p,) float64: how the others follow a step of one in the parameter, by a parabola
     deviation: float  # standard uncertainty by the noise, the known parameters being as fitted
     white: float  # its variance over that by white noise as stated
+    lowest: float  # chi-square of the fit
 
     @classmethod
     def from_fit(cls, problem: FitProblem, fit: Fit, parameter: int, white: float) -> Self:
@@ -229,7 +230,8 @@ class Profile:
         follow = np.zeros(len(fit.parameters))
         follow[fit.free[unknown]] = columns[own] / columns[own, own]
         deviation = float(np.sqrt(white * columns[own, own]))
-        return cls(fixed, fit.law, parameter, fit.parameters, follow, deviation, white)
+        lowest = fixed.cost(fit.parameters, fit.law)
+        return cls(fixed, fit.law, parameter, fit.parameters, follow, deviation, white, lowest)
 
     def interval(self) -> ProfileInterval | None:
         if all(
@@ -246,7 +248,7 @@ class Profile:
         found = []
         for distance in _DISTANCES:
             rise = self._rise(side * distance, follow=True)
-            if rise > CHI_SQUARE_RISE_95:
+            if rise > CHI_SQUARE_RISE_95 and self.law.solver.is_closed_form:
                 rise = min(rise, self._rise(side * distance, follow=False))
             found.append((side * distance, rise))
             if rise > _HOPELESS and distance > 1.0:
@@ -265,8 +267,7 @@ class Profile:
         there = self.problem.minimise(start, self.law, _PROFILE_STEPS, fixed=self.parameter)
         if there.parameters[self.parameter] != start[self.parameter]:  # the law does not allow that value
             return np.inf
-        free = self.problem.free_parameters(self.law)
-        return (there.cost - self.problem.quadratic_model(self.parameters, self.law, free).cost) / self.white
+        return (there.cost - self.lowest) / self.white
 
 
 def distribution(shifts: Floats, rises: Floats) -> ProfileInterval:
