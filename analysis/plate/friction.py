@@ -239,21 +239,17 @@ def _pool(
             columns[k + SHARED_COUNT + covariate, place] = 1.0
     normal, right = columns.T @ equations.matrix @ columns / misfit, columns.T @ equations.right / misfit
     typical = abs(float(inverse(normal[:1, :1])[0, 0] * right[0]))
-    best: tuple[float, float, Floats, Floats] | None = None
-    for share in _SCATTERS:
-        scatter = max(share, 1e-5) * typical
-        prior = np.zeros(len(normal))
-        prior[1], prior[2 : 2 + k] = TILT_MAX_RAD**-2, scatter**-2
-        prior[2 + k + LAG] = _NO_LAG_S**-2 if without_lag else 0.0
-        precision = normal + np.diag(prior)
-        covariance = inverse(precision)
-        found = covariance @ right
-        determinant = np.linalg.slogdet(precision)[1]
-        cost = equations.squares / misfit - float(found @ right) + determinant + 2.0 * k * np.log(scatter)
-        if best is None or cost < best[0]:
-            best = cost, scatter, found, covariance
-    assert best is not None
-    cost, scatter, found, covariance = best
+    scatters = np.maximum(_SCATTERS, 1e-5) * typical
+    priors = np.zeros((len(scatters), len(normal)))
+    priors[:, 1], priors[:, 2 : 2 + k] = TILT_MAX_RAD**-2, scatters[:, None] ** -2
+    priors[:, 2 + k + LAG] = _NO_LAG_S**-2 if without_lag else 0.0
+    precisions = normal + priors[:, None] * np.eye(len(normal))
+    covariances = inverse(precisions)
+    found_by = covariances @ right
+    costs = equations.squares / misfit - found_by @ right + np.linalg.slogdet(precisions)[1]
+    costs += 2.0 * k * np.log(scatters)
+    likeliest = int(np.argmin(costs))
+    scatter, found, covariance = float(scatters[likeliest]), found_by[likeliest], covariances[likeliest]
     mean = np.zeros((2, len(found)))
     mean[0, 0] = mean[1, 1] = 1.0
     if weights is not None:
@@ -268,8 +264,8 @@ def _pool(
         found[2 + k + SHARED_COUNT :],
         deviation[2 + k + SHARED_COUNT :],
         found[2 : 2 + k],
-        scatter if scatter > 1e-5 * typical else 0.0,
-        cost,
+        scatter if likeliest else 0.0,
+        float(costs[likeliest]),
     )
 
 

@@ -198,9 +198,10 @@ def normal_equations(
 
 
 def inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive matrix whose rows differ in unit."""
-    size = 1.0 / np.sqrt(np.diag(matrix))
-    return np.asarray(np.linalg.inv(matrix * np.outer(size, size)) * np.outer(size, size))
+    """Inverse of positive matrices (..., n, n) whose rows differ in unit."""
+    size = 1.0 / np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    scale = size[..., None] * size[..., None, :]
+    return np.asarray(np.linalg.inv(matrix * scale) * scale)
 
 
 def _significant_jumps(normal: Floats, right: Floats, jumps_at: int) -> list[int]:
