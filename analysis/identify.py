@@ -186,7 +186,8 @@ def _conclude(
     """Results with their budget, verdict and warnings."""
     joint, stand, fits = fitted.joint, fitted.stand, fitted.fits
     adequate = joint.selection.adequate
-    slip_end = fitted_quantities.find_slip_end(joint)
+    tied = fitted_quantities.range_of_tied_static_friction(joint)
+    slip_end = fitted_quantities.find_slip_end(joint, tied)
     slip_ended = slip_end is not None or (joint.decay.slip_end_s is not None and not adequate)
     decay = joint.decay.with_tail_from(None if slip_end is None else slip_end.upper_limit_s)
     joint = replace(joint, decay=decay)
@@ -201,7 +202,7 @@ def _conclude(
     joint_fit.add_constants(constants, budget)
     check_period(budget.results["period_s"])
     labels = fitted_quantities.add_fitted_quantities(joint, budget, slip_ended=slip_ended)
-    fitted_quantities.add_static_friction_bounds(joint, budget)
+    fitted_quantities.add_static_friction_bounds(joint, tied, budget)
     if plate is not None:
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     own = budget.results.get("friction_dynamic")

@@ -293,8 +293,10 @@ _STEPS, _HALVINGS = 6, 5
 _SLIP_DOUBT = 2.0  # later slips take back part of the first one: gauge 2 shows as much less in the end
 
 
-def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> None:
-    """Add both bounds of f_s to the budget.
+def add_static_friction_bounds(
+    joint: JointFit, tied: tuple[float, float] | None, budget: UncertaintyBudget
+) -> None:
+    """Add both bounds of f_s to the budget; `tied` is what `range_of_tied_static_friction` gives.
 
     None on a stand that is not ideal. Where a law with f_s explains the record, they are those of its
     motion: the largest demand that the joint stood without slip, and the smallest at which slip began.
@@ -304,8 +306,8 @@ def add_static_friction_bounds(joint: JointFit, budget: UncertaintyBudget) -> No
     chosen, duration_s = joint.chosen, joint.duration_s
     if isinstance(chosen.law, StandModel):
         return
-    if not chosen.law.has_static_friction:
-        _add_tied(joint, budget)
+    if tied is not None:
+        _add_tied(joint, tied, budget)
         return
 
     def bounds(parameters: Floats) -> Floats:
@@ -344,12 +346,15 @@ def add_no_slip_bound(
     budget.add(LOWER, value, shares)
 
 
-def largest_static_friction(joint: JointFit) -> tuple[float, float]:
+def range_of_tied_static_friction(joint: JointFit) -> tuple[float, float] | None:
     """Likeliest f_s, and the one above it at which chi-square is higher by 3.84, all else refined.
 
-    The chosen law ties f_s to f_d; one of the candidates may have found a lower minimum with a free f_s.
+    None unless the chosen law ties f_s to f_d, on an ideal stand; one of the candidates may have found a
+    lower minimum with a free f_s.
     """
     chosen = joint.chosen
+    if chosen.law.has_static_friction or isinstance(chosen.law, StandModel):
+        return None
     law = compared_law(static_friction=True, tilt=chosen.law.has_tilt)
     some = joint.problem.decimated(_READINGS, joint.decay.dense_until_s)
     starts = [chosen.parameters, *(fit.parameters for fit in joint.candidates if fit.law is law)]
@@ -373,15 +378,14 @@ def largest_static_friction(joint: JointFit) -> tuple[float, float]:
     return likeliest, far
 
 
-def _add_tied(joint: JointFit, budget: UncertaintyBudget) -> None:
+def _add_tied(joint: JointFit, tied: tuple[float, float], budget: UncertaintyBudget) -> None:
     chosen = joint.chosen
     friction = chosen.value(Parameter.FRICTION_DYNAMIC)
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         return
     shares = joint.uncertainty.parameter_contributions(Parameter.FRICTION_DYNAMIC)
     budget.add(LOWER, friction, shares)
-    likeliest, end = largest_static_friction(joint)
-    likeliest, end = max(likeliest, friction), max(end, friction)
+    likeliest, end = max(tied[0], friction), max(tied[1], friction)
     noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares[BudgetSource.NOISE]))
     budget.add(UPPER, likeliest, {**shares, BudgetSource.NOISE: noise})
 
@@ -455,23 +459,21 @@ class SlipEnd:
         return self.time_s + 2.0 * self.uncertainty_s
 
 
-def find_slip_end(joint: JointFit) -> SlipEnd | None:
+def find_slip_end(joint: JointFit, tied: tuple[float, float] | None) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
-    The last slips are often smaller than the noise. Gauge 2 alone gives the end to a quarter period, rather
-    too early than too late. None where slip lasts to the end of the record, or comes again after it.
+    `tied` is what `range_of_tied_static_friction` gives. The last slips are often smaller than the noise.
+    Gauge 2 alone gives the end to a quarter period, rather too early than too late. None where slip lasts to
+    the end of the record, or comes again after it.
     """
     decay, chosen, adequate = joint.decay, joint.chosen, joint.selection.adequate
-    end_s, largest = joint.end_s, np.inf
+    end_s, largest = joint.end_s, np.inf if tied is None else tied[1]
     if adequate:  # a period later the widest swing is past
         later = _end_of(chosen.parameters, chosen.law, end_s + decay.period_s)
         if later is None or later > end_s:
             return None
-    static_is_open = not chosen.law.has_static_friction and not isinstance(chosen.law, StandModel)
-    if static_is_open:
-        _, largest = largest_static_friction(joint)
     fitted = _fitted_slip_end(joint, largest)
-    if fitted is not None and static_is_open:
+    if fitted is not None and tied is not None:
         fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted
