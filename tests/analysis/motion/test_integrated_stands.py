@@ -130,8 +130,8 @@ def test_a_contact_that_gives_way_breaks_away_at_the_friction_of_the_slip_that_b
     state = motion.sample(TIMES_S[moving])
     table, relative = stand_displacements(parameters(0.1), values, 5.1)(TIMES_S)
     np.testing.assert_allclose(table[moving], state[U], atol=INTEGRATION_ERROR_M)
-    # Each slip ends within half a deflection; where friction varies, these add up.
-    np.testing.assert_allclose(relative[moving], state[REL], atol=0.5e-6 * len(motion.slips_m))
+    # Each slip ends within a deflection; where friction varies, these add up.
+    np.testing.assert_allclose(relative[moving], state[REL], atol=1e-6 * len(motion.slips_m))
 
 
 def test_creep_of_a_gauge_begins_at_the_release_and_leaves_the_motion():
