@@ -3,6 +3,7 @@
 import contextlib
 import datetime
 import functools
+import io
 import itertools
 import math
 import zipfile
@@ -33,7 +34,6 @@ from messages.i18n import N_
 from messages.message import Message, message, option
 
 _Row = tuple[Any, ...]
-_REPORT_ROWS = 10_000
 _SHOWN = 40  # characters of a cell in a message
 _NAT_NS = np.iinfo(np.int64).min
 _MICROSECOND, _NO_OFFSET = datetime.timedelta(microseconds=1), datetime.timedelta(0)
@@ -45,7 +45,7 @@ def open_table(path: Path, layout: CsvOptions, report: ReportShare) -> Table:
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > LARGEST_BYTES:
             raise ImportFileError("{path} unpacks to more than can be loaded. Export it as CSV", path=path)
-    with _open_book(path) as book:
+    with _open_book(path, report) as book:
         sheet = _find_sheet(path, book, layout)
     reader = _Reader(path, sheet, layout, report)
     return Table(sheet.names, reader.column, reader.row_label, sheet.units, first_rows=sheet.first_rows)
@@ -73,11 +73,8 @@ class _Reader:
     @functools.cached_property
     def _rows(self) -> list[_Row]:
         rows: list[_Row] = []
-        with _open_book(self._path) as book:
-            for row in _rows(book[self._sheet.title], self._sheet.first_row):
-                rows.append(row)
-                if len(rows) % _REPORT_ROWS == 0:
-                    self._report(0.0)
+        with _open_book(self._path, self._report) as book:
+            rows += _rows(book[self._sheet.title], self._sheet.first_row)
         while rows and _is_blank(rows[-1]):
             rows.pop()
         return rows
@@ -130,9 +127,25 @@ class _Reader:
         return cell_fault(self._path, self.row_label(row), self._sheet.names[at] or str(at), fault)
 
 
-def _open_book(path: Path) -> contextlib.closing[Any]:
-    book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
-    return contextlib.closing(book)
+class _ReportedFile(io.FileIO):
+    """File that reports progress whenever it is read: openpyxl reads a large sheet for long."""
+
+    def __init__(self, path: Path, report: ReportShare) -> None:
+        super().__init__(path)
+        self._report = report
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        self._report(0.0)
+        return super().read(size) or b""
+
+
+@contextlib.contextmanager
+def _open_book(path: Path, report: ReportShare) -> Iterator[Any]:
+    openpyxl = import_optional("openpyxl", "Excel")
+    with _ReportedFile(path, report) as file:
+        book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+        with contextlib.closing(book):
+            yield book
 
 
 def _rows(sheet: Any, first_row: int) -> Iterator[_Row]:

@@ -3,6 +3,7 @@
 import datetime
 import gzip
 import os
+import pickle
 import struct
 import time
 import zipfile
@@ -174,7 +175,7 @@ def test_a_workbook_has_times_in_many_forms(tmp_path, names, cells, start):
         assert record.facts.start == start
 
 
-def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path, monkeypatch):
+def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path):
     """Some programs write a wrong size of the sheet, beyond which openpyxl reads nothing."""
     whole, path = tmp_path / "whole.xlsx", tmp_path / "log.xlsx"
     marks = ["OVL", "N/A", -9999]
@@ -185,12 +186,11 @@ def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path, monkeypatch)
         for name in given.namelist():
             made.writestr(name, given.read(name).replace(b'<dimension ref="A1:B62"', b'<dimension ref="A1"'))
     shares = []
-    monkeypatch.setattr("app.runs.exchange.formats.excel._REPORT_ROWS", 10)
     record = read_record(path, CsvImport(CsvOptions("t", "u1", missing=("ovl", "-9999"))), shares.append)
     assert np.isnan(record.cells[0][:3]).all()
     assert list(record.cells[0][3:]) == list(range(3, 60))
     assert record.facts.gauges[0].gain_m_per_count == 1e-3
-    assert shares.count(0.0) == 6
+    assert shares.count(0.0) > 10
 
 
 @pytest.mark.parametrize("suffix", [".xlsx", ".parquet", ".mat", ".h5"])
@@ -247,6 +247,41 @@ def test_a_channel_of_date_times_is_utc_in_tdms(tmp_path, monkeypatch):
         time.tzset()
     assert record.facts.start == datetime.datetime(2025, 11, 23, 14, 3, 7, tzinfo=datetime.UTC)
     assert record.facts.rate_hz == pytest.approx(500.0)
+
+
+def test_a_pickle_beside_a_labview_file_is_not_loaded(tmp_path):
+    """lvm_read loads it whatever it is asked."""
+
+    class Harmful:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "harm"),)
+
+    write_lvm(tmp_path / "bench.lvm")
+    (tmp_path / "bench.lvm.pkl").write_bytes(pickle.dumps(Harmful()))
+    os.utime(tmp_path / "bench.lvm.pkl", (2e9, 2e9))
+    with shared_reading_process().read(tmp_path / "bench.lvm", CsvImport(CsvOptions("", "u1"))) as record:
+        assert len(record) == ROWS
+    assert not (tmp_path / "harm").exists()
+
+
+def test_the_first_segment_of_a_labview_file_is_read_in_parts_to_its_end(tmp_path, monkeypatch):
+    """A cell is empty, rows have comments, and a second segment follows."""
+    write_lvm(tmp_path / "one.lvm")
+    lines = (tmp_path / "one.lvm").read_text().splitlines(keepends=True)
+    first = next(at for at, line in enumerate(lines) if line.startswith("X_Value")) + 1
+    cells = lines[first + 20].rstrip("\n").split("\t")
+    cells[-1 if cells[-1] else -2] = ""
+    lines[first + 20] = "\t".join(cells) + "\n"
+    second = lines[first - 8 : first] + lines[first : first + 5]
+    path = tmp_path / "two.lvm"
+    path.write_text("".join([*lines[: first + ROWS], "\n", *second]))
+    monkeypatch.setattr("app.runs.exchange.formats.labview._ROWS", 50)
+    shares = []
+    record = read_record(path, CsvImport(CsvOptions("", "u1", "rel")), shares.append)
+    assert len(record) == ROWS
+    assert np.abs(record.cells[0] - TABLE).max() < 1e-14
+    assert np.flatnonzero(np.isnan(record.cells[1])).tolist() == [20]
+    assert len(shares) >= ROWS // 50
 
 
 def test_options_of_texts_are_refused_for_other_files(tmp_path):
