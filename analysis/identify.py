@@ -46,7 +46,7 @@ from analysis.results.verdict import judge
 from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import UncertaintyBudget, unstated_clock, unstated_gains
 from messages.i18n import N_
-from messages.message import message
+from messages.message import Message, message
 
 _EVIDENCE_MIN = 10.0
 """Fall of the BIC below which a friction law on an ideal stand is preferred to effects of the stand."""
@@ -57,7 +57,7 @@ often by 0.4 % with 0.01."""
 _LEFT_MAX = 0.1
 """Share of what no law explains that effects may leave: with more, others must be at work, and what these
 effects explain is theirs."""
-Progress = Callable[[float, str], None]
+Progress = Callable[[float, Message], None]
 
 
 def identify(
@@ -116,11 +116,11 @@ def _identify(
     laws = COMPARED_LAWS if model == "auto" else (law_by_name(model),)
     report = progress or (lambda _share, _what: None)
 
-    report(0.0, "looking for the release")
+    report(0.0, message("looking for the release"))
     decay = prepare(record)
     if not decay.slips:
         return _identify_without_slip(record, decay, with_monte_carlo=monte_carlo is not None)
-    report(0.1, "first estimate")
+    report(0.1, message("first estimate"))
     problem = build_problem(record, decay)
     start, informed_problem = initial_guess(problem, decay)
     search = Search(problem, informed_problem, decay.period_s, decay.dense_until_s)
@@ -129,15 +129,15 @@ def _identify(
     else:
         points = guess_release(informed_problem, start, decay.period_s, record.pullback_m)
     plate = estimate_plate_friction(record, decay)
-    report(0.3, "following the motion")
+    report(0.3, message("following the motion"))
     minima = search.find_minima(points)
 
-    report(0.6, "fitting " + ", ".join(law.name for law in laws))
+    report(0.6, message("fitting {laws}", laws=[law.name for law in laws]))
     fits = search.fit_all(laws, minima)
     fitted = _choose(record, decay, search, minima, fits, start if model == "auto" else None, report)
-    report(0.8, "uncertainty")
+    report(0.8, message("uncertainty"))
     found = _conclude(record, fitted, plate, monte_carlo, report)
-    report(1.0, "done")
+    report(1.0, message("done"))
     return found
 
 
@@ -158,7 +158,7 @@ def _choose(
     if start is not None and may_be_friction(problem, fits):
         stand_search = _stand_search(search, decay, fits)
         missing = _missing_effects(stand_search, decay, likeliest, fits)
-        report(0.7, "looking for effects of the stand")
+        report(0.7, message("looking for effects of the stand"))
         if not _is_adequate(problem, decay, fits):
             stand = _fit_stand(stand_search, decay, fits, start)
         elif any(each.promise > PROMISE_MIN for each in missing):
@@ -166,7 +166,7 @@ def _choose(
         if stand is not None and _may_be_other_law(stand, decay):
             widest = next(fit for fit in fits if fit.law is WIDEST_LAW)
             for law in FALLBACK_LAWS:
-                report(0.75, f"fitting {law.name}")
+                report(0.75, message("fitting {laws}", laws=[law.name]))
                 fallback = search.explain_by_fallback(law, widest)
                 if fallback is not None and _is_adequate(problem, decay, [fallback]):
                     fits.append(fallback)
@@ -401,7 +401,8 @@ def _check_by_monte_carlo(
     joint: JointFit, constants: DecayConstants, budget: UncertaintyBudget, refits: int, report: Progress
 ) -> MonteCarlo:
     def progress(done: int) -> None:
-        report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
+        share = 0.8 + 0.2 * done / refits
+        report(share, message("Monte Carlo, {done} of {refits} refits", done=done, refits=refits))
 
     model = MonteCarloModel(joint, constants)
     return run_monte_carlo(model, budget.results, refits=refits, progress=progress)

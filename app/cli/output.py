@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.errors import CommandError, alternatives
+from messages.message import Message
 
 
 def print_json(document: object) -> None:
@@ -93,7 +94,7 @@ def progress_bar(description: str, total: float | None = None) -> Iterator[Any]:
     ) as bar:
         task = bar.add_task(description, total=total)
 
-        def update(completed: float, text: str | None = None) -> None:
-            bar.update(task, completed=completed, description=text)
+        def update(completed: float, text: str | Message | None = None) -> None:
+            bar.update(task, completed=completed, description=None if text is None else str(text))
 
         yield update

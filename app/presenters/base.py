@@ -132,13 +132,13 @@ _ROUNDING = 1e-9
 
 def batch_progress(
     report: ReportProgress, template: str, paths: Sequence[str]
-) -> Callable[[float, str], None]:
+) -> Callable[[float, object], None]:
     """Make a callback for `app.runs.batch` that reports which run is being processed.
 
     `template` has the fields `{name}`, `{number}` and `{all}`, and is translated here.
     """
 
-    def on_share(share: float, _what: str) -> None:
+    def on_share(share: float, _what: object) -> None:
         number = min(int(share * len(paths) + _ROUNDING), len(paths) - 1)
         name = Path(paths[number]).stem
         report(Progress(gettext(template, name=name, number=number + 1, all=len(paths)), share))

@@ -21,8 +21,10 @@ from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import Document, analysis_document, inputs_hash, latest_valid, save_analysis
 from app.runs.validator import Validator
 from drivers.samples import Losses
+from messages.message import Message
 
-Progress = Callable[[float, str], None]
+Progress = Callable[[float, str | Message], None]
+"""Called with the share that is done and what is being done, a name or a message."""
 REFITS_MIN, REFITS_MAX = 100, 1_000_000
 """A 95 % interval of fewer refits would be that of a handful."""
 

@@ -18,6 +18,7 @@ from synthetic import (
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import AnalysisError, GaugeUncertainty, Record, RecordError, StandMasses
+from messages.message import Message
 
 MASSES = StandMasses(131.6, 22.4)
 
@@ -257,6 +258,7 @@ def test_progress_runs_to_the_end():
     shares = [share for share, _ in seen]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+    assert all(isinstance(what, Message) for _, what in seen), "the window tells it in its language"
 
 
 def _still(count=2000):

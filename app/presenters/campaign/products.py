@@ -12,7 +12,8 @@ from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
 from app.runs.campaign.collect import CollectedRuns
-from messages.i18n import gettext
+from messages.i18n import gettext, translate
+from messages.message import Message
 
 _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex", ".xlsx": "xlsx"}
 """By suffix; text for others."""
@@ -40,8 +41,8 @@ def write_product(folder: str, product: Product, path: str, report: ReportProgre
 def _write_figures(target: Path, runs: CollectedRuns, report: ReportProgress) -> tuple[str, ...]:
     """Write Fig. 2 of all runs, and the figures of a representative run."""
 
-    def drawing(share: float, run: str) -> None:
-        report(Progress(gettext("Drawing {run}", run=run), share))
+    def drawing(share: float, run: str | Message) -> None:
+        report(Progress(gettext("Drawing {run}", run=translate(run)), share))
 
     campaign = runs.campaign()
     chosen = representative_runs(campaign, runs.runs) if campaign.rows else []

@@ -2,7 +2,7 @@
 
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +12,7 @@ import msgspec
 from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.series import RunResult
 from analysis.quantities import ResultWarning
-from app.runs.analyze import AnalysisRequest
+from app.runs.analyze import AnalysisRequest, Progress
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import AnalysisTask, map_runs
 from app.runs.campaign.run_result import CollectedRun, RunDetails, collect_run
@@ -23,7 +23,6 @@ from config.schema import ConfigError, Gauges, Stand
 from messages.message import Message, message
 
 Shared = TypeVar("Shared", Stand, Gauges)
-Progress = Callable[[float, str], None]
 
 
 class CollectOptions(msgspec.Struct, frozen=True):
