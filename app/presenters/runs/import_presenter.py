@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 else:
     tasks = LazyModule("app.presenters.runs.tasks")
 
-_CELL = 16
-"""Width of a column of the first rows, in characters."""
+_CELL = 28
+"""Largest width of a column of the first rows, in characters: a date with its time of day."""
 _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
 
 
@@ -244,7 +245,9 @@ def _format_rows(found: "FilePreview") -> str:
     """First rows as a table; long cells are cut."""
     lines = [found.titles, *found.rows] if found.options.header else list(found.rows)
     cut = [[cell if len(cell) <= _CELL else cell[: _CELL - 1] + "…" for cell in cells] for cells in lines]
-    return "\n".join("  ".join(f"{cell:<{_CELL}}" for cell in cells).rstrip() for cells in cut)
+    widths = [max(map(len, column)) for column in zip_longest(*cut, fillvalue="")]
+    rows = (zip(cells, widths, strict=False) for cells in cut)
+    return "\n".join("  ".join(f"{cell:<{width}}" for cell, width in row).rstrip() for row in rows)
 
 
 def _correction_chip() -> Chip:
