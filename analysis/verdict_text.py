@@ -33,7 +33,7 @@ EFFECT_TITLES = {
     "gauge-2-filter": N_("a filter before gauge 2"),
     "gauge-1-bend": N_("a bend of gauge 1"),
     "gauge-2-bend": N_("a bend of gauge 2"),
-    "cross-talk": N_("cross-talk into gauge 2"),
+    "cross-talk": N_("cross-talk between the gauges"),
     "base": N_("a base that gives way"),
     "pendulum": N_("the spring of a pendulum"),
     "damping-rise": N_("damping that grows with the swing"),

@@ -41,6 +41,9 @@ MOTION_EFFECTS = {
     "second-mode": Effect("second_mode_mass_share", "1", 0.0, 0.3),
     "second-mode-frequency": Effect("second_mode_frequency_hz", "Hz", 0.5, 100.0),
     "second-mode-damping": Effect("second_mode_damping", "1", 0.0, 0.3),
+    "base": Effect("base_compliance", "1", 0.0, 0.3),
+    "base-frequency": Effect("base_frequency_hz", "Hz", 2.0, 100.0),
+    "base-damping": Effect("base_damping", "1", 0.0, 0.3),
     "stribeck": Effect(STRIBECK, "m/s", 1e-4, 1.0),
     "film": Effect("film_s_per_m", "s/m", -5.0, 20.0),
     "log-velocity": Effect("friction_per_log_velocity", "1", -0.2, 0.3),
@@ -59,6 +62,7 @@ GAUGE_EFFECTS = {
     "gauge-1-creep": Effect("gauge_1_creep_m", "m", -0.01, 0.01),
     "gauge-2-creep": Effect("gauge_2_creep_m", "m", -0.01, 0.01),
     "cross-talk": Effect("cross_talk", "1", -0.2, 0.2),
+    "cross-talk-1": Effect("cross_talk_1", "1", -0.2, 0.2),
     "gauge-ratio": Effect("relative_gain", "1", -0.3, 0.3),
 }
 """They change readings, not the motion."""
@@ -67,6 +71,7 @@ LISTED = [name if effect.unit == "1" else f"{name} ({effect.unit})" for name, ef
 """Names with their units, for help texts."""
 _COMPLETED_BY = {
     "second-mode": {"second-mode-frequency": 8.0, "second-mode-damping": 0.01},
+    "base": {"base-frequency": 12.0, "base-damping": 0.03},
 }
 
 

@@ -24,6 +24,7 @@ class GaugeChain:
     ) -> None:
         self._lag_s = values.get("gauge_2_lag_s", 0.0)
         self._cross_talk = values.get("cross_talk", 0.0)
+        self._cross_talk_1 = values.get("cross_talk_1", 0.0)
         self._gain = 1.0 + values.get("relative_gain", 0.0)
         square = max(abs(pullback_m), 1e-9) ** 2
         self._bends = [values.get(f"gauge_{number}_bend", 0.0) / square for number in (1, 2)]
@@ -41,6 +42,7 @@ class GaugeChain:
             relative = moved[1]
         if self._is_absolute:
             relative = relative + moved[0]
+        table = table + self._cross_talk_1 * relative
         relative = self._gain * (relative + self._cross_talk * moved[0])
         if self._first_s is None:
             self._first_s = float(time_s[0])

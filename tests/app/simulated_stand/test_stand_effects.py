@@ -87,6 +87,8 @@ def test_lag_gain_cross_talk_and_bend_are_as_large_as_chosen():
     late = GaugeChain({"gauge_2_lag_s": 2e-3}, 0.012, RATE_HZ).read(moving, time_s)
     np.testing.assert_array_equal(late, (table_m, moving(time_s - 2e-3)[1]))
     values = {"relative_gain": 0.02, "cross_talk": 0.01, "gauge_1_bend": 0.005}
+    mixed, _ = GaugeChain({"cross_talk_1": 0.02}, 0.012, RATE_HZ).read(moving, time_s)
+    np.testing.assert_allclose(mixed, table_m + 0.02 * relative_m, rtol=1e-12)
     table, relative = GaugeChain(values, 0.012, RATE_HZ).read(moving, time_s)
     np.testing.assert_allclose(relative, 1.02 * (relative_m + 0.01 * table_m), rtol=1e-12)
     assert np.abs(table - table_m).max() == pytest.approx(0.005 * 0.012)
@@ -135,4 +137,7 @@ def test_a_second_mode_has_a_frequency_and_effects_are_told_apart():
         "second_mode_frequency_hz": 8.0, "second_mode_damping": 0.05, "second_mode_mass_share": 0.02
     }  # fmt: skip
     assert gauge_values(given) == {"cross_talk": 0.01}
+    assert motion_values({"base": 0.01, "base-damping": 0.1}) == {
+        "base_compliance": 0.01, "base_frequency_hz": 12.0, "base_damping": 0.1
+    }  # fmt: skip
     assert EFFECTS.keys() == MOTION_EFFECTS.keys() | GAUGE_EFFECTS.keys()
