@@ -555,10 +555,13 @@ def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float
 def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
     """Root mean square distance from `about_s` of the ends of slip of drawn parameters of `fit`."""
     inverse, _ = covariance(fit.normal_matrix)
-    values, vectors = np.linalg.eigh(inverse)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    # Scaled, since parameters differ by many orders, and symmetric, so that rounding decides nothing.
+    variance = np.diag(inverse)
+    scale = np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    values, vectors = np.linalg.eigh(inverse / np.outer(scale, scale))
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T * scale
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
-    drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root.T
+    drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root
     drawn[:, Parameter.FRICTION_STATIC] = np.minimum(drawn[:, Parameter.FRICTION_STATIC], largest)
     return _rms_distance(np.vstack((fit.parameters, drawn)), fit.law, about_s, end_s)
 
