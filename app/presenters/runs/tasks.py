@@ -39,7 +39,7 @@ from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields
 from app.runs.errors import RunError
-from app.runs.exchange import import_run, importing, recognition
+from app.runs.exchange import import_run, importing, recognition, storing
 from app.runs.exchange.exporting import ExportRequest, export_runs
 from app.runs.exchange.reading_process import shared_reading_process
 from app.runs.listing import list_runs
@@ -173,7 +173,7 @@ def preview_import(path: str, form: Form) -> ImportPreview:
     if unit == "m" and form["quantity"] == "displacement":
         unit, scale = "mm", 1e3
     with shared_reading_process().read(Path(path), plan) as record:
-        importing.check_length(Path(path), record)
+        storing.check_length(Path(path), record)
         trace = _imported_trace(Path(path).stem, record, plan.measures, scale)
         told = [_record_summary(record), *map(_in_window, record.facts.notes)]
     return ImportPreview(Overlay((trace,), gettext("time, s"), unit), ". ".join(told))

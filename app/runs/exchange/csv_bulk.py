@@ -88,6 +88,7 @@ def _by_arrow(
                 null_values=[*spelt, "NaN"],
                 decimal_point=source.decimal,
             ),
+            memory_pool=pa.system_memory_pool(),  # others keep what they have had
         )
     except (pa.ArrowException, ValueError):
         return None

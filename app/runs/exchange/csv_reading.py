@@ -5,8 +5,10 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import DATE, TIME, ForeignColumns, ReportShare, cell_fault, find_columns
@@ -42,6 +44,7 @@ _FOOTER_BYTES = 1 << 16
 _ROOM, _SHARE_MIN = 1.02, 1e-3
 """Room beyond the rows expected from the share of the file that was read; that share is at least this."""
 _NUMERIC = re.compile(r"\s*[-+.,]*\d")
+_ROWS_AT_ONCE = 1 << 17
 _SHOWN = 40  # characters of a footer in a note
 
 
@@ -96,8 +99,7 @@ class _Reader:
             end, share = rows + len(values[0]), min(piece.end_bytes / size_bytes, 1.0)
             if end > len(joined[0]):
                 room = int(_ROOM * end / max(share, _SHARE_MIN)) + 1
-                for column in joined:
-                    column.resize(room, refcheck=False)
+                joined = [_with_room(column[:rows], room) for column in joined]
             for column, part in zip(joined, values, strict=True):
                 column[rows:end] = part
             rows = end
@@ -139,7 +141,7 @@ class _Reader:
             time = unwrap_times(time, stamps.period_ns)
         first_ns = int(time[0]) if rows else 0
         start = to_datetime(first_ns, has_zone=stamps.has_zone) if has_date else None
-        return TimeAxis((time - first_ns) / NS, start)
+        return TimeAxis(_seconds(time, first_ns), start)
 
     def _name(self, at: int) -> str:
         names = self._source.names
@@ -274,6 +276,22 @@ class _RowError(Exception):
 
     error: ImportFileError
     is_first: bool
+
+
+def _with_room(column: NDArray[Any], room: int) -> NDArray[Any]:
+    """Column with room for so many rows. What is not written yet takes no memory, as zeros would."""
+    roomy = np.empty(room, column.dtype)
+    roomy[: len(column)] = column
+    return roomy
+
+
+def _seconds(times_ns: NDArray[np.int64], first_ns: int) -> NDArray[np.float64]:
+    """Seconds (n,) since the first time, in the memory of the nanoseconds."""
+    time_s = times_ns.view(np.float64)
+    for first in range(0, len(time_s), _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        time_s[rows] = (times_ns[rows] - first_ns) / NS
+    return time_s
 
 
 def _line_label(line: int) -> Message:

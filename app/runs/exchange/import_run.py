@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import find_releases
 from analysis.record import RecordError
-from app.runs.exchange.importing import CsvImport, ForeignRecord, store_record
+from app.runs.exchange.importing import CsvImport, ForeignRecord
 from app.runs.exchange.reading_process import shared_reading_process
+from app.runs.exchange.storing import store_record
 from config.schema import Stand
 from messages.message import Message
 
@@ -54,7 +55,7 @@ def import_csv(
 ) -> ImportedRun:
     """Make a run of a foreign file. Raises RunError, ConfigError.
 
-    `report` gets the share that is done. `metadata` as for `importing.store_record`.
+    `report` gets the share that is done. `metadata` as for `storing.store_record`.
     """
     with shared_reading_process().read(path, plan, lambda share: report(_READ_SHARE * share)) as record:
         stored, unit = store_record(

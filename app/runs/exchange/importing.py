@@ -1,19 +1,18 @@
-"""Foreign records into run files."""
+"""Foreign files as records: which columns are what, in which unit, since when."""
 
 import datetime
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.preparation.channels import SAMPLES_MIN
-from app.runs.blocks import RunBlock, StoredRun
+from app.runs.blocks import RunBlock
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns, ReportShare
 from app.runs.exchange.csv_layout import CsvOptions
@@ -21,18 +20,9 @@ from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
 from app.runs.exchange.rounded_times import even_times
 from app.runs.exchange.units import parse_unit
-from app.runs.metadata import (
-    IMPORT_PROTOCOL,
-    QUANTITY_UNITS,
-    EndMetadata,
-    Quantity,
-    SourceFile,
-    create_metadata,
-)
-from app.runs.writer import write_run
-from config.schema import Gauge, Gauges, Stand
-from drivers.clock import TimeBase
-from drivers.samples import DeviceIdentity, Losses, SampleStatus
+from app.runs.metadata import QUANTITY_UNITS, Quantity, SourceFile
+from config.schema import Gauge
+from drivers.samples import SampleStatus
 from messages.i18n import N_
 from messages.message import Message, message, option
 
@@ -48,7 +38,7 @@ _EPOCHS = tuple(datetime.datetime(year, 1, 1, tzinfo=datetime.UTC) for year in (
 _SINCE, _SPAN = datetime.datetime(2001, 1, 1, tzinfo=datetime.UTC), _EPOCHS[0] - _EPOCHS[1]
 """Times are taken to count from an epoch if they lie in the 66 years from 2001 on: no clock that starts with
 a record gets there, and no times lie there from both epochs."""
-_BLOCK_ROWS = 1 << 19
+_BLOCK_ROWS = 1 << 17
 _HASHED_BYTES = 1 << 22
 
 
@@ -127,74 +117,32 @@ class ForeignRecord:
         return RunBlock(np.asarray(self.time_s[rows]), readings, status, cells)
 
 
-def store_record(
+def read_record(
     path: Path,
-    record: ForeignRecord,
     plan: CsvImport,
-    output: Path,
-    stand: Stand,
-    *,
-    replace: bool = False,
     report: ReportShare = lambda _: None,
-    **metadata: Any,
-) -> tuple[StoredRun, str]:
-    """Make a run of a foreign record; return it and the unit of its readings. Raises RunError, ConfigError.
-
-    `metadata` as for `create_metadata`: series, pullback_m, table_mass_kg, operator, note, ...
-    """
-    check_length(path, record)
-    facts, length_s = record.facts, float(record.time_s[-1])
-    unit = plan.unit_name or QUANTITY_UNITS[plan.quantity]
-    run_metadata = create_metadata(
-        stand,
-        Gauges(table=facts.gauges[0], relative=facts.gauges[-1].replace(measures=plan.measures)),
-        facts.start,
-        device=DeviceIdentity(protocol=IMPORT_PROTOCOL, name=path.name),
-        rate_hz=facts.rate_hz,
-        quantity=plan.quantity,
-        unit=unit,
-        source=f"imported from {path.name}, time 0 is its {facts.first_s!r} s",
-        source_file=facts.source,
-        **metadata,
-    )
-    missing = int(np.count_nonzero(np.isnan(record.cells[0]) & np.isnan(record.cells[-1])))
-    ending = EndMetadata(
-        ended="imported",
-        end_time=facts.start and facts.start + datetime.timedelta(seconds=length_s),
-        losses=Losses(samples=len(record), missing=missing),
-        time_base=TimeBase(scale_standard_uncertainty=facts.interval_uncertainty),
-    )
-    stored = write_run(output, run_metadata, _reported(record, report), ending, replace=replace)
-    return stored, unit
-
-
-def check_length(path: Path, record: ForeignRecord) -> None:
-    """Refuse what is too short to be a record. Raises ImportFileError."""
-    present = int(np.count_nonzero(~np.isnan(record.cells[0])))
-    if present < SAMPLES_MIN:
-        raise ImportFileError(
-            "{path} holds {count} readings of gauge 1, too few for a record: {least} at least. Give the whole"
-            " test",
-            path=path,
-            count=present,
-            least=SAMPLES_MIN,
-        )
-
-
-def read_record(path: Path, plan: CsvImport, report: ReportShare = lambda _: None) -> ForeignRecord:
+    keep: Callable[[Floats], Floats] = lambda cells: cells,
+) -> ForeignRecord:
     """Read a foreign file as it would be imported. Raises RunError.
 
-    `report` is called with the share that is done. `app.runs.exchange.reading_process` does it in a process
-    with limits.
+    `report` is called with the share that is done. `keep` takes the cells of each gauge when they are
+    complete, and returns them from where they are kept, so that no more than one column needs memory.
+    `app.runs.exchange.reading_process` does it in a process with limits.
     """
     check_plan(plan)
     with unpacked(path, report) as plain:
         plan = _with_time(plain, plan)
         columns = read_foreign(plain, plan.layout, report)
-        return _record(path, plan, columns, report)
+        return _record(path, plan, columns, report, keep)
 
 
-def _record(path: Path, plan: CsvImport, columns: ForeignColumns, report: ReportShare) -> ForeignRecord:
+def _record(
+    path: Path,
+    plan: CsvImport,
+    columns: ForeignColumns,
+    report: ReportShare,
+    keep: Callable[[Floats], Floats],
+) -> ForeignRecord:
     if not len(columns):
         raise ImportFileError("{path} holds no rows. Give a file with numbers", path=path)
     unit_s = _time_unit_s(path, plan, columns)
@@ -208,15 +156,14 @@ def _record(path: Path, plan: CsvImport, columns: ForeignColumns, report: Report
     if start is not None:
         start += datetime.timedelta(seconds=first_s - float(columns.time[0]))
     time_s -= first_s
+    gauges = tuple(_gauge(path, plan, columns, number) for number in range(len(columns.cells)))
+    cells = tuple(keep(_checked_size(path, plan, gauge, columns.cells.pop(0)[kept])) for gauge in gauges)
     uncertainty = columns.interval_uncertainty
     rate_hz = plan.layout.rate_hz or even_rate_hz(time_s)
-    gauges = tuple(_gauge(path, plan, columns, number) for number in range(len(columns.cells)))
     facts = RecordFacts(
         gauges, first_s, start, rate_hz, _source(path, report), uncertainty, tuple(columns.notes)
     )
-    record = ForeignRecord(facts, time_s, tuple(cells[kept] for cells in columns.cells))
-    _check_size(path, plan, record)
-    return record
+    return ForeignRecord(facts, time_s, cells)
 
 
 def even_rate_hz(time_s: Floats) -> float | None:
@@ -228,14 +175,6 @@ def even_rate_hz(time_s: Floats) -> float | None:
     middling = float(np.median(steps, overwrite_input=True))
     is_even = max(highest - middling, middling - lowest) <= _EVEN * middling
     return 1.0 / middling if is_even else None
-
-
-def _reported(record: ForeignRecord, report: ReportShare) -> Iterator[RunBlock]:
-    done = 0
-    for block in record.blocks():
-        yield block
-        done += len(block)
-        report(done / len(record))
 
 
 def _source(path: Path, report: ReportShare) -> SourceFile:
@@ -309,8 +248,7 @@ def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
     """Replace stamps that a logger has rounded, so that some repeat, by even ones."""
     if columns.is_even or plan.segment is not None:
         return
-    steps = np.diff(columns.time)
-    if not len(steps) or steps.min() != 0.0:
+    if min((float(steps.min()) for _, steps in _steps(columns.time)), default=1.0) != 0.0:
         return
     even = even_times(columns.time)
     if even is None:
@@ -423,12 +361,13 @@ def _check_span(path: Path, plan: CsvImport, time_s: Floats) -> None:
         )
 
 
-def _check_size(path: Path, plan: CsvImport, record: ForeignRecord) -> None:
-    for gauge, cells in zip(record.facts.gauges, record.cells, strict=True):
-        low, high = float(np.fmin.reduce(cells)), float(np.fmax.reduce(cells))
-        if any(math.isinf(gauge.gain_m_per_count * (cell - gauge.zero_count)) for cell in (low, high)):
-            template = N_("{path}: with {option} {value:g} its readings are too large. Check both")
-            raise ImportFileError(template, path=path, option=option("--gain"), value=plan.gain or 1.0)
+def _checked_size(path: Path, plan: CsvImport, gauge: Gauge, cells: Floats) -> Floats:
+    """Cells whose readings are finite. Raises ImportFileError."""
+    low, high = float(np.fmin.reduce(cells)), float(np.fmax.reduce(cells))
+    if any(math.isinf(gauge.gain_m_per_count * (cell - gauge.zero_count)) for cell in (low, high)):
+        template = N_("{path}: with {option} {value:g} its readings are too large. Check both")
+        raise ImportFileError(template, path=path, option=option("--gain"), value=plan.gain or 1.0)
+    return cells
 
 
 def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
@@ -470,11 +409,20 @@ def _segment(columns: ForeignColumns, number: int | None) -> slice:
     return slice(bounds[number], bounds[number + 1])
 
 
+def _steps(time: Floats) -> Iterator[tuple[int, Floats]]:
+    """Differences of times in parts, each with the row that its first one begins at."""
+    for first in range(0, len(time) - 1, _BLOCK_ROWS):
+        yield first, np.diff(time[first : first + _BLOCK_ROWS + 1])
+
+
 def _check_rising(columns: ForeignColumns, rows: slice) -> None:
-    is_wrong = np.diff(columns.time[rows]) <= 0.0
-    if not is_wrong.any():
-        return
-    row = rows.start + int(np.flatnonzero(is_wrong)[0]) + 1
+    for first, steps in _steps(columns.time[rows]):
+        is_wrong = steps <= 0.0
+        if is_wrong.any():
+            raise _not_rising(columns, rows.start + first + int(np.flatnonzero(is_wrong)[0]) + 1)
+
+
+def _not_rising(columns: ForeignColumns, row: int) -> ImportFileError:
     before, now = columns.time[row - 1 : row + 1]
     if now < before:
         fault = message(
@@ -490,4 +438,4 @@ def _check_rising(columns: ForeignColumns, rows: slice) -> None:
             now=str(now),
             option=option("--rate"),
         )
-    raise columns.fault(row, 0, fault)
+    return columns.fault(row, 0, fault)

@@ -7,6 +7,7 @@ import atexit
 import contextlib
 import functools
 import importlib
+import itertools
 import math
 import sys
 import tempfile
@@ -23,7 +24,7 @@ from app.child_process import START_S, CommandReader, EventSender, RequestProces
 from app.log import start_log
 from app.runs.errors import ExtraMissingError, ImportFileError, RunError
 from app.runs.exchange.foreign_files import find_format
-from app.runs.exchange.importing import CsvImport, ForeignRecord, RecordFacts, check_plan, read_record
+from app.runs.exchange.importing import CsvImport, Floats, ForeignRecord, RecordFacts, check_plan, read_record
 from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 from messages.i18n import N_
 from messages.message import Message, Option, Value
@@ -32,6 +33,8 @@ MEMORY_BYTES = 1 << 30
 PROGRESS_S = 10.0
 """A reader that shows no progress for so long hangs. It reports at least every few megabytes."""
 _IDLE_S = 60.0
+_LARGE_BYTES = 1 << 26
+"""A process that has read a record of more ends, since its libraries need more than the start of another."""
 _OPTION, _FLOAT = "\0option", "\0float"
 """Templates of an `Option` and of a float that is not finite, which JSON does not keep."""
 
@@ -111,6 +114,9 @@ class ReadingProcess:
             arrays = [
                 np.load(Path(folder) / f"{number}.npy", mmap_mode="r") for number in range(answer.columns)
             ]
+            if sum(array.nbytes for array in arrays) > _LARGE_BYTES:
+                with self._turn:
+                    self._process.stop()
             facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
             yield ForeignRecord(facts, arrays[0], tuple(arrays[1:]))
 
@@ -205,9 +211,9 @@ def _answer(request: Request, report: Callable[[float], object]) -> Event:
     try:
         if isinstance(request, PreviewRequest):
             return PreviewRead(preview_file(path, request.options))
-        record = read_record(path, request.plan, report)
-        for number, column in enumerate((record.time_s, *record.cells)):
-            np.save(Path(request.folder) / f"{number}.npy", np.ascontiguousarray(column))
+        files = (Path(request.folder) / f"{number}.npy" for number in itertools.count(1))
+        record = read_record(path, request.plan, report, lambda cells: _on_disk(next(files), cells))
+        _on_disk(Path(request.folder) / "0.npy", record.time_s)
         facts = msgspec.structs.replace(record.facts, notes=tuple(map(_packed, record.facts.notes)))
         return RecordRead(facts, 1 + len(record.cells))
     except RunError as error:
@@ -218,6 +224,12 @@ def _answer(request: Request, report: Callable[[float], object]) -> Event:
     except OSError as error:
         template = N_("{path}: cannot be read ({reason}). Check the file and its disk")
         return ReadingFault(ImportFileError(template, path=path, reason=error.strerror or str(error)).message)
+
+
+def _on_disk(path: Path, column: Floats) -> Floats:
+    """Column as a file, whose memory is free until it is read."""
+    np.save(path, np.ascontiguousarray(column))
+    return np.load(path, mmap_mode="r")  # type: ignore[no-any-return]
 
 
 def _crashed(path: Path) -> ImportFileError:

@@ -13,7 +13,7 @@ from app.runs.errors import ImportFileError
 from messages.i18n import N_
 from messages.message import option
 
-PIECE_BYTES = 1 << 22
+PIECE_BYTES = 1 << 20
 HEAD_BYTES = 1 << 18
 """Header, units and the first rows of a record lie within them; a header of more is none."""
 _LINE_BYTES = 1 << 24  # more without a line end is no text of a record

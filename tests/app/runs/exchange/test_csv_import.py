@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from runs_kit import text_file
@@ -6,7 +8,7 @@ from app.runs.analysis_input import to_record
 from app.runs.errors import ImportFileError, RunExistsError
 from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.import_run import import_csv
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.importing import CsvImport, read_record
 from app.runs.reader import load_counts, open_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
@@ -168,3 +170,27 @@ def test_numbers_that_are_too_large_for_a_record(tmp_path, rows, gain, words):
     with pytest.raises(ImportFileError, match=words):
         import_csv(record, CsvImport(CsvOptions("t", "u"), gain=gain), tmp_path / "run.h5", load_stand())
     assert not (tmp_path / "run.h5").exists()
+
+
+def test_reading_takes_little_more_memory_than_the_columns(tmp_path):
+    """Pieces of text are small, and each gauge goes where it is kept before times are copied."""
+    rows, places = 150_000, iter(("1.npy", "2.npy"))
+    lines = (f"{at / 1e4:.4f},{12 - at % 24_001 / 1e3:.6f},{at % 7_919 / 1e4:.6f}\n" for at in range(rows))
+    path = text_file(tmp_path, "time,table,rel\n" + "".join(lines))
+    columns_bytes, text_bytes = 3 * 8 * rows, path.stat().st_size
+
+    def keep(cells):
+        place = tmp_path / next(places)
+        np.save(place, cells)
+        return np.load(place, mmap_mode="r")
+
+    read_record(path, CsvImport(BASIC, until_s=1.0))  # loads the reader
+    tracemalloc.start()
+    try:
+        record = read_record(path, CsvImport(BASIC), keep=keep)
+        held_bytes, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(record) == rows
+    assert held_bytes < columns_bytes / 2
+    assert peak_bytes < columns_bytes + 2 * text_bytes

@@ -2,6 +2,8 @@
 
 import datetime
 import gzip
+import hashlib
+import json
 import os
 import pickle
 import struct
@@ -15,6 +17,7 @@ import pytest
 from app.runs.errors import ImportFileError
 from app.runs.exchange import reading_process
 from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.foreign_files import open_foreign
 from app.runs.exchange.importing import CsvImport, read_record
 from app.runs.exchange.reading_process import ReadingProcess, shared_reading_process
 from app.runs.exchange.recognition import ParseOptions
@@ -284,6 +287,31 @@ def test_the_first_segment_of_a_labview_file_is_read_in_parts_to_its_end(tmp_pat
     assert len(shares) >= ROWS // 50
 
 
+def test_a_labview_file_may_have_decimal_commas(tmp_path):
+    """Numbers go through numpy, and through lvm_read where a cell is empty."""
+    lvmio = pytest.importorskip("lvmio")
+    path, begun = tmp_path / "german.lvm", BEGUN.astimezone()
+    channels = [
+        lvmio.Channel(name, data.tolist(), "mm", delta_x=1 / RATE_HZ)
+        for name, data in (("u1", TABLE), ("rel", RELATIVE))
+    ]
+    lvmio.write_lvm(
+        path, channels, date=f"{begun:%Y/%m/%d}", time=f"{begun:%H:%M:%S,%f}", precision=17,
+        decimal_separator=",",
+    )  # fmt: skip
+    rows = path.read_text().rstrip().splitlines()
+    assert "." not in rows[-1]
+    for is_whole in (True, False):
+        if not is_whole:
+            path.write_text("\n".join([*rows[:-1], rows[-1].replace(rows[-1].split("\t")[-1], ""), ""]))
+        record = read_record(path, CsvImport(CsvOptions("", "u1", "rel")))
+        assert np.abs(record.cells[0] - TABLE).max() < 1e-14
+        assert np.abs(record.cells[1][:-1] - RELATIVE[:-1]).max() < 1e-14
+        assert np.isnan(record.cells[1][-1]) != is_whole
+        assert record.facts.rate_hz == pytest.approx(RATE_HZ)
+        assert record.facts.start == BEGUN
+
+
 def test_options_of_texts_are_refused_for_other_files(tmp_path):
     path = tmp_path / "log.xlsx"
     write_workbook(path, [["t", "u1"], *([row, row] for row in range(60))])
@@ -372,6 +400,28 @@ def test_a_catman_file_is_read_in_all_its_widths(tmp_path):
         assert [gauge.gain_m_per_count for gauge in record.facts.gauges] == [1e-3, 1e-6]
 
 
+CATMAN_FILES = Path(__file__).parent / "catman"
+
+
+@pytest.mark.peer
+@pytest.mark.parametrize(
+    ("name", "channels"), json.loads((CATMAN_FILES / "apread.json").read_text("utf-8")).items()
+)
+def test_files_of_catman_hold_what_apread_reads_of_them(tmp_path, name, channels):
+    path = tmp_path / name.removesuffix(".gz")
+    path.write_bytes(gzip.decompress((CATMAN_FILES / name).read_bytes()))
+    table = open_foreign(path, CsvOptions("", ""))
+    found = {}
+    for at, (channel, unit) in enumerate(zip(table.names, table.units, strict=True)):
+        values = np.asarray(table.column(at), "<f8")
+        found[channel] = [unit, values[0], hashlib.sha256(values).hexdigest()]
+    assert found == channels
+    plan = CsvImport(CsvOptions("", "Baumer encoder 2500", "poti5k"), gain=1e-3)
+    with shared_reading_process().read(CATMAN_FILES / name, plan) as record:
+        assert len(record) == 100
+        assert record.facts.rate_hz == pytest.approx(300.0, rel=1e-3)  # a step of two bytes is 10 us
+
+
 @pytest.mark.peer
 def test_apread_reads_the_same_of_a_catman_file(tmp_path):
     apread = pytest.importorskip("apread", exc_type=ImportError)
@@ -433,6 +483,19 @@ def test_every_hostile_file_is_one_line_and_the_next_file_is_read(tmp_path):
         assert path.name in said, name
         with shared_reading_process().read(sound, CsvImport(CsvOptions("t", "u1 [mm]"))) as record:
             assert np.array_equal(record.cells[0], TABLE)
+
+
+def test_the_process_that_read_a_large_record_frees_its_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading_process, "_LARGE_BYTES", ROWS)
+    path, process = tmp_path / "large.csv.gz", ReadingProcess()
+    write_gzip(path)
+    try:
+        for _ in range(2):
+            with process.read(path, CsvImport(FORMATS["packed.csv.gz"][1])) as record:
+                assert process._process.pid is None
+                assert np.array_equal(record.time_s, TIME_S)
+    finally:
+        process.stop()
 
 
 def test_what_needs_too_much_memory_is_one_line(tmp_path):
