@@ -41,13 +41,13 @@ def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _:
     return columns
 
 
-def open_foreign(path: Path, layout: CsvOptions) -> Table:
+def open_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> Table:
     """Open a file that is no plain text. Raises RunError."""
     found = find_format(path)
     if found is None:
         raise ImportFileError("{path} is plain text", path=path)
     with _faults_named(path, found):
-        return _open(found, path, layout, lambda _: None)
+        return _open(found, path, layout, report)
 
 
 def is_csv(path: Path) -> bool:

@@ -131,7 +131,7 @@ def read_record(
     """
     check_plan(plan)
     with unpacked(path, report) as plain:
-        plan = _with_time(plain, plan)
+        plan = _with_time(plain, plan, report)
         columns = read_foreign(plain, plan.layout, report)
         return _record(path, plan, columns, report, keep)
 
@@ -186,13 +186,13 @@ def _source(path: Path, report: ReportShare) -> SourceFile:
         return SourceFile(name=path.name, sha256=digest.hexdigest(), size_bytes=file.tell())
 
 
-def _with_time(path: Path, plan: CsvImport) -> CsvImport:
+def _with_time(path: Path, plan: CsvImport, report: ReportShare) -> CsvImport:
     """Plan with the time column that the names tell, where none is given. Raises ImportFileError."""
     layout = plan.layout
     if layout.rate_hz is not None or layout.time or has_own_time(path):
         return plan
     lines = ParseOptions(layout.delimiter, layout.decimal, layout.skip, layout.header, layout.encoding)
-    found = preview_file(path, lines)
+    found = preview_file(path, lines, report)
     if not found.time:
         return plan
     if {found.time, str(found.columns.index(found.time))} & {layout.table, layout.second}:

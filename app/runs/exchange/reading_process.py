@@ -210,7 +210,7 @@ def _answer(request: Request, report: Callable[[float], object]) -> Event:
     path = Path(request.path)
     try:
         if isinstance(request, PreviewRequest):
-            return PreviewRead(preview_file(path, request.options))
+            return PreviewRead(preview_file(path, request.options, report))
         files = (Path(request.folder) / f"{number}.npy" for number in itertools.count(1))
         record = read_record(path, request.plan, report, lambda cells: _on_disk(next(files), cells))
         _on_disk(Path(request.folder) / "0.npy", record.time_s)

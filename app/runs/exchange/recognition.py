@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.csv_layout import CsvOptions, CsvText, is_number, survey_csv
 from app.runs.exchange.foreign_files import is_csv, open_foreign, unpacked
 from app.runs.exchange.stamps import find_form, has_date, has_time
@@ -59,17 +60,19 @@ class FilePreview:
     """Column of dates, where `time` is one of times of day."""
 
 
-def preview_file(path: Path, given: ParseOptions | None = None) -> FilePreview:
+def preview_file(
+    path: Path, given: ParseOptions | None = None, report: ReportShare = lambda _: None
+) -> FilePreview:
     """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
-    with unpacked(path) as plain:
-        return _preview(plain, given or ParseOptions())
+    with unpacked(path, report) as plain:
+        return _preview(plain, given or ParseOptions(), report)
 
 
-def _preview(path: Path, given: ParseOptions) -> FilePreview:
+def _preview(path: Path, given: ParseOptions, report: ReportShare) -> FilePreview:
     if is_csv(path):
         return _survey_text(path, given)
     has_header = given.header is not False
-    table = open_foreign(path, CsvOptions("", "", skip=given.skip, header=has_header))
+    table = open_foreign(path, CsvOptions("", "", skip=given.skip, header=has_header), report)
     options = ParseOptions(skip=given.skip, header=has_header)
     units = [table.unit(at) for at in range(len(table.names))]
     return _recognise(_Columns(table.names, units, table.first_rows, table.has_axis), options)

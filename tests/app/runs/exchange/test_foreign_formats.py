@@ -20,7 +20,7 @@ from app.runs.exchange.csv_layout import CsvOptions
 from app.runs.exchange.foreign_files import open_foreign
 from app.runs.exchange.importing import CsvImport, read_record
 from app.runs.exchange.reading_process import ReadingProcess, shared_reading_process
-from app.runs.exchange.recognition import ParseOptions
+from app.runs.exchange.recognition import ParseOptions, preview_file
 
 # pyuff 2.5.8 does not close the file that it writes.
 pytestmark = pytest.mark.filterwarnings(
@@ -194,6 +194,22 @@ def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path):
     assert list(record.cells[0][3:]) == list(range(3, 60))
     assert record.facts.gauges[0].gain_m_per_count == 1e-3
     assert shares.count(0.0) > 10
+
+
+def test_a_look_into_a_large_file_shows_progress(tmp_path, monkeypatch):
+    """Without it the reading process is ended after ten seconds, also where the time column is not named."""
+    book, packed = tmp_path / "large.xlsx", tmp_path / "packed.csv.gz"
+    write_workbook(book, [["t", "u1 [mm]"], *([at / 100, at] for at in range(1000))])
+    write_gzip(packed)
+    monkeypatch.setattr("app.runs.exchange.foreign_files._PIECE_BYTES", 1000)
+    for path in (book, packed):
+        shares = []
+        preview_file(path, report=shares.append)
+        assert len(shares) > 2
+    named, found = [], []
+    read_record(book, CsvImport(CsvOptions("t", "u1 [mm]")), named.append)
+    read_record(book, CsvImport(CsvOptions("", "u1 [mm]")), found.append)
+    assert len(found) > len(named) + 2
 
 
 @pytest.mark.parametrize("suffix", [".xlsx", ".parquet", ".mat", ".h5"])
