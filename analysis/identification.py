@@ -3,13 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.plate.friction import PlateFriction
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
+
+if TYPE_CHECKING:  # which loads compiled code; windows show results without it
+    from analysis.plate.friction import PlateFriction
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,4 +129,4 @@ class Identification:
     curves_by_friction: Callable[[float, Floats], Curves] | None = None
     """Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`."""
     monte_carlo: MonteCarlo | None = None  # where it was asked for
-    plate: PlateFriction | None = None  # friction from the plate alone, slip by slip
+    plate: "PlateFriction | None" = None  # friction from the plate alone, slip by slip

@@ -100,7 +100,7 @@ def test_drawing_confirms_the_budget():
         assert drawn.full[name].standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.25)
         assert drawn.agrees[name]
         assert 0.0 < drawn.tolerances[name] < budget.standard_uncertainty
-    assert any("150 of 150" in what for what in seen)
+    assert any("150 of 150" in str(what) for what in seen)
 
 
 def test_without_refits_only_the_linearised_fit_is_drawn():

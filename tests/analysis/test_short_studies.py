@@ -87,19 +87,19 @@ def test_a_gauge_without_readings_of_the_first_slips_is_no_crash(seed):
 
 
 def test_a_record_without_hope_takes_no_more_work_than_others(monkeypatch):
-    """Its fit goes for springs of no end; and no friction explains it."""
-    evaluations, evaluate = [], GaussNewton.normal_equations
+    """No friction explains it, and which of its fits is the best depends on rounding."""
+    evaluations, evaluate = [], GaussNewton.evaluate
     monkeypatch.setattr(
         GaussNewton,
-        "normal_equations",
+        "evaluate",
         lambda form, point: evaluations.append(form.law) or evaluate(form, point),
     )
 
     outcome = study_garbage.run(9816)
 
     assert "model-inadequate" in outcome.detail
-    assert "implausible-result" in outcome.detail
-    assert len(evaluations) < 2000
+    assert outcome.kind == "no f_d, with a warning"
+    assert 0 < len(evaluations) < 2000
     assert not set(FALLBACK_LAWS) & set(evaluations)
 
 

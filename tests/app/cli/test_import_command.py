@@ -111,7 +111,7 @@ def test_gain_not_stated_is_said_in_the_budget(slipstand: Any, tmp_path: Path) -
 def test_masses_that_are_not_those_of_the_series_are_said(slipstand: Any, tmp_path: Path) -> None:
     csv, run = tmp_path / "good.csv", tmp_path / "run.h5"
     csv.write_text(GOOD)
-    masses = ["--series", "1FFM1", "--plate-mass", "40", "--table-mass", "131.6"]
+    masses = ["--series", "1FFM1", "--plate-mass", "40", "--table-mass", "131.6", "--unit", "m"]
     outcome = slipstand("import", csv, *COLUMNS, *masses, "-o", run)
     assert outcome.code == 0
     assert outcome.err.splitlines() == [
