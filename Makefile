@@ -78,7 +78,7 @@ run: setup
 
 test: compiled
 	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile
-	$(BIN)/python -m pytest tests -m realtime -n 3 --dist loadfile
+	$(BIN)/python -m pytest tests -m realtime -n 4 --dist loadfile
 
 # Once, before processes that start at once would each do it.
 compiled: setup
