@@ -23,10 +23,8 @@ from messages.i18n import N_
 _EVIDENCE = 10.0  # fall of BIC that is very strong evidence (Kass and Raftery 1995)
 _CLOSE = 0.02  # residual, of the swing, above which the first order says little
 _SIGMAS = 3.0  # of each part above its uncertainty
-_MEAN_TIMES, _MEAN_TRIALS = (
-    400,
-    8,
-)  # times at which the swing is taken for the mean damping; Gauss-Newton steps
+_MEAN_TIMES = 400  # at which the swing is taken for the mean damping
+_MEAN_TRIALS = 8  # steps of Gauss and Newton towards it
 _TRIALS = 2  # parts that are fitted in each round: those with the best first-order scores
 
 
