@@ -18,7 +18,6 @@ from analysis.laws.closed_form import (
     GaugeReadings,
     chi_squares,
     chi_squares_with_fitted_zero,
-    quadratic_model,
 )
 from analysis.laws.law import IDEAL_STAND, FrictionLaw, Gauge, StandPart
 from analysis.laws.parameters import MOTION_PARAMETER_COUNT, SHARED_PARAMETER_COUNT, Parameter
@@ -312,21 +311,14 @@ class GaussNewton:
         self._directions = law.directions(
             np.array([place for place in free if _moves(place)], dtype=np.int64)
         )
-        self._readings, self._mean = problem.readings, problem.prior_mean[free]
-        self._weight = problem.prior_weights(free)
-        self._prior_normal = np.diag(self._weight)
+        self._readings = problem.readings
+        self._known = problem.prior_mean[free], problem.prior_weights(free)
 
     def evaluate(self, point: Floats) -> QuadraticModel:
         """Chi-square at `point` (p,), priors included, its descent and its curvature."""
-        if self.law.solver.is_closed_form:
-            known = self._readings, self._mean, self._weight
-            return QuadraticModel(*quadratic_model(point, self._free, self._directions, *known))
-        systems = self.normal_equations(point)
-        system = systems[0] if len(systems) == 1 else systems[0] + systems[1]
-        last, away = len(self._free), self._mean - point[self._free]
-        pull = self._weight * away
-        cost = float(system[last, last]) + float(pull @ away)
-        return QuadraticModel(cost, system[:last, last] + pull, system[:last, :last] + self._prior_normal)
+        solver, vector, gauges = self.law.solver, self.law.vector(point), (self._gauges, self._readings)
+        form = solver.quadratic_form(point, vector, self._free, self._directions, *gauges, self._known)
+        return QuadraticModel(*form)
 
     def normal_equations(self, point: Floats) -> list[Floats]:
         """Normal equations of each gauge, priors aside."""

@@ -10,7 +10,13 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled, compiled_part
-from analysis.laws.closed_form import GAUGE_1, GAUGE_2_BASE, gauge_normal_equations
+from analysis.laws.closed_form import (
+    GAUGE_1,
+    GAUGE_2_BASE,
+    GaugeReadings,
+    gauge_normal_equations,
+    quadratic_model,
+)
 from analysis.laws.parameters import (
     FRICTION_MAX,
     MOTION_PARAMETER_COUNT,
@@ -75,12 +81,45 @@ class MotionSolver(ABC):
         (k + 1, k + 1): normal matrix, descent (last column) and chi-square (corner), priors aside.
         """
 
+    def quadratic_form(
+        self,
+        point: Floats,
+        vector: Floats,
+        free: Indices,
+        directions: Floats,
+        gauges: list[Gauge],
+        readings: GaugeReadings,  # noqa: ARG002 - the same as `gauges`, for compiled functions
+        known: tuple[Floats, Floats],
+    ) -> tuple[float, Floats, Floats]:
+        """Chi-square of all gauges at a point, its descent (k,) and its normal matrix (k, k).
+
+        `known` is what is known of the `free` places beforehand: values (k,), and inverse variances (k,).
+        """
+        system = np.sum(self.normal_equations(point, vector, free, directions, gauges), axis=0)
+        mean, weight = known
+        last, away = len(free), mean - point[free]
+        pull = weight * away
+        cost = float(system[last, last]) + float(pull @ away)
+        return cost, system[:last, last] + pull, system[:last, :last] + np.diag(weight)
+
 
 class ClosedFormSolver(MotionSolver):
     """Coulomb friction in each phase: every phase is a damped oscillation with constant load."""
 
     is_closed_form = True
     kernels = EXACT
+
+    def quadratic_form(
+        self,
+        point: Floats,
+        vector: Floats,  # noqa: ARG002 - it is the beginning of `point`
+        free: Indices,
+        directions: Floats,
+        gauges: list[Gauge],  # noqa: ARG002 - the same as `readings`
+        readings: GaugeReadings,
+        known: tuple[Floats, Floats],
+    ) -> tuple[float, Floats, Floats]:
+        return quadratic_model(point, free, directions, readings, *known)
 
     def normal_equations(
         self, point: Floats, vector: Floats, free: Indices, directions: Floats, gauges: list[Gauge]
