@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import kolmogorov
 
 from analysis.arrays import Floats
 
-_RARE = 1e-3  # chance at which noise alone is called a pattern, per test
+RARE = 1e-3  # chance at which noise alone is called a pattern, per test
+KOLMOGOROV_RARE = 1.9494746035043753  # exceeded by that chance: scipy.special.kolmogi(RARE)
 _BAND = 3.29  # standard deviations within which 99.9 % of a normal distribution lie
 COMPUTED = 1e-9  # residuals under this share of the swing are those of computed readings
 _ROUNDED_SHARE = 0.25  # rounding makes residuals of any colour once it makes this share of their variance
@@ -61,7 +61,7 @@ class ResidualAssessment:
     @property
     def unseen(self) -> float:
         """Amplitude of the largest line that noise of this size hides."""
-        return 2.0 * self.rms * math.sqrt(math.log(max(1, self.count // 2) / _RARE) / max(1, self.count))
+        return 2.0 * self.rms * math.sqrt(math.log(max(1, self.count // 2) / RARE) / max(1, self.count))
 
 
 def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:
@@ -102,7 +102,7 @@ def find_second_mode(time_s: Floats, residual: Floats, period_s: float, step: fl
     even = np.interp(even_s, time_s, residual)
     power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(even))))[: len(even) // 2] ** 2
     lone = np.flatnonzero(~_is_harmonic(len(power), periods))
-    limit = 2.0 * math.log(max(len(power), 2) / _RARE)
+    limit = 2.0 * math.log(max(len(power), 2) / RARE)
     for peak in lone[np.argsort(power[lone])[::-1]][:_PEAKS].tolist():
         around = power[max(0, peak - _TOP_BINS) : peak + _TOP_BINS + 1]
         if power[peak] == around.max() and power[peak] > limit * _level_beside(power, lone, peak):
@@ -179,7 +179,7 @@ def _ordinates(residual: Floats) -> Floats:
 
 def _strongest_line(residual: Floats, power: Floats, interval_s: float) -> SpectralLine | None:
     peak = int(np.argmax(power))
-    if power[peak] < math.log(len(power) / _RARE):
+    if power[peak] < math.log(len(power) / RARE):
         return None
     total = 2.0 * float(np.var(residual)) * float(power[max(0, peak - 2) : peak + 3].sum() / power.sum())
     return SpectralLine((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
@@ -188,7 +188,7 @@ def _strongest_line(residual: Floats, power: Floats, interval_s: float) -> Spect
 def _is_flat(power: Floats) -> bool:
     share, even = np.cumsum(power) / power.sum(), np.arange(1, len(power) + 1) / len(power)
     distance = float(np.abs(share - even).max())
-    return bool(kolmogorov(distance * math.sqrt(len(power))) > _RARE)
+    return distance * math.sqrt(len(power)) < KOLMOGOROV_RARE
 
 
 def _is_even(residual: Floats) -> bool:

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.special import kolmogorov
 
-from analysis.one_mass.residuals import assess_residuals, rounding_step
+from analysis.one_mass.residuals import KOLMOGOROV_RARE, RARE, assess_residuals, rounding_step
 
 
 def white(count, seed):
@@ -71,3 +72,7 @@ def test_rounding_step():
     assert rounding_step(np.round(np.round(value / 0.0234) * 0.0234, 3)) == pytest.approx(0.0234, abs=0.001)
     assert rounding_step(value + 1e-3 * white(3000, 5)) == 0.0
     assert rounding_step(np.zeros(100)) == 0.0
+
+
+def test_flatness_is_refused_by_the_quantile_of_kolmogorov():
+    assert kolmogorov(KOLMOGOROV_RARE) == pytest.approx(RARE, rel=1e-12)
