@@ -214,7 +214,7 @@ def gauge_normal_equations(
     _held_slopes(motion, slopes, parameters, rows, which)
     _other_slopes(slopes, motion, free, len(rows), which, gain)
     _add_still(moments, block, values[:last], offset + gain * motion[ONE])
-    _combine(system, slopes, moments, mixed, CONSTANT)
+    combine(system, slopes, moments, mixed, CONSTANT)
     for p in range(len(phases)):
         first, last = last, len(times)
         if p + 1 < len(phases):
@@ -229,7 +229,7 @@ def gauge_normal_equations(
         else:
             within = times[first:last], values[first:last], tables
             _add_moving(moments, block, parameters, phase, within, motion, (offset, gain), needed)
-        _combine(system, slopes, moments, mixed, needed)
+        combine(system, slopes, moments, mixed, needed)
     return system / noise**2
 
 
@@ -289,7 +289,7 @@ def _add_still(moments: Floats, block: Floats, values: Floats, level: float) -> 
         count = min(BLOCK, len(values) - first)
         for k in range(count):
             block[ONE, k], block[RESIDUAL, k] = 1.0, values[first + k] - level
-        _sum_products(block, count, moments, CONSTANT)
+        sum_products(block, count, moments, CONSTANT)
 
 
 @compiled_part
@@ -317,11 +317,11 @@ def _add_moving(
             moved = motion[ONE] + (motion[COS] * cosine + motion[SIN] * sine)
             moved += (motion[TAU] + motion[TAU_2] * tau) * tau
             block[RESIDUAL, k] = values[first + k] - offset - gain * moved
-        _sum_products(block, count, moments, needed)
+        sum_products(block, count, moments, needed)
 
 
 @compiled_sum
-def _sum_products(block: Floats, count: int, moments: Floats, needed: int) -> None:
+def sum_products(block: Floats, count: int, moments: Floats, needed: int) -> None:
     """Add the sums of products of the first `needed` functions over `count` readings."""
     for i in range(needed):
         for j in range(i + 1):
@@ -334,7 +334,7 @@ def _sum_products(block: Floats, count: int, moments: Floats, needed: int) -> No
 
 
 @compiled_part
-def _combine(system: Floats, slopes: Floats, moments: Floats, mixed: Floats, needed: int) -> None:
+def combine(system: Floats, slopes: Floats, moments: Floats, mixed: Floats, needed: int) -> None:
     """Add the lower triangle of slopes^T moments slopes, the part of a phase, and clear the moments."""
     for i in range(needed):
         for e in range(len(mixed)):

@@ -345,21 +345,26 @@ def _off_cubic(x: Floats, weights: Floats) -> Floats:
 
 NOISE_FLOOR_M = 1e-9  # noise below this is not believed: the readings are computed, not measured
 _POOLED_READINGS_MIN = 30
+_BLOCK_MIN = 6  # readings: with fewer about a line their scatter is hardly known
 _DITHER = 0.4  # noise above this share of the converter's step makes rounding errors independent
 
 
 def detrended_noise(channel: Channel, block_s: float) -> float:
     """Standard deviation of readings at rest about straight lines over blocks: drift does not count."""
-    if len(channel) < 6:
+    if len(channel) < _BLOCK_MIN:
         return 0.0
     edges = np.arange(channel.time_s[0], channel.time_s[-1], block_s)
-    squares, freedom = 0.0, 0
-    for part in np.split(np.arange(len(channel)), np.searchsorted(channel.time_s, edges[1:])):
-        if len(part) >= 6:
-            t, x = channel.time_s[part] - channel.time_s[part[0]], channel.value_m[part]
-            residual = x - np.polyval(np.polyfit(t, x, 1), t)
-            squares, freedom = squares + float(residual @ residual), freedom + len(part) - 2
-    return float(np.sqrt(squares / freedom)) if freedom else 0.0
+    firsts = np.unique(np.concatenate(([0], np.searchsorted(channel.time_s, edges[1:]))))
+    counts = np.diff(np.append(firsts, len(channel)))
+
+    def about_mean(values: Floats) -> Floats:
+        return values - np.repeat(np.add.reduceat(values, firsts) / counts, counts)
+
+    t, x = about_mean(channel.time_s), about_mean(channel.value_m)
+    slopes = np.add.reduceat(t * x, firsts) / (np.add.reduceat(t * t, firsts) + (counts == 1))
+    squares = np.add.reduceat((x - np.repeat(slopes, counts) * t) ** 2, firsts)
+    used = counts >= _BLOCK_MIN
+    return float(np.sqrt(squares[used].sum() / (counts[used] - 2).sum())) if used.any() else 0.0
 
 
 def third_difference_noise(channel: Channel) -> float:

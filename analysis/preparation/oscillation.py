@@ -12,7 +12,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.preparation.channels import Channel, detect_hum, remove_hum
-from analysis.preparation.sums import windows
+from analysis.preparation.sums import swing_equations, windows
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
 from messages.i18n import N_
@@ -576,14 +576,13 @@ def _refine(channel: Channel, shape: Floats) -> Floats:
     tau = channel.time_s - channel.time_s[0]
     x = channel.value_m
     parameters = np.concatenate((shape, np.zeros(3)))
-    _, columns = damped_cosine(parameters, tau)
-    parameters[2:] = np.linalg.lstsq(columns[2:].T, x, rcond=None)[0]
+    system = swing_equations(parameters, tau, x)
+    parameters[2:] = np.linalg.lstsq(system[2:5, 2:5], system[2:5, 5], rcond=1e-14)[0]
     cost = np.inf
     for _ in range(30):
-        curve, columns = damped_cosine(parameters, tau)
-        residual = x - curve
-        before, cost = cost, float(residual @ residual)
-        step = np.linalg.lstsq(columns @ columns.T, columns @ residual, rcond=1e-14)[0]
+        system = swing_equations(parameters, tau, x)
+        before, cost = cost, float(system[5, 5])
+        step = np.linalg.lstsq(system[:5, :5], system[:5, 5], rcond=1e-14)[0]
         step[:2] = np.clip(step[:2], -0.05 * parameters[1], 0.05 * parameters[1])
         parameters = parameters + step
         if not _is_swing(parameters, float(tau[-1])):

@@ -1,4 +1,4 @@
-"""Compiled sums over readings: windows about each time, waves, and the cubic through neighbours.
+"""Compiled sums over readings: windows about each time, waves, a damped cosine, and the cubic of neighbours.
 
 Times (n,) rise and are in s, readings (n,) in m; both are float64.
 """
@@ -9,7 +9,19 @@ import numpy as np
 
 from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled, compiled_sum
-from analysis.motion.sampling import rotating_basis
+from analysis.laws.closed_form import (
+    BASIS_SIZE,
+    COS,
+    ONE,
+    OSCILLATION,
+    RESIDUAL,
+    SIN,
+    TAU_COS,
+    TAU_SIN,
+    combine,
+    sum_products,
+)
+from analysis.motion.sampling import BLOCK, rotating_basis
 
 
 @compiled
@@ -24,6 +36,36 @@ def windows(times: Floats, half_s: float) -> tuple[Indices, Indices]:
             high += 1
         first[k], past[k] = low, high
     return first, past
+
+
+@compiled
+def swing_equations(parameters: Floats, taus: Floats, values: Floats) -> Floats:
+    """Normal matrix of a damped cosine over its parameters (5,), descent and sum of squares, (6, 6).
+
+    Parameters are those of `oscillation.DampedCosine`; descent is the last column, the sum its corner.
+    """
+    damping, frequency, cosine, sine, offset = parameters
+    slopes, moments = np.zeros((BASIS_SIZE, 6)), np.zeros((BASIS_SIZE, BASIS_SIZE))
+    slopes[TAU_COS, 0], slopes[TAU_SIN, 0] = -cosine, -sine
+    slopes[TAU_COS, 1], slopes[TAU_SIN, 1] = sine, -cosine
+    slopes[COS, 2] = slopes[SIN, 3] = slopes[ONE, 4] = slopes[RESIDUAL, 5] = 1.0
+    block = np.empty((BASIS_SIZE, BLOCK))
+    for first in range(0, len(taus), BLOCK):
+        count = min(BLOCK, len(taus) - first)
+        at = taus[first : first + count]
+        rotating_basis(damping, frequency, 0.0, at, block[COS], block[SIN])
+        for k in range(count):
+            block[ONE, k], block[TAU_COS, k], block[TAU_SIN, k] = (
+                1.0,
+                at[k] * block[COS, k],
+                at[k] * block[SIN, k],
+            )
+            swing = cosine * block[COS, k] + sine * block[SIN, k]
+            block[RESIDUAL, k] = values[first + k] - offset - swing
+        sum_products(block, count, moments, OSCILLATION)
+    system = np.zeros((6, 6))
+    combine(system, slopes, moments, np.empty(6), OSCILLATION)
+    return system
 
 
 @compiled

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.preparation.sums import cubic_weights, wave_amplitudes, windows
+from analysis.preparation.channels import Channel, detrended_noise
+from analysis.preparation.oscillation import damped_cosine
+from analysis.preparation.sums import cubic_weights, swing_equations, wave_amplitudes, windows
 
 RNG = np.random.default_rng(4)
 EVEN_S = 2e-3 * np.arange(700)
@@ -18,6 +20,16 @@ def test_windows_are_those_of_a_binary_search(time_s, half_s):
 
     assert (first == np.searchsorted(time_s, time_s - half_s)).all()
     assert (past == np.searchsorted(time_s, time_s + half_s, "right")).all()
+
+
+@GRIDS
+def test_the_equations_of_a_damped_cosine_are_products_of_its_derivatives(time_s):
+    parameters = np.array([0.3, 19.0, 2e-3, -1e-3, 3e-4])
+    readings = 1e-3 * RNG.standard_normal(len(time_s))
+    curve, columns = damped_cosine(parameters, time_s)
+    rows = np.vstack((columns, readings - curve))
+
+    assert swing_equations(parameters, time_s, readings) == pytest.approx(rows @ rows.T, rel=1e-9, abs=1e-14)
 
 
 @GRIDS
@@ -40,3 +52,16 @@ def test_a_cubic_is_met_by_its_neighbours(time_s):
     assert met == pytest.approx(cubic[2:-2], rel=1e-9)
     steps = np.diff(time_s)
     assert (widest_s[2:-2] == np.max([steps[k : len(steps) - 3 + k] for k in range(4)], axis=0)).all()
+
+
+@GRIDS
+def test_noise_about_lines_over_blocks_is_that_of_a_line_fitted_to_each(time_s):
+    """Blocks of under six readings are left out; so are the few of the last block here."""
+    channel, squares, freedom = Channel(time_s, 5.0 + time_s**2 + RNG.standard_normal(len(time_s))), 0.0, 0
+    for first_s in np.arange(time_s[0], time_s[-1], 0.011):
+        t, x = (part := channel.between(first_s, first_s + 0.011)).time_s, part.value_m
+        if len(t) >= 6:
+            squares += float(np.sum((x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])) ** 2))
+            freedom += len(t) - 2
+
+    assert detrended_noise(channel, 0.011) == pytest.approx(np.sqrt(squares / freedom), rel=1e-9)
