@@ -13,8 +13,8 @@ from app.cli.errors import CommandError
 from app.cli.option_values import checked_conditions, print_mass_overrides
 from app.cli.run_file_options import FileOptions, ImportOptions
 from app.runs.errors import RunError
-from app.runs.exchange.import_run import ImportedRun, free_path, import_csv
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.import_run import ImportedRun, free_path, import_foreign_file
+from app.runs.exchange.importing import ImportPlan
 from config.files import load_stand
 
 _HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
@@ -36,7 +36,7 @@ def import_record(options: ImportOptions) -> None:
         _import_many(files, plan, options, metadata)
 
 
-def _import_one(file: Path, plan: CsvImport, options: ImportOptions, metadata: dict[str, Any]) -> None:
+def _import_one(file: Path, plan: ImportPlan, options: ImportOptions, metadata: dict[str, Any]) -> None:
     if options.output.suffix != ".h5":
         raise CommandError(f"-o {options.output.name} does not end in .h5, as run files do. Rename it")
     output = out.output_file(options.output, options.force)
@@ -50,7 +50,7 @@ def _import_one(file: Path, plan: CsvImport, options: ImportOptions, metadata: d
 
 
 def _import_many(
-    files: list[Path], plan: CsvImport, options: ImportOptions, metadata: dict[str, Any]
+    files: list[Path], plan: ImportPlan, options: ImportOptions, metadata: dict[str, Any]
 ) -> None:
     """Import files into a folder; one that fails does not stop the rest."""
     folder = _folder(options.output)
@@ -77,10 +77,12 @@ def _import_many(
 
 
 def _import(
-    file: Path, plan: CsvImport, output: Path, replace: bool, metadata: dict[str, Any]
+    file: Path, plan: ImportPlan, output: Path, replace: bool, metadata: dict[str, Any]
 ) -> ImportedRun:
     with out.progress_bar(f"reading {file.name}", total=1.0) as update:
-        return import_csv(file, plan, output, load_stand(), replace=replace, report=update, **metadata)
+        return import_foreign_file(
+            file, plan, output, load_stand(), replace=replace, report=update, **metadata
+        )
 
 
 def _files(given: list[Path]) -> list[Path]:
@@ -139,7 +141,7 @@ def _row(run: ImportedRun) -> tuple[str, ...]:
     )
 
 
-def _plan(source: FileOptions) -> CsvImport:
+def _plan(source: FileOptions) -> ImportPlan:
     if source.relative is not None and source.plate is not None:
         raise CommandError("--relative and --plate are both gauge 2. Give one of them")
     if source.offset is not None and source.gain is None:
@@ -173,7 +175,7 @@ def _plan(source: FileOptions) -> CsvImport:
         "begun": _begun(source.begun),
     }
     try:
-        return msgspec.convert(fields, CsvImport)
+        return msgspec.convert(fields, ImportPlan)
     except msgspec.ValidationError:
         raise CommandError("the options do not fit together. See slipstand import --help") from None
 

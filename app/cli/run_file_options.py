@@ -10,7 +10,7 @@ from app.cli.shared_options import ConditionOptions, MassOptions
 
 @dataclass(frozen=True, kw_only=True)
 class FileOptions:
-    """How the file is read: the fields of `CsvImport` and of its layout."""
+    """How the file is read: the fields of `ImportPlan` and of its layout."""
 
     time: str | None = option(
         "--time", "Time column: its name or number, from 0; found by its name or kind if absent."

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import config
 from app.runs.errors import RunError
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.csv_reading import read_columns
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError
@@ -57,7 +57,7 @@ def hostile_texts(count: int, folder: Path, seed: int = 0) -> TextReport:
     kinds: list[tuple[str, bytes, Callable[[Path], object]]] = [
         ("stand.toml", (shipped / "stand.toml").read_bytes(), load_stand),
         ("gauges.toml", (shipped / "gauges.toml").read_bytes(), load_gauges),
-        ("record.csv", CSV.encode(), lambda path: read_columns(path, CsvOptions("0", "1", "2"))),
+        ("record.csv", CSV.encode(), lambda path: read_columns(path, FileLayout("0", "1", "2"))),
     ]
     report = TextReport()
     tracemalloc.start()

@@ -168,7 +168,7 @@ def _run_trace(overview: DecimatedRun) -> Trace:
 
 def preview_import(path: str, form: Form) -> ImportPreview:
     """Read a file as it would be imported; `form` is valid, also below."""
-    plan = csv_import(form)
+    plan = import_plan(form)
     unit, scale = form["unit_name"].strip() or "m", 1.0
     if unit == "m" and form["quantity"] == "displacement":
         unit, scale = "mm", 1e3
@@ -217,8 +217,8 @@ def _import(path: str, form: Form, folder: str, report: ReportProgress) -> impor
         "conditions": parse_conditions(form, dict(parse_pairs(form["other"]))),
     }
     try:
-        return import_run.import_csv(
-            Path(path), csv_import(form), target, load_stand(),
+        return import_run.import_foreign_file(
+            Path(path), import_plan(form), target, load_stand(),
             report=lambda share: report(Progress(text, share)), **metadata,
         )  # fmt: skip
     except SeriesError as error:
@@ -267,7 +267,7 @@ def survey_file(path: str, form: Form) -> recognition.FilePreview:
     return shared_reading_process().preview(Path(path), request)
 
 
-def csv_import(form: Form) -> importing.CsvImport:
+def import_plan(form: Form) -> importing.ImportPlan:
     """Request for the import, as `slipstand import` makes it."""
     number = {name: field.parse(form) for name, field in FIELDS.items() if field.rule}
     unit: dict[str, Any] = {"unit": form["unit"] or None}
@@ -300,7 +300,7 @@ def csv_import(form: Form) -> importing.CsvImport:
         "begun": parse_time(form["begun"]),
         **{name: number[name] for name in ("gain_uncertainty", "from_s", "until_s", "segment")},
     }
-    return convert(request, importing.CsvImport)
+    return convert(request, importing.ImportPlan)
 
 
 def _lines(form: Form) -> dict[str, Any]:

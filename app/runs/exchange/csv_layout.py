@@ -35,7 +35,7 @@ _HEAD_LINES = 1000
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
-class CsvOptions(msgspec.Struct, frozen=True):
+class FileLayout(msgspec.Struct, frozen=True):
     """What the user says of a file. A column is a name, or a number counted from 0."""
 
     time: str
@@ -140,7 +140,7 @@ class _Format(NamedTuple):
 _COMMAS, _DECIMAL_COMMAS = _Format(",", "."), _Format(" ", ",")
 
 
-def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
+def survey_csv(path: Path, layout: FileLayout) -> CsvText:
     """Read a text file as far as its first row. Raises ImportFileError.
 
     Lines above the names are left out. Where no names stand above the numbers, the last `#` line before them
@@ -208,7 +208,7 @@ def _kind(cell: str, decimal: str) -> str:
     return "s" if find_form(cell) else "x"
 
 
-def _head(file: TextFile, layout: CsvOptions) -> tuple[list[Line], list[Line], str]:
+def _head(file: TextFile, layout: FileLayout) -> tuple[list[Line], list[Line], str]:
     """First lines that count, comments among them, and the delimiter that a `sep=` line names."""
     lines: list[Line] = []
     comments: list[Line] = []
@@ -233,7 +233,7 @@ def _head(file: TextFile, layout: CsvOptions) -> tuple[list[Line], list[Line], s
 
 
 def _format(
-    path: Path, layout: CsvOptions, given: str | None, lines: Sequence[Line], sample: Sequence[str]
+    path: Path, layout: FileLayout, given: str | None, lines: Sequence[Line], sample: Sequence[str]
 ) -> _Format:
     """Delimiter and decimal sign that make most cells of most lines numbers."""
     decimals = _DECIMALS if layout.decimal is None else (layout.decimal,)
@@ -262,7 +262,7 @@ def _format(
     return best
 
 
-def _one_or_two(path: Path, layout: CsvOptions, lines: Sequence[Line], sample: Sequence[str]) -> _Format:
+def _one_or_two(path: Path, layout: FileLayout, lines: Sequence[Line], sample: Sequence[str]) -> _Format:
     """Format of rows such as `1,25` without times: one number where the line above them has no comma.
 
     Raises ImportFileError where none stands above.
@@ -292,7 +292,7 @@ def _score(form: _Format, sample: Sequence[str], least: int) -> int:
     return score
 
 
-def _no_numbers(path: Path, layout: CsvOptions, lines: Sequence[Line]) -> ImportFileError:
+def _no_numbers(path: Path, layout: FileLayout, lines: Sequence[Line]) -> ImportFileError:
     if layout.header and len(lines) < 2:
         return ImportFileError(
             "{path} holds a header but no line of data. Give a file with numbers", path=path
@@ -309,7 +309,7 @@ def _no_numbers(path: Path, layout: CsvOptions, lines: Sequence[Line]) -> Import
     )
 
 
-def _pattern(form: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
+def _pattern(form: _Format, sample: Sequence[str], layout: FileLayout) -> str:
     """Kinds of the cells of a row, as in most of the lines that have numbers."""
     rows = [form.kinds(line) for line in sample]
     rows = [kinds for kinds in rows if kinds.count("n") + kinds.count("s") >= layout.least_numbers]
@@ -319,7 +319,7 @@ def _pattern(form: _Format, sample: Sequence[str], layout: CsvOptions) -> str:
     )
 
 
-def _first_row(path: Path, layout: CsvOptions, form: _Format, lines: Sequence[Line], pattern: str) -> int:
+def _first_row(path: Path, layout: FileLayout, form: _Format, lines: Sequence[Line], pattern: str) -> int:
     """Index of the first line whose cells are those of rows."""
     if not layout.header:
         return 0
@@ -347,7 +347,7 @@ def _width(form: _Format, line: str) -> int:
 
 def _names(
     path: Path,
-    layout: CsvOptions,
+    layout: FileLayout,
     form: _Format,
     lines: Sequence[Line],
     first: int,

@@ -14,8 +14,8 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import DATE, TIME, ForeignColumns, ReportShare, cell_fault, find_columns
 from app.runs.exchange.csv_bulk import TextColumn, Values, parse_piece
 from app.runs.exchange.csv_layout import (
-    CsvOptions,
     CsvText,
+    FileLayout,
     is_data,
     is_number,
     split_quoted,
@@ -48,7 +48,7 @@ _ROWS_AT_ONCE = 1 << 17
 _SHOWN = 40  # characters of a footer in a note
 
 
-def read_columns(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> ForeignColumns:
+def read_columns(path: Path, layout: FileLayout, report: ReportShare = lambda _: None) -> ForeignColumns:
     """Read time and gauges from a text file. Raises ImportFileError, which names line and column.
 
     `report` is called with the share of the file that has been read.
@@ -68,7 +68,7 @@ class _CellError(MessageError):
 class _Reader:
     """Reads the wanted columns of one file."""
 
-    def __init__(self, source: CsvText, layout: CsvOptions) -> None:
+    def __init__(self, source: CsvText, layout: FileLayout) -> None:
         self._source = source
         self._layout = layout
         wanted = list(layout.wanted)

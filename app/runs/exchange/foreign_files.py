@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError, RunError, one_line
 from app.runs.exchange.columns import DATE, TIME, ForeignColumns, ReportShare, find_columns
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.csv_reading import read_columns
 from app.runs.exchange.formats import FORMATS, Format
 from app.runs.exchange.stamps import NS, no_date_beside, to_datetime, unwrap_times
@@ -27,7 +27,7 @@ _PIECE_BYTES = 1 << 22
 _UNPACKED_MOST_BYTES = 2 << 30
 
 
-def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> ForeignColumns:
+def read_foreign(path: Path, layout: FileLayout, report: ReportShare = lambda _: None) -> ForeignColumns:
     """Read columns of a file. Raises RunError. `report` gets the share that is done."""
     found = find_format(path)
     if found is None:
@@ -41,7 +41,7 @@ def read_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _:
     return columns
 
 
-def open_foreign(path: Path, layout: CsvOptions, report: ReportShare = lambda _: None) -> Table:
+def open_foreign(path: Path, layout: FileLayout, report: ReportShare = lambda _: None) -> Table:
     """Open a file that is no plain text. Raises RunError."""
     found = find_format(path)
     if found is None:
@@ -112,7 +112,7 @@ def find_format(path: Path) -> Format | None:
     return next((one for one in FORMATS if suffix in one.suffixes), None)
 
 
-def _open(found: Format, path: Path, layout: CsvOptions, report: ReportShare) -> Table:
+def _open(found: Format, path: Path, layout: FileLayout, report: ReportShare) -> Table:
     module: Any = importlib.import_module(f"app.runs.exchange.formats.{found.module}")
     table: Table = module.open_table(path, layout, report)
     return table
@@ -140,7 +140,7 @@ def _faults_named(path: Path, found: Format) -> Iterator[None]:
         ) from error
 
 
-def _check_layout(path: Path, found: Format, layout: CsvOptions) -> None:
+def _check_layout(path: Path, found: Format, layout: FileLayout) -> None:
     of_text = {"--delimiter": layout.delimiter, "--decimal": layout.decimal, "--encoding": layout.encoding}
     for name, value in of_text.items():
         if value is not None:
@@ -156,7 +156,7 @@ def _check_layout(path: Path, found: Format, layout: CsvOptions) -> None:
         )
 
 
-def _read(path: Path, table: Table, layout: CsvOptions, report: ReportShare) -> ForeignColumns:
+def _read(path: Path, table: Table, layout: FileLayout, report: ReportShare) -> ForeignColumns:
     wanted = list(layout.wanted)
     names = list(table.names)
     positions = find_columns(path, wanted, names, len(names))
@@ -204,7 +204,7 @@ def _stamped(time: NDArray[Any], date: NDArray[Any] | None, *, has_zone: bool) -
     return TimeAxis(time_s, start)
 
 
-def _own_axis(path: Path, table: Table, layout: CsvOptions, positions: list[int], rows: int) -> TimeAxis:
+def _own_axis(path: Path, table: Table, layout: FileLayout, positions: list[int], rows: int) -> TimeAxis:
     """Times of rows of the rate that is given, or those that the format keeps. Raises ImportFileError."""
     if layout.rate_hz is not None:
         return TimeAxis(np.arange(rows) / layout.rate_hz, is_even=True)

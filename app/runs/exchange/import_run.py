@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import find_releases
 from analysis.record import RecordError
-from app.runs.exchange.importing import CsvImport, ForeignRecord
+from app.runs.exchange.importing import ForeignRecord, ImportPlan
 from app.runs.exchange.reading_process import shared_reading_process
 from app.runs.exchange.storing import store_record
 from config.schema import Stand
@@ -43,9 +43,9 @@ class ImportedRun(msgspec.Struct, frozen=True):
     """What was concluded or left out."""
 
 
-def import_csv(
+def import_foreign_file(
     path: Path,
-    plan: CsvImport,
+    plan: ImportPlan,
     output: Path,
     stand: Stand,
     *,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.runs.blocks import RunBlock
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns, ReportShare
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
 from app.runs.exchange.rounded_times import even_times
@@ -42,10 +42,10 @@ _BLOCK_ROWS = 1 << 17
 _HASHED_BYTES = 1 << 22
 
 
-class CsvImport(msgspec.Struct, frozen=True):
+class ImportPlan(msgspec.Struct, frozen=True):
     """Which columns of a foreign file are what, and in which unit. A reading is `gain * cell + offset`."""
 
-    layout: CsvOptions
+    layout: FileLayout
     measures: Literal["relative", "plate"] = "relative"
     """What the second column is: plate against table, or plate against base."""
     time_unit: Literal["s", "ms", "us"] | None = None
@@ -119,7 +119,7 @@ class ForeignRecord:
 
 def read_record(
     path: Path,
-    plan: CsvImport,
+    plan: ImportPlan,
     report: ReportShare = lambda _: None,
     keep: Callable[[Floats], Floats] = lambda cells: cells,
 ) -> ForeignRecord:
@@ -138,7 +138,7 @@ def read_record(
 
 def _record(
     path: Path,
-    plan: CsvImport,
+    plan: ImportPlan,
     columns: ForeignColumns,
     report: ReportShare,
     keep: Callable[[Floats], Floats],
@@ -186,7 +186,7 @@ def _source(path: Path, report: ReportShare) -> SourceFile:
         return SourceFile(name=path.name, sha256=digest.hexdigest(), size_bytes=file.tell())
 
 
-def _with_time(path: Path, plan: CsvImport, report: ReportShare) -> CsvImport:
+def _with_time(path: Path, plan: ImportPlan, report: ReportShare) -> ImportPlan:
     """Plan with the time column that the names tell, where none is given. Raises ImportFileError."""
     layout = plan.layout
     if layout.rate_hz is not None or layout.time or has_own_time(path):
@@ -206,7 +206,7 @@ def _with_time(path: Path, plan: CsvImport, report: ReportShare) -> CsvImport:
     return msgspec.structs.replace(plan, layout=layout)
 
 
-def _time_unit_s(path: Path, plan: CsvImport, columns: ForeignColumns) -> float:
+def _time_unit_s(path: Path, plan: ImportPlan, columns: ForeignColumns) -> float:
     if columns.is_stamped or columns.is_even:
         return 1.0
     if plan.time_unit is not None:
@@ -230,7 +230,7 @@ def _time_unit_s(path: Path, plan: CsvImport, columns: ForeignColumns) -> float:
     return 1.0 if unit is None else unit.scale
 
 
-def _start(plan: CsvImport, columns: ForeignColumns) -> datetime.datetime | None:
+def _start(plan: ImportPlan, columns: ForeignColumns) -> datetime.datetime | None:
     """Time of the file's first row."""
     if plan.begun is not None:
         return plan.begun if plan.begun.tzinfo else plan.begun.astimezone()
@@ -244,7 +244,7 @@ def _start(plan: CsvImport, columns: ForeignColumns) -> datetime.datetime | None
     return epochs[0] + datetime.timedelta(seconds=first_s) if epochs else None
 
 
-def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
+def _even_out(columns: ForeignColumns, plan: ImportPlan) -> None:
     """Replace stamps that a logger has rounded, so that some repeat, by even ones."""
     if columns.is_even or plan.segment is not None:
         return
@@ -259,7 +259,7 @@ def _even_out(columns: ForeignColumns, plan: CsvImport) -> None:
     columns.notes.append(message(note, resolution=even.resolution, rate=1.0 / even.interval))
 
 
-def check_plan(plan: CsvImport) -> None:
+def check_plan(plan: ImportPlan) -> None:
     """Refuse options that do not fit together, and numbers that cannot be. Raises ImportFileError."""
     _check_exclusions(plan)
     gain = 1.0 if plan.gain is None else plan.gain
@@ -280,7 +280,7 @@ def check_plan(plan: CsvImport) -> None:
         raise ImportFileError(template, option=option("--rate"), value=rate_hz)
 
 
-def _check_exclusions(plan: CsvImport) -> None:
+def _check_exclusions(plan: ImportPlan) -> None:
     if plan.gain is not None and plan.unit is not None:
         template = N_(
             "{unit_option} and {gain_option} exclude each other: a gain says the unit. Give one of them"
@@ -298,7 +298,7 @@ def _check_exclusions(plan: CsvImport) -> None:
         raise ImportFileError(template, time_option=option("--time"), rate_option=option("--rate"))
 
 
-def _gauge(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) -> Gauge:
+def _gauge(path: Path, plan: ImportPlan, columns: ForeignColumns, number: int) -> Gauge:
     """Calibration that turns cells of a column into readings. Raises ImportFileError."""
     gain = plan.gain
     if gain is None:
@@ -310,7 +310,7 @@ def _gauge(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) ->
     )
 
 
-def _named_gain(path: Path, plan: CsvImport, columns: ForeignColumns, number: int) -> float:
+def _named_gain(path: Path, plan: ImportPlan, columns: ForeignColumns, number: int) -> float:
     """Gain by the unit that the file names. Raises ImportFileError for one of something else."""
     name, named = columns.names[1 + number], columns.units[1 + number]
     unit = parse_unit(named) if named else None
@@ -344,7 +344,7 @@ def _named_gain(path: Path, plan: CsvImport, columns: ForeignColumns, number: in
     return unit.scale
 
 
-def _check_span(path: Path, plan: CsvImport, time_s: Floats) -> None:
+def _check_span(path: Path, plan: ImportPlan, time_s: Floats) -> None:
     with np.errstate(over="ignore"):
         is_too_long = not float(time_s[-1]) - float(time_s[0]) <= _LONGEST_S
     if is_too_long:
@@ -361,7 +361,7 @@ def _check_span(path: Path, plan: CsvImport, time_s: Floats) -> None:
         )
 
 
-def _checked_size(path: Path, plan: CsvImport, gauge: Gauge, cells: Floats) -> Floats:
+def _checked_size(path: Path, plan: ImportPlan, gauge: Gauge, cells: Floats) -> Floats:
     """Cells whose readings are finite. Raises ImportFileError."""
     low, high = float(np.fmin.reduce(cells)), float(np.fmax.reduce(cells))
     if any(math.isinf(gauge.gain_m_per_count * (cell - gauge.zero_count)) for cell in (low, high)):
@@ -370,7 +370,7 @@ def _checked_size(path: Path, plan: CsvImport, gauge: Gauge, cells: Floats) -> F
     return cells
 
 
-def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
+def _kept(columns: ForeignColumns, plan: ImportPlan) -> slice:
     """Rows of the segment and stretch that were asked for, their times rising. Raises ImportFileError."""
     time = columns.time
     segment = _segment(columns, plan.segment)

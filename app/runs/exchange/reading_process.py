@@ -24,7 +24,14 @@ from app.child_process import START_S, CommandReader, EventSender, RequestProces
 from app.log import start_log
 from app.runs.errors import ExtraMissingError, ImportFileError, RunError
 from app.runs.exchange.foreign_files import find_format
-from app.runs.exchange.importing import CsvImport, Floats, ForeignRecord, RecordFacts, check_plan, read_record
+from app.runs.exchange.importing import (
+    Floats,
+    ForeignRecord,
+    ImportPlan,
+    RecordFacts,
+    check_plan,
+    read_record,
+)
 from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 from messages.i18n import N_
 from messages.message import Message, Option, Value
@@ -43,7 +50,7 @@ class ReadRequest(msgspec.Struct, frozen=True, tag=True):
     """Read a record into files `0.npy` (time) and `1.npy`, `2.npy` (cells) of a folder."""
 
     path: str
-    plan: CsvImport
+    plan: ImportPlan
     folder: str
 
 
@@ -100,7 +107,7 @@ class ReadingProcess:
 
     @contextlib.contextmanager
     def read(
-        self, path: Path, plan: CsvImport, report: Callable[[float], object] = lambda _: None
+        self, path: Path, plan: ImportPlan, report: Callable[[float], object] = lambda _: None
     ) -> Iterator[ForeignRecord]:
         """Read a file as `importing.read_record` does; its arrays hold until the context ends.
 

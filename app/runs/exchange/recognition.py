@@ -10,7 +10,7 @@ import msgspec
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.csv_layout import CsvOptions, CsvText, is_number, survey_csv
+from app.runs.exchange.csv_layout import CsvText, FileLayout, is_number, survey_csv
 from app.runs.exchange.foreign_files import is_csv, open_foreign, unpacked
 from app.runs.exchange.stamps import find_form, has_date, has_time
 from app.runs.exchange.units import parse_unit
@@ -41,7 +41,7 @@ class FilePreview:
     """What is in a file."""
 
     columns: tuple[str, ...]
-    """As `CsvOptions` asks for them: by name, by number where a name is missing or comes twice."""
+    """As `FileLayout` asks for them: by name, by number where a name is missing or comes twice."""
     titles: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     """Cells of the first lines of a text; none of other files."""
@@ -63,7 +63,7 @@ class FilePreview:
 def preview_file(
     path: Path, given: ParseOptions | None = None, report: ReportShare = lambda _: None
 ) -> FilePreview:
-    """Look into a file that `import_csv` can read. Raises ImportFileError, ExtraMissingError."""
+    """Look into a file that `import_foreign_file` can read. Raises ImportFileError, ExtraMissingError."""
     with unpacked(path, report) as plain:
         return _preview(plain, given or ParseOptions(), report)
 
@@ -72,7 +72,7 @@ def _preview(path: Path, given: ParseOptions, report: ReportShare) -> FilePrevie
     if is_csv(path):
         return _survey_text(path, given)
     has_header = given.header is not False
-    table = open_foreign(path, CsvOptions("", "", skip=given.skip, header=has_header), report)
+    table = open_foreign(path, FileLayout("", "", skip=given.skip, header=has_header), report)
     options = ParseOptions(skip=given.skip, header=has_header)
     units = [table.unit(at) for at in range(len(table.names))]
     return _recognise(_Columns(table.names, units, table.first_rows, table.has_axis), options)
@@ -113,7 +113,7 @@ def _survey_text(path: Path, given: ParseOptions) -> FilePreview:
     """Read with the given options, and else with names above the numbers, if there are any."""
     faults = []
     for header in (True, False) if given.header is None else (given.header,):
-        layout = CsvOptions(
+        layout = FileLayout(
             "", "", None, given.delimiter, given.decimal, given.skip, header, encoding=given.encoding
         )
         try:

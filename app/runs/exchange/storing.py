@@ -11,7 +11,7 @@ from analysis.preparation.channels import SAMPLES_MIN
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.importing import CsvImport, ForeignRecord
+from app.runs.exchange.importing import ForeignRecord, ImportPlan
 from app.runs.metadata import IMPORT_PROTOCOL, QUANTITY_UNITS, EndMetadata, create_metadata
 from app.runs.writer import write_run
 from config.schema import Gauges, Stand
@@ -22,7 +22,7 @@ from drivers.samples import DeviceIdentity, Losses
 def store_record(
     path: Path,
     record: ForeignRecord,
-    plan: CsvImport,
+    plan: ImportPlan,
     output: Path,
     stand: Stand,
     *,

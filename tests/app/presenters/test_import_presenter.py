@@ -11,7 +11,7 @@ from app.presenters.base import TaskFailure, Tone
 from app.presenters.runs.import_form import FIELDS, GAIN, Form, make_form, validate
 from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
-from app.presenters.runs.tasks import csv_import, import_file, import_files, preview_import, survey_file
+from app.presenters.runs.tasks import import_file, import_files, import_plan, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
 from app.runs.exchange.recognition import FilePreview, ParseOptions
 from app.runs.reader import open_run
@@ -271,14 +271,14 @@ POSITIVE = "is no number above 0. Write one in kg, or leave it empty"
 
 
 def test_what_is_left_empty_is_not_stated(path: Path) -> None:
-    request = csv_import(filled(path))
+    request = import_plan(filled(path))
     assert (request.gain, request.gain_uncertainty, request.from_s, request.segment) == (
         None,
         None,
         None,
         None,
     )
-    assert csv_import(filled(path, unit=GAIN)).gain == 1.0
+    assert import_plan(filled(path, unit=GAIN)).gain == 1.0
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import Table
 
 _VERSION_MIN = 5010  # number of the format from which on the data stand channel after channel
@@ -60,7 +60,7 @@ class _Reader:
             return data.decode("cp1252", "replace").strip("\0 ")
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Channels by their names, the times among them. Raises ImportFileError."""
     with path.open("rb") as file:
         reader = _Reader(path, file)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare, cell_fault
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.stamps import (
     StampColumn,
     StampError,
@@ -40,7 +40,7 @@ _MICROSECOND, _NO_OFFSET = datetime.timedelta(microseconds=1), datetime.timedelt
 _MIDNIGHT = datetime.datetime(1970, 1, 1)  # noqa: DTZ001 - a time of day counts from it
 
 
-def open_table(path: Path, layout: CsvOptions, report: ReportShare) -> Table:
+def open_table(path: Path, layout: FileLayout, report: ReportShare) -> Table:
     """Columns of the first sheet that has those asked for. Raises ImportFileError, ExtraMissingError."""
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > LARGEST_BYTES:
@@ -64,7 +64,7 @@ class _Sheet:
 class _Reader:
     """Reads the rows of a sheet when the first column is asked for."""
 
-    def __init__(self, path: Path, sheet: _Sheet, layout: CsvOptions, report: ReportShare) -> None:
+    def __init__(self, path: Path, sheet: _Sheet, layout: FileLayout, report: ReportShare) -> None:
         self._path = path
         self._sheet = sheet
         self._layout = layout
@@ -154,7 +154,7 @@ def _rows(sheet: Any, first_row: int) -> Iterator[_Row]:
     return rows
 
 
-def _find_sheet(path: Path, book: Any, layout: CsvOptions) -> _Sheet:
+def _find_sheet(path: Path, book: Any, layout: FileLayout) -> _Sheet:
     """The first sheet that has the columns, else the first one with rows. Raises ImportFileError."""
     sheets = [found for sheet in book.worksheets if (found := _open_sheet(sheet, layout)) is not None]
     if not sheets:
@@ -164,7 +164,7 @@ def _find_sheet(path: Path, book: Any, layout: CsvOptions) -> _Sheet:
     return next((sheet for sheet in sheets if wanted <= set(sheet.names)), sheets[0])
 
 
-def _open_sheet(sheet: Any, layout: CsvOptions) -> _Sheet | None:
+def _open_sheet(sheet: Any, layout: FileLayout) -> _Sheet | None:
     """Names and units of a sheet; None of one without rows."""
     rows = _rows(sheet, layout.skip + 1)
     header = next(rows, ()) if layout.header else ()

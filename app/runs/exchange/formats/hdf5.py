@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import Table
 
 COLUMNS_MOST = 256
@@ -28,7 +28,7 @@ class _Column(NamedTuple):
     read: Callable[[h5py.File], NDArray[Any]]
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Datasets by their paths, columns of a matrix as `path:0`, fields of a compound as `path.field`."""
     with h5py.File(path, "r", locking=False) as file:
         if "slipstand_schema" in file.attrs:

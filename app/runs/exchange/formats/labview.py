@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import Table, TimeAxis, even_axis
 
 _HEADER_LINES = 1000
 _ROWS = 100_000  # read at once
 
 
-def open_table(path: Path, _layout: CsvOptions, report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, report: ReportShare) -> Table:
     """Channels of the first segment by their names, with its time column or its `Delta_X`."""
     file = _File(path, report)
     segment, count = file.segment, file.channels

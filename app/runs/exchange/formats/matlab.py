@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.formats.hdf5 import COLUMNS_MOST, open_matlab
 from app.runs.exchange.tables import LARGEST_BYTES, Table
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
     from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
 

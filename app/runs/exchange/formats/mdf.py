@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import Table, TimeAxis
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Channels by their names, with the times of their master."""
     file = import_optional("asammdf", "MDF").MDF(path)
     start: datetime.datetime | None = file.header.start_time

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import LARGEST_BYTES, SHOWN_ROWS, Table
 from messages.i18n import N_
 
 
-def open_table(path: Path, layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, layout: FileLayout, _report: ReportShare) -> Table:
     """Columns by their names; timestamps are date-times. Raises ImportFileError, ExtraMissingError."""
     file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
     names = list(file.schema_arrow.names)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.stamps import to_datetime
 from app.runs.exchange.tables import Table, TimeAxis, even_axis
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Channels as `group/channel`, by the channel alone where one group has it; times of their waveform."""
     module = import_optional("nptdms", "TDMS")
     with module.TdmsFile.open(path) as file:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.exchange.columns import ReportShare
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.tables import Table, TimeAxis, even_axis
 
 
-def open_table(path: Path, _layout: CsvOptions, _report: ReportShare) -> Table:
+def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Channels by their numbers from 0; a cell of 1 is full scale."""
     from scipy.io import wavfile  # a third of a second that only this format needs
 

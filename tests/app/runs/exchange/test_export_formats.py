@@ -19,11 +19,11 @@ from app.runs.analysis_input import to_record
 from app.runs.blocks import BlockLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.export_formats import FORMATS, csv_cell
 from app.runs.exchange.exporting import ExportRequest, export_runs, write_exported_run
-from app.runs.exchange.import_run import import_csv
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.import_run import import_foreign_file
+from app.runs.exchange.importing import ImportPlan
 from app.runs.reader import open_run
 from app.runs.saved_analyses import inputs_hash, save_analysis
 from app.runs.writer import write_run
@@ -129,8 +129,8 @@ def test_latex_shows_value_and_uncertainty_to_the_same_digit(run):
 @pytest.mark.parametrize("name", ["csv", "parquet", "mat", "xlsx"])
 def test_what_is_exported_imports_to_the_same_record(run, name):
     path = exported_file(run, name)
-    import_csv(
-        path, CsvImport(CsvOptions(*CHANNELS)), run.path.parent / "again.h5", load_stand(), series="1FFM1"
+    import_foreign_file(
+        path, ImportPlan(FileLayout(*CHANNELS)), run.path.parent / "again.h5", load_stand(), series="1FFM1"
     )
     again, before = (to_record(open_run(p, trusted=True)) for p in (run.path.parent / "again.h5", run.path))
     assert again.time_s.tobytes() == (before.time_s - before.time_s[0]).tobytes()
@@ -227,17 +227,19 @@ def test_a_format_that_cannot_hold_it_says_so(run, name, content):
 @pytest.mark.parametrize(
     ("suffix", "layout", "said"),
     [
-        (".parquet", CsvOptions("time_s", "nix"), "no column 'nix'"),
-        (".mat", CsvOptions("time_s", "units.time_s"), "no column 'units.time_s'"),
-        (".xlsx", CsvOptions("value", "quantity"), "is not a number"),
-        (".parquet", CsvOptions("time_s", "status", decimal=","), "--decimal"),
-        (".mat", CsvOptions("time_s", "status", skip=2), "--skip"),
+        (".parquet", FileLayout("time_s", "nix"), "no column 'nix'"),
+        (".mat", FileLayout("time_s", "units.time_s"), "no column 'units.time_s'"),
+        (".xlsx", FileLayout("value", "quantity"), "is not a number"),
+        (".parquet", FileLayout("time_s", "status", decimal=","), "--decimal"),
+        (".mat", FileLayout("time_s", "status", skip=2), "--skip"),
     ],
 )
 def test_a_wrong_column_is_named(run, suffix, layout, said):
     name = {".parquet": "parquet", ".mat": "mat", ".xlsx": "xlsx"}[suffix]
     with pytest.raises(ImportFileError, match=said):
-        import_csv(exported_file(run, name), CsvImport(layout), run.path.parent / "x.h5", load_stand())
+        import_foreign_file(
+            exported_file(run, name), ImportPlan(layout), run.path.parent / "x.h5", load_stand()
+        )
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".mat", ".xlsx"])
@@ -246,7 +248,7 @@ def test_rubbish_is_one_line(tmp_path, suffix, content):
     path = tmp_path / f"bad{suffix}"
     path.write_bytes(content)
     with pytest.raises(ImportFileError, match=r"bad\.") as caught:
-        import_csv(path, CsvImport(CsvOptions("0", "1")), tmp_path / "x.h5", load_stand())
+        import_foreign_file(path, ImportPlan(FileLayout("0", "1")), tmp_path / "x.h5", load_stand())
     assert "\n" not in str(caught.value)
 
 

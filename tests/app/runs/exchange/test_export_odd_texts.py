@@ -8,10 +8,10 @@ import pyuff
 from runs_kit import text_file
 
 from app.runs.edits import edit_run
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.exporting import ExportRequest, export_runs
-from app.runs.exchange.import_run import import_csv
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.import_run import import_foreign_file
+from app.runs.exchange.importing import ImportPlan
 from config.files import load_stand
 
 FORMATS = ("csv", "json", "parquet", "mat", "uff58", "xlsx")
@@ -22,8 +22,8 @@ pytestmark = pytest.mark.usefixtures("short_records")
 
 def _imported(folder, unit_name="m"):
     record = text_file(folder, "t,u\n0,1\n1,2\n2,3\n")
-    plan = CsvImport(CsvOptions("t", "u"), gain=1.0, unit_name=unit_name)
-    import_csv(record, plan, folder / "run.h5", load_stand())
+    plan = ImportPlan(FileLayout("t", "u"), gain=1.0, unit_name=unit_name)
+    import_foreign_file(record, plan, folder / "run.h5", load_stand())
     return folder / "run.h5"
 
 

@@ -5,10 +5,10 @@ from runs_kit import ENDING, block
 from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.exporting import write_exported_run
-from app.runs.exchange.import_run import import_csv
-from app.runs.exchange.importing import CsvImport
+from app.runs.exchange.import_run import import_foreign_file
+from app.runs.exchange.importing import ImportPlan
 from app.runs.reader import open_run
 from app.runs.writer import write_run
 from config.files import load_stand
@@ -25,8 +25,10 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     run = open_run(tmp_path / "run.h5", trusted=True)
 
     write_exported_run("csv", ExportedRun(run, None, sample_columns(run)), tmp_path / "run.csv")
-    layout = CsvOptions("time_s", "table_displacement_m", "relative_displacement_m")
-    import_csv(tmp_path / "run.csv", CsvImport(layout), tmp_path / "again.h5", load_stand(), series="1FFM1")
+    layout = FileLayout("time_s", "table_displacement_m", "relative_displacement_m")
+    import_foreign_file(
+        tmp_path / "run.csv", ImportPlan(layout), tmp_path / "again.h5", load_stand(), series="1FFM1"
+    )
     again = to_record(open_run(tmp_path / "again.h5", trusted=True))
 
     record = to_record(run)

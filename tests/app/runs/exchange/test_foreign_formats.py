@@ -16,9 +16,9 @@ import pytest
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange import reading_process
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.foreign_files import open_foreign
-from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.importing import ImportPlan, read_record
 from app.runs.exchange.reading_process import ReadingProcess, shared_reading_process
 from app.runs.exchange.recognition import ParseOptions, preview_file
 
@@ -112,13 +112,13 @@ def write_gzip(path):
 ROUNDED = {"labview.lvm": 1e-16}
 """Formats of decimal digits, of which lvmio writes seventeen behind the point."""
 FORMATS = {
-    "matlab.mat": (write_matlab_73, CsvOptions("t", "both:0", "both:1"), 1.0, None),
-    "labview.tdms": (write_tdms, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
-    "labview.lvm": (write_lvm, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
-    "bench.uff": (write_universal, CsvOptions("", "u1", "rel"), 1e-3, None),
-    "vehicle.mf4": (write_mdf, CsvOptions("", "u1", "rel"), 1e-3, BEGUN),
-    "laboratory.hdf5": (write_hdf5, CsvOptions("raw/t", "raw/u1", "raw/more.rel"), 1e-3, None),
-    "packed.csv.gz": (write_gzip, CsvOptions("t", "u1 [mm]", "rel"), 1e-3, None),
+    "matlab.mat": (write_matlab_73, FileLayout("t", "both:0", "both:1"), 1.0, None),
+    "labview.tdms": (write_tdms, FileLayout("", "u1", "rel"), 1e-3, BEGUN),
+    "labview.lvm": (write_lvm, FileLayout("", "u1", "rel"), 1e-3, BEGUN),
+    "bench.uff": (write_universal, FileLayout("", "u1", "rel"), 1e-3, None),
+    "vehicle.mf4": (write_mdf, FileLayout("", "u1", "rel"), 1e-3, BEGUN),
+    "laboratory.hdf5": (write_hdf5, FileLayout("raw/t", "raw/u1", "raw/more.rel"), 1e-3, None),
+    "packed.csv.gz": (write_gzip, FileLayout("t", "u1 [mm]", "rel"), 1e-3, None),
 }
 
 
@@ -127,7 +127,7 @@ def test_a_file_of_another_program_is_read_to_the_last_bit(tmp_path, name):
     write, layout, unit_m, start = FORMATS[name]
     path = tmp_path / name
     write(path)
-    with shared_reading_process().read(path, CsvImport(layout)) as record:
+    with shared_reading_process().read(path, ImportPlan(layout)) as record:
         for cells, written in zip(record.cells, (TABLE, RELATIVE), strict=True):
             assert np.abs(cells - written).max() <= ROUNDED.get(name, 0.0)
         assert record.time_s == pytest.approx(TIME_S, abs=1e-12)
@@ -172,7 +172,7 @@ LATE_STAMPS = [LATE + datetime.timedelta(seconds=row / 4) for row in range(60)]
 def test_a_workbook_has_times_in_many_forms(tmp_path, names, cells, start):
     path = tmp_path / "log.xlsx"
     write_workbook(path, [[*names, "u1"], *([*cell, row] for row, cell in enumerate(cells))])
-    plan = CsvImport(CsvOptions("t", "u1", date="Date" if "Date" in names else None))
+    plan = ImportPlan(FileLayout("t", "u1", date="Date" if "Date" in names else None))
     with shared_reading_process().read(path, plan) as record:
         assert record.time_s == pytest.approx(np.arange(60) / 4, abs=1e-9)
         assert record.facts.start == start
@@ -189,7 +189,7 @@ def test_a_workbook_is_read_whole_with_marks_and_progress(tmp_path):
         for name in given.namelist():
             made.writestr(name, given.read(name).replace(b'<dimension ref="A1:B62"', b'<dimension ref="A1"'))
     shares = []
-    record = read_record(path, CsvImport(CsvOptions("t", "u1", missing=("ovl", "-9999"))), shares.append)
+    record = read_record(path, ImportPlan(FileLayout("t", "u1", missing=("ovl", "-9999"))), shares.append)
     assert np.isnan(record.cells[0][:3]).all()
     assert list(record.cells[0][3:]) == list(range(3, 60))
     assert record.facts.gauges[0].gain_m_per_count == 1e-3
@@ -207,8 +207,8 @@ def test_a_look_into_a_large_file_shows_progress(tmp_path, monkeypatch):
         preview_file(path, report=shares.append)
         assert len(shares) > 2
     named, found = [], []
-    read_record(book, CsvImport(CsvOptions("t", "u1 [mm]")), named.append)
-    read_record(book, CsvImport(CsvOptions("", "u1 [mm]")), found.append)
+    read_record(book, ImportPlan(FileLayout("t", "u1 [mm]")), named.append)
+    read_record(book, ImportPlan(FileLayout("", "u1 [mm]")), found.append)
     assert len(found) > len(named) + 2
 
 
@@ -233,7 +233,7 @@ def test_units_and_times_are_found_in_the_names_of_any_format(tmp_path, suffix):
             file["at first"] = -np.arange(60.0)
             for name, values in columns.items():
                 file[name] = values
-    with shared_reading_process().read(path, CsvImport(CsvOptions("", list(columns)[1]))) as record:
+    with shared_reading_process().read(path, ImportPlan(FileLayout("", list(columns)[1]))) as record:
         assert record.time_s == pytest.approx(1e-3 * np.arange(60))
         assert record.facts.gauges[0].gain_m_per_count == 1e-3
 
@@ -244,7 +244,7 @@ def test_date_times_of_a_table_are_its_times_whatever_their_name(tmp_path, monke
     index = pandas.date_range("2025-11-23 14:03:07", periods=60, freq="2ms", tz="UTC")
     path = tmp_path / "frame.parquet"
     pandas.DataFrame({"u1 [mm]": np.arange(60.0)}, index=index).to_parquet(path)
-    record = read_record(path, CsvImport(CsvOptions("", "u1 [mm]")))
+    record = read_record(path, ImportPlan(FileLayout("", "u1 [mm]")))
     assert record.facts.start == datetime.datetime(2025, 11, 23, 14, 3, 7, tzinfo=datetime.UTC)
     assert shared_reading_process().preview(path, ParseOptions()).rows[1][0] == "1.0"
 
@@ -260,7 +260,7 @@ def test_a_channel_of_date_times_is_utc_in_tdms(tmp_path, monkeypatch):
     monkeypatch.setenv("TZ", "Asia/Tokyo")
     time.tzset()
     try:
-        record = read_record(path, CsvImport(CsvOptions("", "u1")))
+        record = read_record(path, ImportPlan(FileLayout("", "u1")))
     finally:
         monkeypatch.undo()
         time.tzset()
@@ -278,7 +278,7 @@ def test_a_pickle_beside_a_labview_file_is_not_loaded(tmp_path):
     write_lvm(tmp_path / "bench.lvm")
     (tmp_path / "bench.lvm.pkl").write_bytes(pickle.dumps(Harmful()))
     os.utime(tmp_path / "bench.lvm.pkl", (2e9, 2e9))
-    with shared_reading_process().read(tmp_path / "bench.lvm", CsvImport(CsvOptions("", "u1"))) as record:
+    with shared_reading_process().read(tmp_path / "bench.lvm", ImportPlan(FileLayout("", "u1"))) as record:
         assert len(record) == ROWS
     assert not (tmp_path / "harm").exists()
 
@@ -296,7 +296,7 @@ def test_the_first_segment_of_a_labview_file_is_read_in_parts_to_its_end(tmp_pat
     path.write_text("".join([*lines[: first + ROWS], "\n", *second]))
     monkeypatch.setattr("app.runs.exchange.formats.labview._ROWS", 50)
     shares = []
-    record = read_record(path, CsvImport(CsvOptions("", "u1", "rel")), shares.append)
+    record = read_record(path, ImportPlan(FileLayout("", "u1", "rel")), shares.append)
     assert len(record) == ROWS
     assert np.abs(record.cells[0] - TABLE).max() < 1e-14
     assert np.flatnonzero(np.isnan(record.cells[1])).tolist() == [20]
@@ -320,7 +320,7 @@ def test_a_labview_file_may_have_decimal_commas(tmp_path):
     for is_whole in (True, False):
         if not is_whole:
             path.write_text("\n".join([*rows[:-1], rows[-1].replace(rows[-1].split("\t")[-1], ""), ""]))
-        record = read_record(path, CsvImport(CsvOptions("", "u1", "rel")))
+        record = read_record(path, ImportPlan(FileLayout("", "u1", "rel")))
         assert np.abs(record.cells[0] - TABLE).max() < 1e-14
         assert np.abs(record.cells[1][:-1] - RELATIVE[:-1]).max() < 1e-14
         assert np.isnan(record.cells[1][-1]) != is_whole
@@ -332,10 +332,10 @@ def test_options_of_texts_are_refused_for_other_files(tmp_path):
     path = tmp_path / "log.xlsx"
     write_workbook(path, [["t", "u1"], *([row, row] for row in range(60))])
     assert (
-        fault_of(path, CsvOptions("t", "u1", encoding="cp1251"))
+        fault_of(path, FileLayout("t", "u1", encoding="cp1251"))
         == "log.xlsx is no text: leave out --encoding"
     )
-    with_dates = fault_of(path, CsvOptions("t", "u1", date="1"))
+    with_dates = fault_of(path, FileLayout("t", "u1", date="1"))
     assert "is given for" in with_dates
 
 
@@ -350,7 +350,7 @@ def test_rows_are_channels_where_a_matrix_has_too_many_columns(tmp_path, name):
     else:
         with h5py.File(path, "w") as file:
             file["x"] = wide
-    with shared_reading_process().read(path, CsvImport(CsvOptions("x:0", "x:1"))) as record:
+    with shared_reading_process().read(path, ImportPlan(FileLayout("x:0", "x:1"))) as record:
         assert np.array_equal(record.time_s, wide[0])
         assert np.array_equal(record.cells[0], wide[1])
 
@@ -361,17 +361,17 @@ def test_a_sound_file_is_full_scale_times_a_gain(tmp_path):
     path = tmp_path / "recorder.wav"
     counts = np.round(TABLE / 12.0 * 32767).astype(np.int16)
     wavfile.write(path, int(RATE_HZ), np.column_stack([counts, -counts]))
-    plan = CsvImport(CsvOptions("", "channel 0", "channel 1"), gain=0.01)
+    plan = ImportPlan(FileLayout("", "channel 0", "channel 1"), gain=0.01)
     with shared_reading_process().read(path, plan) as record:
         assert np.array_equal(record.cells[0], counts / 32768.0)
         assert record.block.readings[:, 1] == pytest.approx(-0.01 * counts / 32768.0)
         assert record.facts.rate_hz == pytest.approx(RATE_HZ)
-    assert "what one full scale means is not known. Add --gain" in fault_of(path, CsvOptions("", "0"))
+    assert "what one full scale means is not known. Add --gain" in fault_of(path, FileLayout("", "0"))
 
 
 def fault_of(path, layout):
     """Text of the error that a file is refused with."""
-    with pytest.raises(ImportFileError) as caught, shared_reading_process().read(path, CsvImport(layout)):
+    with pytest.raises(ImportFileError) as caught, shared_reading_process().read(path, ImportPlan(layout)):
         pass
     return str(caught.value)
 
@@ -407,7 +407,7 @@ CATMAN = [("Time  1 - default", "s", TIME_S, 0), ("Tisch", "mm", TABLE, 1), ("Pl
 def test_a_catman_file_is_read_in_all_its_widths(tmp_path):
     path = tmp_path / "old.bin"
     path.write_bytes(catman_file(CATMAN))
-    plan = CsvImport(CsvOptions("", "Tisch", "Platte"))
+    plan = ImportPlan(FileLayout("", "Tisch", "Platte"))
     with shared_reading_process().read(path, plan) as record:
         assert np.array_equal(record.cells[0], TABLE.astype(np.float32))
         step = np.ptp(RELATIVE) / 32767
@@ -426,13 +426,13 @@ CATMAN_FILES = Path(__file__).parent / "catman"
 def test_files_of_catman_hold_what_apread_reads_of_them(tmp_path, name, channels):
     path = tmp_path / name.removesuffix(".gz")
     path.write_bytes(gzip.decompress((CATMAN_FILES / name).read_bytes()))
-    table = open_foreign(path, CsvOptions("", ""))
+    table = open_foreign(path, FileLayout("", ""))
     found = {}
     for at, (channel, unit) in enumerate(zip(table.names, table.units, strict=True)):
         values = np.asarray(table.column(at), "<f8")
         found[channel] = [unit, values[0], hashlib.sha256(values).hexdigest()]
     assert found == channels
-    plan = CsvImport(CsvOptions("", "Baumer encoder 2500", "poti5k"), gain=1e-3)
+    plan = ImportPlan(FileLayout("", "Baumer encoder 2500", "poti5k"), gain=1e-3)
     with shared_reading_process().read(CATMAN_FILES / name, plan) as record:
         assert len(record) == 100
         assert record.facts.rate_hz == pytest.approx(300.0, rel=1e-3)  # a step of two bytes is 10 us
@@ -444,7 +444,7 @@ def test_apread_reads_the_same_of_a_catman_file(tmp_path):
     path = tmp_path / "old.bin"
     path.write_bytes(catman_file(CATMAN))
     channels = {channel.Name: channel.data for channel in apread.APReader(str(path)).Channels}
-    with shared_reading_process().read(path, CsvImport(CsvOptions("", "Tisch", "Platte"))) as record:
+    with shared_reading_process().read(path, ImportPlan(FileLayout("", "Tisch", "Platte"))) as record:
         assert np.array_equal(channels["Tisch"], record.cells[0])
         assert np.array_equal(channels["Platte"], record.cells[1])
 
@@ -477,7 +477,7 @@ def huge_hdf5(folder: Path) -> bytes:
 def read_or_fault(path, layout):
     """Name and text of the fault of a file, or its name where it can be read in spite of all."""
     try:
-        with shared_reading_process().read(path, CsvImport(layout)) as record:
+        with shared_reading_process().read(path, ImportPlan(layout)) as record:
             assert len(record) <= ROWS
             return path.name
     except ImportFileError as error:
@@ -488,16 +488,16 @@ def test_every_hostile_file_is_one_line_and_the_next_file_is_read(tmp_path):
     sound = tmp_path / "sound.csv.gz"
     write_gzip(sound)
     layouts = {Path(name).suffix: layout for name, (_, layout, *_) in FORMATS.items()}
-    layouts[".bin"] = CsvOptions("", "Tisch", "Platte")
+    layouts[".bin"] = FileLayout("", "Tisch", "Platte")
     for name, data in hostile_files(tmp_path).items():
         path = tmp_path / name
         path.write_bytes(data)
-        layout = layouts.get(path.suffix, CsvOptions("t", "u1"))
+        layout = layouts.get(path.suffix, FileLayout("t", "u1"))
         said = read_or_fault(path, layout)
         assert said.count("\n") == 0, name
         assert len(said) < 600, name
         assert path.name in said, name
-        with shared_reading_process().read(sound, CsvImport(CsvOptions("t", "u1 [mm]"))) as record:
+        with shared_reading_process().read(sound, ImportPlan(FileLayout("t", "u1 [mm]"))) as record:
             assert np.array_equal(record.cells[0], TABLE)
 
 
@@ -507,7 +507,7 @@ def test_the_process_that_read_a_large_record_frees_its_memory(tmp_path, monkeyp
     write_gzip(path)
     try:
         for _ in range(2):
-            with process.read(path, CsvImport(FORMATS["packed.csv.gz"][1])) as record:
+            with process.read(path, ImportPlan(FORMATS["packed.csv.gz"][1])) as record:
                 assert process._process.pid is None
                 assert np.array_equal(record.time_s, TIME_S)
     finally:
@@ -517,7 +517,7 @@ def test_the_process_that_read_a_large_record_frees_its_memory(tmp_path, monkeyp
 def test_what_needs_too_much_memory_is_one_line(tmp_path):
     path = tmp_path / "huge.h5"
     path.write_bytes(huge_hdf5(tmp_path))
-    assert "memory" in fault_of(path, CsvOptions("t", "u1"))
+    assert "memory" in fault_of(path, FileLayout("t", "u1"))
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a file that never ends is a pipe here")
@@ -528,7 +528,7 @@ def test_a_reader_without_progress_is_ended(tmp_path, monkeypatch):
     reader = ReadingProcess()
     try:
         fault = pytest.raises(ImportFileError, match=r"endless.csv: reading it shows no progress for 0.5 s")
-        with fault, reader.read(path, CsvImport(CsvOptions("t", "u1"))):
+        with fault, reader.read(path, ImportPlan(FileLayout("t", "u1"))):
             pass
     finally:
         reader.stop()

@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.csv_layout import CsvOptions
-from app.runs.exchange.import_run import find_release, import_csv
-from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.csv_layout import FileLayout
+from app.runs.exchange.import_run import find_release, import_foreign_file
+from app.runs.exchange.importing import ImportPlan, read_record
 from app.runs.exchange.text_files import TextFile
 from app.runs.reader import open_run
 from config.files import load_stand
 
 ROWS = 60
-BASIC = CsvOptions("", "u1")
+BASIC = FileLayout("", "u1")
 
 
 def record_of(folder, text, plan=None, encoding="utf-8"):
     path = folder / "logger.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
-    return read_record(path, plan or CsvImport(BASIC))
+    return read_record(path, plan or ImportPlan(BASIC))
 
 
 def stamped(pattern, step_ms=125, zone=None):
@@ -80,7 +80,7 @@ def test_a_date_that_may_be_read_both_ways_is_asked_for(tmp_path):
     text = "Time;u1\n" + "".join(f"03/11/2025 14:00:{row:02d};{row}\n" for row in range(ROWS))
     with pytest.raises(ImportFileError, match="--date-order dmy or mdy"):
         record_of(tmp_path, text)
-    record = record_of(tmp_path, text, CsvImport(CsvOptions("", "u1", date_order="mdy")))
+    record = record_of(tmp_path, text, ImportPlan(FileLayout("", "u1", date_order="mdy")))
     assert record.facts.start.date() == datetime.date(2025, 3, 11)
 
 
@@ -89,7 +89,7 @@ def test_seconds_since_1970_tell_the_start_and_begun_overrules(tmp_path):
     record = record_of(tmp_path, text)
     assert record.facts.start == datetime.datetime.fromtimestamp(1763900000, datetime.UTC)
     begun = datetime.datetime(2019, 5, 4, 14, 3, tzinfo=BERLIN_WINTER)
-    later = record_of(tmp_path, text, CsvImport(BASIC, begun=begun, from_s=1763900000.25))
+    later = record_of(tmp_path, text, ImportPlan(BASIC, begun=begun, from_s=1763900000.25))
     assert later.facts.start == begun + datetime.timedelta(seconds=0.25)
 
 
@@ -107,14 +107,14 @@ def test_a_file_without_times_is_told_what_it_needs(tmp_path):
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-8-sig", "UTF8", "cp866"])
 def test_a_text_is_read_in_the_encoding_that_is_given(tmp_path, encoding):
     text = "Время;u1\n" + "".join(f"{row};{row}\n" for row in range(ROWS))
-    plan = CsvImport(CsvOptions("Время", "u1", encoding=encoding))
+    plan = ImportPlan(FileLayout("Время", "u1", encoding=encoding))
     assert list(record_of(tmp_path, text, plan, encoding).cells[0]) == list(range(ROWS))
 
 
 @pytest.mark.parametrize("encoding", ["utf-32", "cp037", "hex", "none"])
 def test_an_encoding_in_which_digits_are_no_ascii_is_refused(tmp_path, encoding):
     with pytest.raises(ImportFileError, match=f"--encoding '{encoding}' is not known"):
-        record_of(tmp_path, "t,u1\n0,1\n", CsvImport(CsvOptions("t", "u1", encoding=encoding)))
+        record_of(tmp_path, "t,u1\n0,1\n", ImportPlan(FileLayout("t", "u1", encoding=encoding)))
 
 
 @pytest.mark.parametrize(
@@ -131,11 +131,11 @@ def test_an_encoding_in_which_digits_are_no_ascii_is_refused(tmp_path, encoding)
 def test_units_that_the_file_names_are_taken(tmp_path, header, time_s, table_m):
     text = f"{header}\n" + "".join(f"{row};{2 * row}\n" for row in range(ROWS))
     record = record_of(
-        tmp_path, text, CsvImport(CsvOptions("0", "1")), "cp1251" if "Время" in header else "utf-8"
+        tmp_path, text, ImportPlan(FileLayout("0", "1")), "cp1251" if "Время" in header else "utf-8"
     )
     assert record.time_s == pytest.approx(time_s * np.arange(ROWS), rel=1e-14)
     assert record.block.readings[:, 0] == pytest.approx(2 * table_m * np.arange(ROWS), rel=1e-14)
-    told = CsvImport(CsvOptions("0", "1"), time_unit="us", unit="m")
+    told = ImportPlan(FileLayout("0", "1"), time_unit="us", unit="m")
     record = record_of(tmp_path, text, told, "cp1251" if "Время" in header else "utf-8")
     assert record.time_s == pytest.approx(1e-6 * np.arange(ROWS), rel=1e-14)
     assert list(record.block.readings[:, 0]) == list(2.0 * np.arange(ROWS))
@@ -152,40 +152,40 @@ def test_units_that_the_file_names_are_taken(tmp_path, header, time_s, table_m):
 def test_a_unit_that_does_not_tell_the_reading_is_asked_for(tmp_path, header, said):
     text = f"{header}\n" + "".join(f"{row};{row}\n" for row in range(ROWS))
     with pytest.raises(ImportFileError, match=said):
-        record_of(tmp_path, text, CsvImport(CsvOptions("0", "1")))
+        record_of(tmp_path, text, ImportPlan(FileLayout("0", "1")))
 
 
 def test_a_rate_stands_for_times(tmp_path):
     text = "u1\n" + "".join(f"{row},5\n" for row in range(ROWS))
-    record = record_of(tmp_path, text, CsvImport(CsvOptions("", "u1", decimal=",", rate_hz=2000.0)))
+    record = record_of(tmp_path, text, ImportPlan(FileLayout("", "u1", decimal=",", rate_hz=2000.0)))
     assert np.array_equal(record.time_s, np.arange(ROWS) / 2000.0)
     assert record.facts.rate_hz == 2000.0
     assert list(record.cells[0]) == [row + 0.5 for row in range(ROWS)]
     with pytest.raises(ImportFileError, match="--time and --rate exclude each other"):
-        record_of(tmp_path, text, CsvImport(CsvOptions("0", "u1", rate_hz=1.0)))
+        record_of(tmp_path, text, ImportPlan(FileLayout("0", "u1", rate_hz=1.0)))
 
 
 ONE_COLUMN = "".join(f"{row},50\n" for row in range(ROWS))
 
 
 def test_decimal_commas_of_one_column_are_no_second_column(tmp_path):
-    plan = CsvImport(CsvOptions("", "0", rate_hz=100.0))
+    plan = ImportPlan(FileLayout("", "0", rate_hz=100.0))
     assert list(record_of(tmp_path, "u1\n" + ONE_COLUMN, plan).cells[0]) == [row + 0.5 for row in range(ROWS)]
     assert list(record_of(tmp_path, "u1,u2\n" + ONE_COLUMN, plan).cells[0]) == list(range(ROWS))
-    bare = CsvOptions("", "0", rate_hz=100.0, header=False)
+    bare = FileLayout("", "0", rate_hz=100.0, header=False)
     with pytest.raises(ImportFileError, match=r"'20,50' may be one number or two. Add --decimal , or"):
-        record_of(tmp_path, ONE_COLUMN, CsvImport(bare))
+        record_of(tmp_path, ONE_COLUMN, ImportPlan(bare))
 
 
 def test_decimal_commas_between_quotes_are_read(tmp_path):
     text = '"t","u1"\n' + "".join(f'"{row},25","{row},5"\n' for row in range(ROWS))
-    record = record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1")))
+    record = record_of(tmp_path, text, ImportPlan(FileLayout("t", "u1")))
     assert list(record.cells[0]) == [row + 0.5 for row in range(ROWS)]
 
 
 def test_a_unit_that_is_not_named_is_told(tmp_path):
     text = "t;u1 [mm];rel\n" + "".join(f"{row};{row};{row}\n" for row in range(ROWS))
-    notes = record_of(tmp_path, text, CsvImport(CsvOptions("t", "1", "2"))).facts.notes
+    notes = record_of(tmp_path, text, ImportPlan(FileLayout("t", "1", "2"))).facts.notes
     assert list(map(str, notes)) == [
         "'u1 [mm]' is in mm, as the file says",
         "'rel' names no unit: it is taken as m. --unit states another",
@@ -195,7 +195,7 @@ def test_a_unit_that_is_not_named_is_told(tmp_path):
 def test_marks_of_absent_readings(tmp_path):
     marks = ["", "NaN", "N/A", "#N/A", "NULL", "-", "---", "1.#QNAN", "-1.#IND", "oops"]
     text = "t;u1\n" + "".join(f"{row};{mark}\n" for row, mark in enumerate([*marks, *range(60)]))
-    record = record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1", missing=("oops",))))
+    record = record_of(tmp_path, text, ImportPlan(FileLayout("t", "u1", missing=("oops",))))
     assert np.isnan(record.cells[0][: len(marks)]).all()
     assert list(record.cells[0][len(marks) :]) == list(range(60))
     with pytest.raises(ImportFileError, match="line 11, column 'u1': 'oops' is not a number"):
@@ -205,7 +205,7 @@ def test_marks_of_absent_readings(tmp_path):
 def test_a_mark_that_is_a_number_is_absent_however_it_is_written(tmp_path):
     cells = ["-9999", "-9999.00", "-9.999e3", *map(str, range(60))]
     text = "t;u1\n" + "".join(f"{row};{cell}\n" for row, cell in enumerate(cells))
-    record = record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1", missing=("-9999",))))
+    record = record_of(tmp_path, text, ImportPlan(FileLayout("t", "u1", missing=("-9999",))))
     assert np.isnan(record.cells[0][:3]).all()
     assert list(record.cells[0][3:]) == list(range(60))
 
@@ -243,14 +243,14 @@ def test_a_footer_is_looked_for_at_the_end_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("app.runs.exchange.csv_reading.PIECE_BYTES", 64)
     monkeypatch.setattr(TextFile, "decode", lambda file, data: decoded.append(data) or decode(file, data))
     text = "t;u1\n" + "".join(f"{row};{row}\n" for row in range(1000)) + "Mean;29,5\n"
-    assert len(record_of(tmp_path, text, CsvImport(CsvOptions("t", "u1")))) == 1000
+    assert len(record_of(tmp_path, text, ImportPlan(FileLayout("t", "u1")))) == 1000
     assert sum(map(len, decoded)) < 2 * len(text)
 
 
 def test_a_run_keeps_its_file_and_what_is_known_of_its_start(tmp_path):
     path = tmp_path / "old test.csv"
     path.write_text("t,u1\n" + "".join(f"{row / 10},{row}\n" for row in range(ROWS)))
-    made = import_csv(path, CsvImport(BASIC), tmp_path / "run.h5", load_stand())
+    made = import_foreign_file(path, ImportPlan(BASIC), tmp_path / "run.h5", load_stand())
     run = open_run(made.run, trusted=True)
     source = run.metadata.source_file
     assert (source.name, source.size_bytes) == ("old test.csv", path.stat().st_size)
@@ -259,7 +259,7 @@ def test_a_run_keeps_its_file_and_what_is_known_of_its_start(tmp_path):
         "the date of the file is not the test's"
     )
     begun = datetime.datetime(2019, 5, 4, 14, 3, tzinfo=BERLIN_WINTER)
-    made = import_csv(path, CsvImport(BASIC, begun=begun), tmp_path / "dated.h5", load_stand())
+    made = import_foreign_file(path, ImportPlan(BASIC, begun=begun), tmp_path / "dated.h5", load_stand())
     dated = open_run(made.run, trusted=True)
     assert dated.metadata.start_time == begun
     assert dated.end.end_time == begun + datetime.timedelta(seconds=5.9)
@@ -270,7 +270,7 @@ def test_what_is_too_short_is_no_record(tmp_path, rows):
     path = tmp_path / "short.csv"
     path.write_text("t,u1\n" + "".join(f"{row},{row}\n" for row in range(rows)))
     with pytest.raises(ImportFileError, match=f"holds {rows} readings of gauge 1, too few"):
-        import_csv(path, CsvImport(CsvOptions("t", "u1")), tmp_path / "run.h5", load_stand())
+        import_foreign_file(path, ImportPlan(FileLayout("t", "u1")), tmp_path / "run.h5", load_stand())
     assert not (tmp_path / "run.h5").exists()
 
 
@@ -292,5 +292,5 @@ def test_a_release_is_found_after_a_hold_only(tmp_path):
         text = "t,u1 [mm]\n" + "".join(
             f"{t},{u:.5f}\n" for t, u in zip(time_s[first:], swing[first:], strict=True)
         )
-        found = find_release(record_of(tmp_path, text, CsvImport(CsvOptions("", "u1 [mm]"))))
+        found = find_release(record_of(tmp_path, text, ImportPlan(FileLayout("", "u1 [mm]"))))
         assert found == (None if expected is None else pytest.approx(expected, abs=0.02))

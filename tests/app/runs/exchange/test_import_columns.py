@@ -9,10 +9,10 @@ from runs_kit import text_file
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange import csv_reading
-from app.runs.exchange.csv_layout import CsvOptions
+from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.csv_reading import read_columns
 
-BASIC = CsvOptions("time", "table", "rel")
+BASIC = FileLayout("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
 PLAIN = "time,table,rel\n0,1.5,-2\n0.5,2.5,-3\n1.0,3.5,-4\n"
 NO_HEADER = PLAIN.partition("\n")[2]
@@ -20,20 +20,20 @@ NO_HEADER = PLAIN.partition("\n")[2]
 
 FORMS = {
     "plain": (PLAIN, BASIC),
-    "columns by number": (PLAIN, CsvOptions("0", "1", "2")),
+    "columns by number": (PLAIN, FileLayout("0", "1", "2")),
     "other order": ("rel;note;time;table\n-2;a;0;1.5\n-3;b;0.5;2.5\n-4;c;1;3.5\n", BASIC),
     "tabs": (PLAIN.replace(",", "\t"), BASIC),
-    "tabs told": (PLAIN.replace(",", "\t"), CsvOptions("time", "table", "rel", delimiter="tab")),
+    "tabs told": (PLAIN.replace(",", "\t"), FileLayout("time", "table", "rel", delimiter="tab")),
     "blanks": (PLAIN.replace(",", "  "), BASIC),
-    "blanks told": ("  " + PLAIN.replace(",", " \t "), CsvOptions("time", "table", "rel", delimiter="space")),
+    "blanks told": ("  " + PLAIN.replace(",", " \t "), FileLayout("time", "table", "rel", delimiter="space")),
     "blanks after commas": (PLAIN.replace(",", ", "), BASIC),
     "semicolons, decimal comma": (
-        PLAIN.replace(",", ";").replace(".", ","), CsvOptions("time", "table", "rel", decimal=","),
+        PLAIN.replace(",", ";").replace(".", ","), FileLayout("time", "table", "rel", decimal=","),
     ),
     "tabs, decimal comma": (
-        PLAIN.replace(",", "\t").replace(".", ","), CsvOptions("time", "table", "rel", decimal=","),
+        PLAIN.replace(",", "\t").replace(".", ","), FileLayout("time", "table", "rel", decimal=","),
     ),
-    "any delimiter": (PLAIN.replace(",", "!"), CsvOptions("time", "table", "rel", delimiter="!")),
+    "any delimiter": (PLAIN.replace(",", "!"), FileLayout("time", "table", "rel", delimiter="!")),
     "windows lines": (PLAIN.replace("\n", "\r\n"), BASIC),
     "old mac lines": (PLAIN.replace("\n", "\r"), BASIC),
     "no newline at the end": (PLAIN.rstrip(), BASIC),
@@ -41,12 +41,12 @@ FORMS = {
     "utf-16": (PLAIN.encode("utf-16"), BASIC),
     "latin-1": (b"time,table,rel,\xb5m\n0,1.5,-2,0\n0.5,2.5,-3,0\n1,3.5,-4,0\n", BASIC),
     "blanks around names": (PLAIN.replace("time,table", " time , table "), BASIC),
-    "name asked with blanks": (PLAIN, CsvOptions(" time ", "table", "rel ")),
+    "name asked with blanks": (PLAIN, FileLayout(" time ", "table", "rel ")),
     "quotes": ('"time","table","rel"\n"0","1.5","-2"\n"0.5","2.5","-3"\n"1","3.5","-4"\n', BASIC),
     "quoted text beside": ('time,note,table,rel\n0,"a, b",1.5,-2\n0.5,"c",2.5,-3\n1,,3.5,-4\n', BASIC),
-    "lines before the header": ("by X\n\nversion;2\n" + PLAIN, CsvOptions("time", "table", "rel", skip=3)),
-    "no header": (NO_HEADER, CsvOptions("0", "1", "2", header=False)),
-    "lines before, no header": ("a\nb\n" + NO_HEADER, CsvOptions("0", "1", "2", skip=2, header=False)),
+    "lines before the header": ("by X\n\nversion;2\n" + PLAIN, FileLayout("time", "table", "rel", skip=3)),
+    "no header": (NO_HEADER, FileLayout("0", "1", "2", header=False)),
+    "lines before, no header": ("a\nb\n" + NO_HEADER, FileLayout("0", "1", "2", skip=2, header=False)),
     "empty trailing columns": (PLAIN.replace("\n", ",,\n"), BASIC),
     "trailing in some rows": ("time,table,rel\n0,1.5,-2,\n0.5,2.5,-3\n1,3.5,-4,,\n", BASIC),
     "blank lines": (PLAIN.replace("\n", "\n\n") + "\n \n", BASIC),
@@ -74,12 +74,12 @@ def test_every_form_reads_the_same(tmp_path, form, monkeypatch):
 
 
 FAULTS = {
-    "no such column": (PLAIN, CsvOptions("time", "tabel"), ["no column 'tabel'", "time, table, rel"]),
-    "number beyond": (PLAIN, CsvOptions("0", "7"), ["no column '7'"]),
-    "column twice": ("time,a,a\n0,1,2\n1,1,2\n", CsvOptions("time", "a"), ["2 columns named 'a'"]),
+    "no such column": (PLAIN, FileLayout("time", "tabel"), ["no column 'tabel'", "time, table, rel"]),
+    "number beyond": (PLAIN, FileLayout("0", "7"), ["no column '7'"]),
+    "column twice": ("time,a,a\n0,1,2\n1,1,2\n", FileLayout("time", "a"), ["2 columns named 'a'"]),
     "text in a cell": (PLAIN.replace("2.5", "x"), BASIC, ["line 3", "column 'table'", "'x' is not a number"]),
     "decimal comma": (
-        "time;table;rel\n0;1;2\n0,5;1;2\n", CsvOptions("time", "table", "rel", decimal="."),
+        "time;table;rel\n0;1;2\n0,5;1;2\n", FileLayout("time", "table", "rel", decimal="."),
         ["line 3", "column 'time'", "'0,5'", "--decimal ,"],
     ),
     "infinite": (PLAIN.replace("2.5", "-inf"), BASIC, ["line 3", "column 'table'", "infinite"]),
@@ -89,13 +89,13 @@ FAULTS = {
     "fault after blank lines": ("\n\n" + PLAIN.replace("\n0.5", "\n\n# c\n?.5"), BASIC, ["line 7"]),
     "empty": ("", BASIC, ["holds no line of data"]),
     "only a header": ("time,table,rel\n", BASIC, ["a header but no line of data"]),
-    "all skipped": (PLAIN, CsvOptions("time", "table", skip=9), ["--skip 9"]),
-    "data for a header": (NO_HEADER, CsvOptions("0", "1"), ["line 1", "--no-header"]),
+    "all skipped": (PLAIN, FileLayout("time", "table", skip=9), ["--skip 9"]),
+    "data for a header": (NO_HEADER, FileLayout("0", "1"), ["line 1", "--no-header"]),
     "no delimiter": ("time\n1\n2\n", BASIC, ["line 3", "--delimiter"]),
     "no numbers": ("time,table\na,b\nc,d\n", BASIC, ["line 3", "--skip"]),
-    "delimiter of two": (PLAIN, CsvOptions("time", "table", delimiter="::"), ["'::'"]),
+    "delimiter of two": (PLAIN, FileLayout("time", "table", delimiter="::"), ["'::'"]),
     "delimiter is the decimal": (
-        PLAIN, CsvOptions("time", "table", delimiter=",", decimal=","), ["decimal sign ,"],
+        PLAIN, FileLayout("time", "table", delimiter=",", decimal=","), ["decimal sign ,"],
     ),
     "not text": (b"PK\x03\x04\0\0\0\0", BASIC, ["not a text file"]),
 }  # fmt: skip
@@ -134,7 +134,7 @@ def test_any_numbers_by_another_writer_are_read_exactly(tmp_path_factory, rows, 
         writer.writerow(["time", "table", "rel"])
         for row in rows:
             writer.writerow([repr(x).replace(".", ",") if comma else repr(x) for x in row])
-    layout = CsvOptions(
+    layout = FileLayout(
         "time",
         "table",
         "rel",

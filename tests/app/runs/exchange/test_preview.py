@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.importing import ImportPlan, read_record
 from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 
 
@@ -83,7 +83,7 @@ def test_other_files_tell_their_columns_and_are_read_by_them(tmp_path: Path, suf
     found = preview_file(path)
     assert found.columns == ("time", "u1", "u2")
     assert roles(found)[:4] == ("time", "u1", "u2", "plate")
-    plan = CsvImport(_layout(found))
+    plan = ImportPlan(_layout(found))
     record = read_record(path, plan)
     assert record.facts.first_s == 0.0
     assert list(record.block.readings[:, 0]) == [1.0, 2.0, 3.0, 4.0]
@@ -100,9 +100,9 @@ def test_damaged_and_missing_files_are_said(tmp_path: Path, suffix: str) -> None
 
 
 def _layout(found: FilePreview) -> object:
-    from app.runs.exchange.csv_layout import CsvOptions
+    from app.runs.exchange.csv_layout import FileLayout
 
-    return CsvOptions(found.time, found.table, found.second or None)
+    return FileLayout(found.time, found.table, found.second or None)
 
 
 def _write(path: Path, columns: dict[str, np.ndarray]) -> None:
