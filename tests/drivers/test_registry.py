@@ -41,12 +41,15 @@ def test_what_is_built_makes_a_source(name, baud):
     assert source.rate_hz == 500
 
 
-@pytest.mark.parametrize("name", [driver.name for driver in DRIVERS.values() if not driver.available])
-def test_what_is_only_reserved_says_so(name):
+@pytest.mark.parametrize(
+    ("name", "read_by"),
+    [("mantracourt", "csv --set format=mantracourt-dscusb"), ("scale-line", "csv --set columns=")],
+)
+def test_what_is_only_reserved_says_what_reads_it(name, read_by):
     info = DRIVERS[name]
     assert not info.available
     with pytest.raises(
-        SettingsError, match=rf"protocol '{name}' .* comes later: use one of slipstand-binary, csv"
+        SettingsError, match=rf"'{name}' .* comes later: its lines are read by --protocol {read_by}"
     ):
         find_driver(name)
     with pytest.raises(SettingsError, match="comes later"):

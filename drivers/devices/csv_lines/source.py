@@ -280,6 +280,7 @@ class PolledLinesSource(CsvLinesSource):
         super().__init__(_with_host_time(layout), rate_hz, overload_count, commands, preset)
         self._mark = layout.separator.encode("ascii")
         self._request = LineRequest(commands.poll)
+        self._identity_query = preset.identity if preset else None
         self._schedule: PollSchedule | None = None
         self._timing: ResponseTiming | None = None
         self._answer_overdue = False
@@ -294,6 +295,7 @@ class PolledLinesSource(CsvLinesSource):
         if self._commands.start:
             link.write(self._commands.start)
         self._await_line(link)
+        self._ask_identity(link)
         timing = ResponseTiming([[transact(link, self._request, self._answer_s)] for _ in range(TRIALS)])
         if self._rate_hz is None:
             self._rate_hz = timing.max_rate_hz
@@ -349,6 +351,18 @@ class PolledLinesSource(CsvLinesSource):
             received += read()
             if time.monotonic() > deadline_s:
                 raise self.no_data_error(received)
+
+    def _ask_identity(self, link: Link) -> None:
+        """Ask the device who it is, where its preset knows how. Some devices of a kind have no answer."""
+        asked = self._identity_query
+        if asked is None:
+            return
+        answer = transact(link, LineRequest(unescape("query", asked.query)), self._answer_s)
+        name = _find_identity(asked.pattern, answer.data)
+        if name:
+            self._identity = replace(self._identity, name=name)
+        else:
+            drain(link)
 
     def _with_time(self, transaction: Transaction) -> bytes:
         """What came, each line on its own and the last one with its time; b"" for nothing."""
@@ -431,8 +445,14 @@ def identity_queries() -> tuple[IdentityQuery, ...]:
 
 
 def _parse_identity(pattern: str, received: bytes) -> Message | None:
+    name = _find_identity(pattern, received)
+    return message("{identity}", identity=name) if name else None
+
+
+def _find_identity(pattern: str, received: bytes) -> str:
+    """What the first group of a pattern finds in a whole line; empty for nothing."""
     found = re.search(pattern + r"\s*[\r\n]", received.decode("ascii", "replace"))
-    return message("{identity}", identity=found[1].strip()) if found else None
+    return found[1].strip() if found else ""
 
 
 @cache

@@ -121,6 +121,18 @@ def test_a_simulated_stream_waits_for_its_start_and_obeys_its_stop(name):
 # --- lines that are asked for ------------------------------------------------------------------
 
 
+IDENTITIES = {"mt-sics": "AL204 Standard 210.0000 g", "scpi-read": "HEWLETT-PACKARD,34401A"}
+"""What the simulated devices answer, as the manuals show it; the others are not asked."""
+
+
+def test_a_balance_that_does_not_know_the_question_is_read_all_the_same():
+    link = ScriptedLink(lambda sent: b"ES\r\n" if sent == b"I2\r\n" else b"S S      1.00 g\r\n")
+    source = make_source({"format": "mt-sics"}, None)
+    source.start(link)
+    assert link.sent.count(b"I2\r\n") == 1
+    assert source.identity.name == read_preset("mt-sics").title
+
+
 @pytest.mark.parametrize("name", POLLED)
 def test_a_polled_device_is_read_over_its_wire(name):
     wire = open_tcp_port()
@@ -133,6 +145,7 @@ def test_a_polled_device_is_read_over_its_wire(name):
                 data = source.read(link)
                 read += data
                 blocks += source.decode(data, time.monotonic_ns()) if data else []
+    assert source.identity.name == IDENTITIES.get(name, read_preset(name).title)
     assert 5 <= source.rate_hz <= 100  # some ten bytes there and back at 9600 baud
     assert source.run_note
     block = join(blocks)
