@@ -9,7 +9,7 @@ from analysis.laws.catalogue import FALLBACK_LAWS
 from benchmarks import study_coverage, study_garbage, study_one_mass, study_wrong_models
 
 SLOW_RATE_HZ = 450.0
-RECORDS = 60
+RECORDS = 36
 RARE = 1e-4
 
 
@@ -76,7 +76,7 @@ def test_searches_that_once_got_stuck(seed, whole):
 
 
 def test_faulty_records_are_never_believed_when_wrong():
-    outcomes = [study_garbage.run(seed) for seed in slow_seeds(30)]
+    outcomes = [study_garbage.run(seed) for seed in slow_seeds(16)]
     assert not [outcome for outcome in outcomes if outcome.kind in ("crash", "adequate, off")]
 
 

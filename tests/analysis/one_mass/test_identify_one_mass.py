@@ -267,7 +267,7 @@ def test_intervals_hold_the_truth_in_95_percent(coulomb):
 
 def test_correlated_noise_widens_the_interval():
     inside = []
-    for seed in range(60):
+    for seed in range(30):
         truth = Truth(noise=0.0, seed=seed)
         time_s, value = readings(truth)
         white = np.random.default_rng(seed).standard_normal(len(time_s) + 15)
