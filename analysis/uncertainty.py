@@ -201,12 +201,9 @@ def numerical_gradient(
         step = _STEP * max(abs(float(value)), _SCALE_MIN)
         shift = np.zeros_like(point)
         shift[index] = step
-        near, far = (
-            np.asarray(function(point + steps * shift)) - np.asarray(function(point - steps * shift))
-            for steps in (1.0, 2.0)
-        )
-        with np.errstate(invalid="ignore"):  # values that do not exist have no slope
-            columns.append((8.0 * near - far) / (12.0 * step))
+        around = [np.asarray(function(point + steps * shift)) for steps in (-2.0, -1.0, 1.0, 2.0)]
+        with np.errstate(invalid="ignore"):  # values that do not exist, or are not finite, have no slope
+            columns.append((8.0 * (around[2] - around[1]) - (around[3] - around[0])) / (12.0 * step))
     return np.stack(columns, axis=-1)
 
 

@@ -90,8 +90,7 @@ def open_inlet(url: str) -> tuple[Any, StreamDescription]:
     pylsl = load_pylsl()
     found = pylsl.resolve_bypred(_predicate(url), minimum=1, timeout=RESOLVE_S)
     if not found:
-        template = N_("there is no stream {url}: start the program that sends it, in the same network")
-        raise PortUnavailableError(template, url=url)
+        raise _no_such_stream(url)
     sources = {(info.source_id() or info.uid()) for info in found}
     if len(sources) > 1:
         template = N_("{url} may be any of {streams}: give the source id of one")
@@ -104,7 +103,9 @@ def open_inlet(url: str) -> tuple[Any, StreamDescription]:
         inlet.open_stream(_OPEN_S)
         full = inlet.info(_OPEN_S)
         inlet.time_correction(_OPEN_S)  # the first takes half a second, later ones nothing
-    except RuntimeError as error:  # TimeoutError and LostError of pylsl
+    except pylsl.util.LostError as error:  # found, as its end had not yet been noticed
+        raise _no_such_stream(url) from error
+    except pylsl.util.TimeoutError as error:
         template = N_("stream {url} does not answer ({fault}): start the program that sends it again")
         raise PortUnavailableError(template, url=url, fault=error) from error
     labels = tuple(full.get_channel_labels() or ())
@@ -114,6 +115,11 @@ def open_inlet(url: str) -> tuple[Any, StreamDescription]:
     )  # fmt: skip
     _log.info("opened %s: %s", url, description)
     return inlet, description
+
+
+def _no_such_stream(url: str) -> PortUnavailableError:
+    template = N_("there is no stream {url}: start the program that sends it, in the same network")
+    return PortUnavailableError(template, url=url)
 
 
 class LslLink:
