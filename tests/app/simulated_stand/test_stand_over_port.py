@@ -46,6 +46,7 @@ PAIRS = {
     "GSV-2": ("gsv-234", {"format": "gsv-2"}, 500.0),
     "DSCUSB": ("csv", {"format": "mantracourt-dscusb"}, 300.0),
     "iLoad": ("csv", {"format": "loadstar-iload"}, 500.0),
+    "OpenScale": ("csv", {"format": "openscale"}, 100.0),
 }
 
 
