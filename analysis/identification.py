@@ -107,6 +107,14 @@ class MonteCarlo:
     of draws leaves open."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Correlation:
+    """Correlation of the errors of results."""
+
+    names: tuple[str, ...]  # of the results (m)
+    matrix: Floats  # (m, m) float64
+
+
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Result of `identify`; the same values as `analyze --json`."""
@@ -130,3 +138,4 @@ class Identification:
     """Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`."""
     monte_carlo: MonteCarlo | None = None  # where it was asked for
     plate: "PlateFriction | None" = None  # friction from the plate alone, slip by slip
+    correlation: Correlation | None = None  # of those results whose errors are linear forms of a fit

@@ -240,6 +240,7 @@ def _conclude(
         joint_fit.friction_curves(joint.chosen, fitted_friction, decay, delays_s),
         drawn,
         plate,
+        budget.correlation(),
     )
 
 
@@ -275,6 +276,7 @@ def _identify_without_slip(record: Record, decay: FreeDecay, *, with_monte_carlo
         budget=budget.lines + unstated_clock(record, budget.results),
         events=Events(release),
         warnings=warnings,
+        correlation=budget.correlation(),
     )
 
 

@@ -43,7 +43,7 @@ from analysis.results.joint_fit import (
     add_systematic_uncertainty,
     law_places,
 )
-from analysis.uncertainty import UncertaintyBudget, propagate_expected, unstated_gain_warnings
+from analysis.uncertainty import LinearForm, UncertaintyBudget, propagate_expected, unstated_gain_warnings
 from messages.i18n import N_
 from messages.message import message
 
@@ -223,7 +223,7 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
     for place, name in FRICTION_PARAMETERS.items():
         if place in test.law.free_parameters and fit.determines(place):
-            value, shares = fit.value(place), fitted.parameter_contributions(place)
+            value, shares = fit.value(place), LinearForm.of_parameter(fitted, place).contributions()
             if place == Parameter.FRICTION_DYNAMIC:
                 shares[BudgetSource.MODEL] = test.model_spread * value
             budget.add(name, value, shares)

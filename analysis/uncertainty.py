@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from analysis.arrays import Floats, Indices
 from analysis.catalogue import CATALOGUE
 from analysis.fitting.problem import FitProblem, covariance
 from analysis.fitting.search import Fit
+from analysis.identification import Correlation
 from analysis.laws.parameters import Parameter
 from analysis.quantities import (
     BudgetLine,
@@ -59,12 +60,6 @@ class ParameterUncertainty:
         }
         shares.update({source: abs(float(column @ weights)) for source, column in self.shifts.items()})
         return shares
-
-    def parameter_contributions(self, place: int) -> dict[Source, float]:
-        """Standard uncertainty of one parameter by source."""
-        weights = np.zeros(len(self.noise_covariance))
-        weights[place] = 1.0
-        return self.contributions(weights)
 
 
 def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
@@ -207,16 +202,51 @@ def numerical_gradient(
     return np.stack(columns, axis=-1)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class LinearForm:
+    """The error of a quantity as a linear form of those of parameters."""
+
+    uncertainty: ParameterUncertainty
+    weights: Floats  # (p,): derivatives of the quantity by the parameters
+
+    @classmethod
+    def of_parameter(cls, uncertainty: ParameterUncertainty, place: int, sign: int = 1) -> Self:
+        weights = np.zeros(len(uncertainty.noise_covariance))
+        weights[place] = sign
+        return cls(uncertainty, weights)
+
+    def contributions(self) -> dict[Source, float]:
+        """Standard uncertainty by source."""
+        return self.uncertainty.contributions(self.weights)
+
+    def covariance(self, other: "LinearForm") -> float:
+        """Covariance with another quantity; noise is shared by forms of the same fit alone."""
+        mine, theirs = self.uncertainty, other.uncertainty
+        sources = mine.shifts.keys() & theirs.shifts.keys()
+        shared = sum(
+            float(mine.shifts[source] @ self.weights) * float(theirs.shifts[source] @ other.weights)
+            for source in sources
+        )
+        noise = self.weights @ mine.noise_covariance @ other.weights if mine is theirs else 0.0
+        return float(noise + shared)
+
+
 class UncertaintyBudget:
     """Collects quantities and their budget lines."""
 
     def __init__(self) -> None:
         self.results: dict[str, Quantity] = {}
         self.lines: list[BudgetLine] = []
+        self._forms: dict[str, LinearForm] = {}
+
+    def form(self, name: str) -> LinearForm | None:
+        """The linear form of a quantity; None where none is known."""
+        return self._forms.get(name)
 
     def remove(self, name: str) -> None:
         """Remove a quantity with its lines."""
         del self.results[name]
+        self._forms.pop(name, None)
         self.lines = [line for line in self.lines if line.contribution_to != name]
 
     def add(
@@ -227,11 +257,13 @@ class UncertaintyBudget:
         *,
         unit: str = "",
         half_widths: tuple[float, float] | None = None,
+        form: LinearForm | None = None,
     ) -> None:
         """Add a quantity with its standard uncertainty from each source; zero contributions are left out.
 
         `unit` is that of the catalogue where none is given. `half_widths` of the 95 % interval, below and
-        above the value, replace 1.96 standard uncertainties.
+        above the value, replace 1.96 standard uncertainties. `form` tells how its error goes with those of
+        other quantities.
         """
         deviation = float(np.sqrt(sum(share**2 for share in contributions.values())))
         quantity = Quantity.normal(value, deviation, unit or _UNITS[name])
@@ -239,6 +271,22 @@ class UncertaintyBudget:
             quantity = replace(quantity, interval_95=(value - half_widths[0], value + half_widths[1]))
         self.results[name] = quantity
         self.lines += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
+        if form is not None:
+            self._forms[name] = form
+
+    def correlation(self) -> Correlation:
+        """Correlation of the quantities whose linear forms are known and that are uncertain."""
+        known = {
+            name: form for name, form in self._forms.items() if self.results[name].standard_uncertainty > 0.0
+        }
+        matrix = np.array([[one.covariance(other) for other in known.values()] for one in known.values()])
+        # Where the uncertainty holds more than the form does (a spread of models), the rest is its own.
+        stated = [self.results[name].standard_uncertainty for name in known]
+        deviations = np.maximum(stated, np.sqrt(np.diag(matrix))) if known else np.zeros(0)
+        matrix = matrix.reshape(len(known), len(known)) / np.outer(deviations, deviations)
+        matrix = np.clip(matrix, -1.0, 1.0)  # beyond by rounding
+        np.fill_diagonal(matrix, 1.0)
+        return Correlation(tuple(known), matrix)
 
 
 def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:

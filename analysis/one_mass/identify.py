@@ -19,7 +19,13 @@ from analysis.one_mass.turning_points import classical_log_decrement, find_turni
 from analysis.preparation.channels import Channel, Channels, read_channels
 from analysis.quantities import BudgetSource, Quantity, ResultWarning, Source, result_warning
 from analysis.record import AnalysisError, Record, StandMasses
-from analysis.uncertainty import UncertaintyBudget, numerical_gradient, unstated_clock
+from analysis.uncertainty import (
+    LinearForm,
+    ParameterUncertainty,
+    UncertaintyBudget,
+    numerical_gradient,
+    unstated_clock,
+)
 from messages.i18n import N_
 from messages.message import message
 
@@ -178,6 +184,7 @@ def _identification(
         }
         | {part.result: part.size(parameters) for part in parts},
         _curves(channels, solution.fit, record.table_gauge.lateness_s),
+        correlation=budget.correlation(),
     )
 
 
@@ -194,15 +201,11 @@ def _uncertainty_budget(
     columns[BudgetSource.MASS] = np.append(np.zeros(len(point) - 1), deviation)
     if solution.spread is not None:
         columns[BudgetSource.MODEL] = np.append(solution.spread, 0.0)
-    budget = UncertaintyBudget()
+    budget, known = UncertaintyBudget(), ParameterUncertainty(columns, noise)
     for name, function in _functions(found, with_mass=mass is not None).items():
-        weights = numerical_gradient(function, point)
-        shares: dict[Source, float] = {
-            BudgetSource.NOISE: math.sqrt(max(0.0, float(weights @ noise @ weights)))
-        }
-        shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
+        form = LinearForm(known, numerical_gradient(function, point))
         units = {_COULOMB: unit, "drag_per_m": f"1/{unit}"}
-        budget.add(name, function(point), shares, unit=units.get(name, ""))
+        budget.add(name, function(point), form.contributions(), unit=units.get(name, ""), form=form)
     return budget
 
 

@@ -24,6 +24,7 @@ from analysis.record import AnalysisError, Record
 from analysis.results.joint_fit import FRICTION_PARAMETERS, SIGNED_PARAMETERS, DecayConstants, JointFit
 from analysis.uncertainty import (
     LEVELLING_UNCERTAINTY_RAD,
+    LinearForm,
     UncertaintyBudget,
     numerical_gradient,
     white_noise_variance,
@@ -50,13 +51,14 @@ def add_fitted_quantities(
     for place, name, unit in (*friction, *of_law, *of_stand):
         if fit.determines(place):
             sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
-            shares, reach = fitted.parameter_contributions(place), None
+            form = LinearForm.of_parameter(fitted, place, sign)
+            shares, reach = form.contributions(), None
             if name in CORNER_NAMES:
                 _add_corner(CORNER_NAMES[name], fit.value(place), shares, budget)
                 continue
             if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
                 shares, reach = _by_profile(joint.problem, fit, place, shares)
-            budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach)
+            budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach, form=form)
     if isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects):
         _add_mean_friction(joint, fit.law, budget)
     if isinstance(fit.law.solver, IntegratedSolver):
@@ -140,7 +142,8 @@ def _add_finite(
     """Add quantities (name, value, derivatives by the parameters) that have a value."""
     for name, value, slopes in quantities:
         if np.isfinite(value):
-            budget.add(name, float(value), joint.uncertainty.contributions(np.nan_to_num(slopes)))
+            form = LinearForm(joint.uncertainty, np.nan_to_num(slopes))
+            budget.add(name, float(value), form.contributions(), form=form)
 
 
 def _add_residual_displacement(joint: JointFit, budget: UncertaintyBudget) -> None:
@@ -383,7 +386,7 @@ def _add_tied(joint: JointFit, tied: tuple[float, float], budget: UncertaintyBud
     friction = chosen.value(Parameter.FRICTION_DYNAMIC)
     if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         return
-    shares = joint.uncertainty.parameter_contributions(Parameter.FRICTION_DYNAMIC)
+    shares = LinearForm.of_parameter(joint.uncertainty, Parameter.FRICTION_DYNAMIC).contributions()
     budget.add(LOWER, friction, shares)
     likeliest, end = max(tied[0], friction), max(tied[1], friction)
     noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares[BudgetSource.NOISE]))

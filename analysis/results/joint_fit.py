@@ -21,6 +21,7 @@ from analysis.preparation.oscillation import DampedCosine, check_friction, dampe
 from analysis.quantities import BudgetSource, ResultWarning, Source, result_warning
 from analysis.record import Record, RecordError
 from analysis.uncertainty import (
+    LinearForm,
     ParameterUncertainty,
     UncertaintyBudget,
     levelling_shift,
@@ -404,7 +405,8 @@ def add_constants(constants: DecayConstants, budget: UncertaintyBudget) -> None:
     """Add period, damping and stiffness to the budget."""
     for name, function in DECAY_QUANTITIES.items():
         weights = numerical_gradient(function, constants.point)
-        budget.add(name, function(constants.point), constants.uncertainty.contributions(weights))
+        form = LinearForm(constants.uncertainty, weights)
+        budget.add(name, function(constants.point), form.contributions(), form=form)
 
 
 def _mass(p: Floats) -> float:

@@ -155,8 +155,9 @@ def _with_degree(joint: JointFit, degree: Degree) -> JointFit:
 def _add_model_spread(budget: UncertaintyBudget, name: str, spread: float) -> None:
     value = budget.results[name].value
     shares = {line.source: line.standard_uncertainty for line in budget.lines if line.contribution_to == name}
+    form = budget.form(name)
     budget.remove(name)
-    budget.add(name, value, {**shares, BudgetSource.MODEL: spread})
+    budget.add(name, value, {**shares, BudgetSource.MODEL: spread}, form=form)
 
 
 def _disagreement(own: Quantity, plate: PlateFriction) -> ResultWarning:
