@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from messages.message import MessageError
 
@@ -139,6 +139,58 @@ class Record:
     gauge_2_measures_plate: bool = False
     """True when gauge 2 measures the plate against the base instead of against the table."""
 
+    @classmethod
+    def from_arrays(
+        cls,
+        time_s: ArrayLike,
+        table_displacement_m: ArrayLike,
+        relative_displacement_m: ArrayLike | None = None,
+        *,
+        table_mass_kg: float,
+        plate_mass_kg: float,
+        gain_uncertainties: tuple[float | None, float | None] = (None, None),
+    ) -> Self:
+        """Record of arrays of equal length (n,); NaN stands for an absent reading.
+
+        `gain_uncertainties` are the relative standard uncertainties of both gauges' gains; None is "not
+        stated", which an identification warns of. All other fields are set by `replace`. Raises RecordError.
+        """
+        channels = {"time_s": time_s, "table_displacement_m": table_displacement_m}
+        if relative_displacement_m is not None:
+            channels["relative_displacement_m"] = relative_displacement_m
+        arrays = {name: _float_array(name, values) for name, values in channels.items()}
+        for name, array in arrays.items():
+            if len(array) != len(arrays["time_s"]):
+                raise RecordError(
+                    "{name} has {values} values for {times} of time_s. Give one for each time",
+                    name=name,
+                    values=len(array),
+                    times=len(arrays["time_s"]),
+                )
+        for name, mass in (("table_mass_kg", table_mass_kg), ("plate_mass_kg", plate_mass_kg)):
+            if not 0.0 < mass < float("inf"):
+                template = "{name} is {mass!r}: give a positive number of kilograms"
+                raise RecordError(template, name=name, mass=mass)
+        return cls(
+            arrays["time_s"],
+            arrays["table_displacement_m"],
+            arrays.get("relative_displacement_m"),
+            StandMasses(float(table_mass_kg), float(plate_mass_kg)),
+            table_gauge=GaugeUncertainty(gain_relative=gain_uncertainties[0]),
+            relative_gauge=GaugeUncertainty(gain_relative=gain_uncertainties[1]),
+        )
+
     def replace(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""
         return replace(self, **changes)
+
+
+def _float_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordError("{name} is no array of numbers ({fault})", name=name, fault=str(error)) from error
+    if array.ndim != 1:
+        template = "{name} has {axes} axes. Give one channel as an array with one axis"
+        raise RecordError(template, name=name, axes=array.ndim)
+    return array

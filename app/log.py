@@ -67,8 +67,10 @@ def start_log(kind: str, level: str | None = None, *, on_stderr: bool = False) -
     logging.raiseExceptions = False  # a full disk must not disturb a recording
     root.setLevel(logging.WARNING)  # of libraries
     for package in ("app", "analysis", "config", "drivers"):
-        logging.getLogger(package).setLevel(chosen.upper())
+        logging.getLogger(_PREFIX + package).setLevel(chosen.upper())
     _log.info("%s of Slipstand %s starts, Python %s", kind, __version__, platform.python_version())
 
 
 _NAME = "slipstand"
+_PREFIX = __name__.removesuffix("app.log")
+"""Of our packages: empty in a checkout, "slipstand." in an installation (setup.py)."""

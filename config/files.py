@@ -8,7 +8,6 @@ import os
 import tomllib
 from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,7 +21,7 @@ from messages.i18n import N_
 T = TypeVar("T", bound=msgspec.Struct)
 
 _CHECKS_TITLE = "# Checks of the gauges, added by `slipstand calibrate check`.\n\n"
-_SHIPPED = Path(str(files("config")))
+_SHIPPED = Path(__file__).parent
 
 
 def config_directory() -> Path:

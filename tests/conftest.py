@@ -1,14 +1,19 @@
 """Shared by all tests: no window system is needed, and warnings are errors (pyproject.toml)."""
 
 import gc
+import json
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
 
+from app.__main__ import main
 from messages import i18n
 
 hypothesis.settings.register_profile("house", deadline=None)  # a busy machine is slow, and not wrong
@@ -68,3 +73,38 @@ def pytest_collection_finish() -> None:
     """Let garbage collections pass over what imports and collected tests hold: most of all objects."""
     gc.collect()
     gc.freeze()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command said and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Stdout as the one JSON document that it must be."""
+        return json.loads(self.out)
+
+
+Slipstand = Callable[..., Outcome]
+
+
+@pytest.fixture
+def slipstand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Slipstand:
+    """Run `slipstand ARGUMENTS` and return how it ended."""
+
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["slipstand", *map(str, arguments)])
+        capsys.readouterr()
+        code: object = 0
+        try:
+            main()
+        except SystemExit as ending:
+            code = ending.code or 0
+        said = capsys.readouterr()
+        return Outcome(int(str(code)), said.out, said.err)
+
+    return run

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Floats
 from analysis.motion.events import SIGN, START
 from analysis.motion.sampling import EXACT, MotionKernels, out_of_order
-from analysis.record import AnalysisError
+from analysis.record import AnalysisError, StandMasses
 from messages.i18n import N_
 
 
@@ -205,6 +205,11 @@ class TwoMassParameters:
     def static_or_dynamic(self) -> float:
         """f_s, which is f_d where none was given."""
         return self.friction_dynamic if self.friction_static is None else self.friction_static
+
+    @property
+    def masses(self) -> StandMasses:
+        """Masses and gravity, known exactly."""
+        return StandMasses(self.table_mass_kg, self.plate_mass_kg, gravity_m_per_s2=self.gravity_m_per_s2)
 
     def vector(self, release_s: float = 0.0) -> NDArray[np.float64]:
         """The parameter vector of the compiled kernels, (10,), in the order of `analysis.motion.events`."""

@@ -49,14 +49,16 @@ class SavedAnalysis:
     """Hash of what was known beside the samples, see `app.runs.saved_analyses`."""
 
 
-def analysis_document(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
-    """JSON object of one identification, schema `slipstand-analysis/1`."""
+def analysis_document(
+    path: Path | None, series: str | None, losses: Losses, result: Identification
+) -> Document:
+    """JSON object of one identification, schema `slipstand-analysis/1`; `run` is null without a path."""
     quantities = {
         name: quantity_document(value) for name, value in result.results.items() if math.isfinite(value.value)
     }
     return {
         "schema": SCHEMA,
-        "run": str(path.absolute()),
+        "run": None if path is None else str(path.absolute()),
         "series": series,
         "kind": result.kind,
         "results": quantities | result.labels,

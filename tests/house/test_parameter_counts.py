@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("analysis", "app", "benchmarks", "config", "drivers", "messages", "tools")
+PACKAGES = ("analysis", "app", "benchmarks", "config", "drivers", "messages", "slipstand", "tools")
 MOST = 8
 
 
