@@ -34,7 +34,7 @@ help:
 
 setup: $(READY)
 
-$(READY): requirements.lock pyproject.toml | system-libraries
+$(READY): requirements.lock pyproject.toml setup.py | system-libraries
 	@$(PYTHON) -c 'import sys; sys.exit("error: Python %d.%d is too old. Install Python 3.11 or later and run: make setup PYTHON=python3.11" % sys.version_info[:2] if sys.version_info < (3, 11) else 0)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
