@@ -60,7 +60,7 @@ class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Contact(_Checked, frozen=True):
     """The two surfaces that slide on each other."""
 
-    name: str
+    name: str  # both surfaces in words
 
 
 class Stand(_Checked, frozen=True):
@@ -70,17 +70,17 @@ class Stand(_Checked, frozen=True):
     are the alphabets of the series code `ABBMI`.
     """
 
-    name: str
-    table_mass_kg: float
-    plate_mass_kg: float
-    pullbacks_m: dict[str, float]
-    contacts: dict[str, Contact]
-    added_masses_kg: dict[str, float]
-    table_mass_standard_uncertainty_kg: float = 0.0
-    plate_mass_standard_uncertainty_kg: float = 0.0
-    gravity_m_per_s2: float = 9.81
-    gravity_standard_uncertainty_m_per_s2: float = 0.0
-    geometry: dict[str, float] = {}
+    name: str  # of the stand, in runs and reports
+    table_mass_kg: float  # table, box, lower plate and half of the elastic plates
+    plate_mass_kg: float  # upper plate without added mass
+    pullbacks_m: dict[str, float]  # by the first digit of a series code
+    contacts: dict[str, Contact]  # by the letters of a series code
+    added_masses_kg: dict[str, float]  # by the end of a series code, M0
+    table_mass_standard_uncertainty_kg: float = 0.0  # part of the budget of c and f_d
+    plate_mass_standard_uncertainty_kg: float = 0.0  # part of the budget of c and f_d
+    gravity_m_per_s2: float = 9.81  # at the stand
+    gravity_standard_uncertainty_m_per_s2: float = 0.0  # part of the budget of f_d
+    geometry: dict[str, float] = {}  # further lengths, kept with each run
 
     def __post_init__(self) -> None:
         self._check(_POSITIVE, "table_mass_kg", "plate_mass_kg", "gravity_m_per_s2", "pullbacks_m")
@@ -132,9 +132,9 @@ class Filter(_Checked, frozen=True):
     the amplitude has fallen by 3 dB.
     """
 
-    kind: FilterKind
-    order: int = 1
-    corner_hz: float | None = None
+    kind: FilterKind  # equal RC stages, Butterworth, Bessel, moving averages, or none
+    order: int = 1  # number of stages, of poles, or of moving averages
+    corner_hz: float | None = None  # where the amplitude has fallen by 3 dB
     corner_relative_standard_uncertainty: float = 0.05
     """The usual components are within 10 %, rectangular."""
 
@@ -163,27 +163,27 @@ class Gauge(_Checked, frozen=True):
     "not stated".
     """
 
-    gain_m_per_count: float
-    zero_count: float
-    gain_relative_standard_uncertainty: float | None = None
-    zero_standard_uncertainty_m: float | None = None
+    gain_m_per_count: float  # negative for a gauge mounted the other way; not 0
+    zero_count: float  # the count at rest
+    gain_relative_standard_uncertainty: float | None = None  # "not stated" if absent, which is warned of
+    zero_standard_uncertainty_m: float | None = None  # of the displacement at `zero_count`
     nonlinearity_m: float | None = None
     """Largest deviation from line or polynomial."""
-    delay_s: float = 0.0
-    delay_standard_uncertainty_s: float = 0.0
-    range_m: float | None = None
+    delay_s: float = 0.0  # by which this channel is later than its time stamp, without the filter
+    delay_standard_uncertainty_s: float = 0.0  # of `delay_s`
+    range_m: float | None = None  # readings beyond it on either side are clipped
     measures: Literal["relative", "plate"] = "relative"
     """Gauge 2 only: against the table (`relative`), or the plate against the base (`plate`)."""
-    serial_number: str = ""
-    reference: str = ""
-    date: datetime.date | None = None
-    valid_until: datetime.date | None = None
-    polynomial: tuple[float, ...] = ()
-    hysteresis_m: float | None = None
-    repeatability_m: float | None = None
+    serial_number: str = ""  # of the gauge
+    reference: str = ""  # what the gauge was calibrated against
+    date: datetime.date | None = None  # of the calibration
+    valid_until: datetime.date | None = None  # runs after it are warned of
+    polynomial: tuple[float, ...] = ()  # p1 (1/m) and p2 (1/m^2)
+    hysteresis_m: float | None = None  # largest difference between the way up and the way down
+    repeatability_m: float | None = None  # standard deviation of repeated readings
     certificate: str = ""
     """Of the reference."""
-    calibrated_by: str = ""
+    calibrated_by: str = ""  # name of a person
     filter: Filter | None = None
     """What `delay_s` does not include."""
 
@@ -231,20 +231,20 @@ class Gauge(_Checked, frozen=True):
 class Device(_Checked, frozen=True):
     """The amplifier that the gauges hang on. `settings` belongs to its driver, which checks it."""
 
-    protocol: str = "slipstand-binary"
-    baud: int | None = None
-    parity: Literal["N", "E", "O"] = "N"
-    stop_bits: Literal[1, 2] = 1
-    rate_hz: float | None = None
-    settings: dict[str, Any] = {}
+    protocol: str = "slipstand-binary"  # as `slipstand device list` names it
+    baud: int | None = None  # the protocol's own if absent
+    parity: Literal["N", "E", "O"] = "N"  # none, even, odd
+    stop_bits: Literal[1, 2] = 1  # of the serial line
+    rate_hz: float | None = None  # samples a second; the device's own if absent
+    settings: dict[str, Any] = {}  # as `--set KEY=VALUE` gives them
 
 
 class Gauges(_Checked, frozen=True):
     """A calibration file: both gauges, and the device they are read through."""
 
-    table: Gauge
-    relative: Gauge
-    device: Device = Device()
+    table: Gauge  # gauge 1: table against the base
+    relative: Gauge  # gauge 2: plate against the table
+    device: Device = Device()  # amplifier of both
 
 
 class GaugeCheck(_Checked, frozen=True):
@@ -296,14 +296,14 @@ class GaugeChecks(_Checked, frozen=True):
 class Settings(_Checked, frozen=True):
     """What a person has chosen for the window, and where runs go."""
 
-    theme: Literal["system", "light", "dark"] = "system"
-    language: Literal["system", "en", "ru"] = "system"
+    theme: Literal["system", "light", "dark"] = "system"  # of the window
+    language: Literal["system", "en", "ru"] = "system"  # of the window, from the next start on
     scale: float = 1.0
     """Of all that is shown, on top of the system's own scaling."""
     recordings: str = ""  # folder of the runs; empty for the usual one
     operator: str = ""  # who records, unless a run names another operator
     sounds: bool = False  # whether each state of a pullback has a sound
-    log_level: Literal["error", "warning", "info", "debug"] = "info"
+    log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
 
     def __post_init__(self) -> None:
         if not SCALE_MIN <= self.scale <= SCALE_MAX:
