@@ -15,7 +15,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 # What compiles the Arduino firmware, and the simulator that its tests run it in.
 FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 
-.PHONY: translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers screenshots study drill lock system-libraries firmware firmware-tools
+.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers screenshots study drill lock system-libraries firmware firmware-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -30,6 +30,7 @@ help:
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
+	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
 
 setup: $(READY)
@@ -123,6 +124,9 @@ drill: setup
 
 peers: setup
 	$(BIN)/python -m pytest tests -m peer -rA
+
+docs: setup
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 screenshots: setup
 	$(BIN)/python -m tools.screenshots docs/screenshots
