@@ -16,6 +16,8 @@ _EXAMPLES = {
     "plan:plan": "plan --series 1FFM0 --pullback 0.008 --rate 500",
     "import_record:import_record": "import test.csv --time t --table u1 --relative u2 --unit mm"
     " --series 1FFM0 -o test.h5",
+    "watch:watch": "watch incoming --time t --table u1 --relative u2 --unit mm --series 1FFM0"
+    " --write-table table.xlsx",
 }
 """Shown below the help of a command, by its target."""
 
@@ -81,6 +83,7 @@ class SlipstandGroup(LazyGroup):
         CommandEntry("simulate", "measurement_options:SimulateOptions", "simulate:simulate"),
         CommandEntry("plan", "measurement_options:PlanOptions", "plan:plan"),
         CommandEntry("import", "run_file_options:ImportOptions", "import_record:import_record"),
+        CommandEntry("watch", "run_file_options:WatchOptions", "watch:watch"),
         CommandEntry("export", "run_file_options:ExportOptions", "export:export"),
         CommandEntry("table", "result_options:TableOptions", "table:table"),
         CommandEntry("figures", "result_options:FiguresOptions", "figures:figures"),

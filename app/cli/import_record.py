@@ -11,7 +11,7 @@ import typer
 from app.cli import output as out
 from app.cli.errors import CommandError
 from app.cli.option_values import checked_conditions, print_mass_overrides
-from app.cli.run_file_options import FileOptions, ImportOptions
+from app.cli.run_file_options import FileOptions, ImportOptions, WatchOptions
 from app.runs.errors import RunError
 from app.runs.exchange.import_run import ImportedRun, free_path, import_foreign_file
 from app.runs.exchange.importing import ImportPlan
@@ -21,8 +21,17 @@ _HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
 
 
 def import_record(options: ImportOptions) -> None:
-    files, plan = _files(options.files), _plan(options.source)
-    metadata = {
+    files, plan = _files(options.files), import_plan(options.source)
+    metadata = import_metadata(options)
+    if len(files) == 1 and not options.output.expanduser().is_dir():
+        _import_one(files[0], plan, options, metadata)
+    else:
+        _import_many(files, plan, options, metadata)
+
+
+def import_metadata(options: ImportOptions | WatchOptions) -> dict[str, Any]:
+    """What is stated of the runs. Raises CommandError."""
+    return {
         "series": options.masses.series,
         "plate_mass_kg": options.masses.plate_mass,
         "table_mass_kg": options.masses.table_mass,
@@ -30,10 +39,6 @@ def import_record(options: ImportOptions) -> None:
         "note": options.note,
         "conditions": checked_conditions(options.conditions),
     }
-    if len(files) == 1 and not options.output.expanduser().is_dir():
-        _import_one(files[0], plan, options, metadata)
-    else:
-        _import_many(files, plan, options, metadata)
 
 
 def _import_one(file: Path, plan: ImportPlan, options: ImportOptions, metadata: dict[str, Any]) -> None:
@@ -44,9 +49,11 @@ def _import_one(file: Path, plan: ImportPlan, options: ImportOptions, metadata: 
     print_mass_overrides(options.masses)
     _print_notes(run)
     if options.as_json:
-        out.print_json(_document(run))
+        out.print_json(import_document(run))
     else:
-        out.print_line(f"{run.run}: {run.samples} samples, {', '.join(filter(None, _row(run)[1:]))}")
+        out.print_line(
+            f"{run.run}: {run.samples} samples, {', '.join(filter(None, import_summary(run)[1:]))}"
+        )
 
 
 def _import_many(
@@ -67,11 +74,11 @@ def _import_many(
         else:
             _print_notes(run)
             runs.append(run)
-            documents.append(_document(run))
+            documents.append(import_document(run))
     if options.as_json:
         out.print_json(documents)
     elif runs:
-        out.print_table(_HEADER, [_row(run) for run in runs])
+        out.print_table(_HEADER, [import_summary(run) for run in runs])
     if len(runs) < len(files):
         raise typer.Exit(1)
 
@@ -111,7 +118,7 @@ def _print_notes(run: ImportedRun) -> None:
         out.print_status(f"note: {Path(run.file).name}: {note}")
 
 
-def _document(run: ImportedRun) -> dict[str, Any]:
+def import_document(run: ImportedRun) -> dict[str, Any]:
     names = ("table_range", "relative_range")
     return {
         "run": run.run,
@@ -127,7 +134,7 @@ def _document(run: ImportedRun) -> dict[str, Any]:
     }
 
 
-def _row(run: ImportedRun) -> tuple[str, ...]:
+def import_summary(run: ImportedRun) -> tuple[str, ...]:
     """Name, length, rate, ranges and release."""
     scale, unit = (1e3, "mm") if run.unit == "m" else (1.0, run.unit)
     ranges = [f"{scale * low:.4g} to {scale * high:.4g} {unit}" for low, high in run.ranges]
@@ -141,7 +148,8 @@ def _row(run: ImportedRun) -> tuple[str, ...]:
     )
 
 
-def _plan(source: FileOptions) -> ImportPlan:
+def import_plan(source: FileOptions) -> ImportPlan:
+    """How a file is read. Raises CommandError for options that do not fit together."""
     if source.relative is not None and source.plate is not None:
         raise CommandError("--relative and --plate are both gauge 2. Give one of them")
     if source.offset is not None and source.gain is None:

@@ -80,6 +80,33 @@ class ImportOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class WatchOptions:
+    """Import and identify files of a folder as they arrive.
+
+    A file is taken when it has not changed between two looks. Run files are identified where they are. Table
+    and report are written anew after each file. Ctrl-C ends it; the next start goes on where it ended.
+    """
+
+    folder: Path = argument("Folder that files arrive in.", metavar="FOLDER")
+    output: Path | None = option("-o --output", "Folder of the runs; FOLDER/runs if absent.")
+    pattern: list[str] | None = option(
+        "--pattern", "Names of the files to take, such as *.csv; repeatable; all that can be read if absent."
+    )
+    source: FileOptions
+    masses: MassOptions
+    operator: str = option("--operator", "Who recorded.", "")
+    note: str = option("--note", "A remark kept with the run.", "")
+    conditions: ConditionOptions
+    table_file: Path | None = option(
+        "--write-table", "Table of all runs: .txt, .csv, .json, .md, .tex or .xlsx."
+    )
+    report_file: Path | None = option("--write-report", "Report of all runs: a PDF.")
+    every_s: float = number("--every", "Seconds between two looks at the folder.", 2.0, above=0.0)
+    once: bool = flag("--once", "Take what is there now, and end.")
+    as_json: bool = shared.as_json()
+
+
+@dataclass(frozen=True, kw_only=True)
 class ExportOptions:
     """Write samples and coefficients of runs for other programs.
 
@@ -88,7 +115,10 @@ class ExportOptions:
 
     runs: list[Path] = shared.run_files()
     format_name: str = choice(
-        "--format", ("csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"), "File format.", REQUIRED
+        "--format",
+        ("csv", "json", "parquet", "mat", "uff58", "xlsx", "latex", "ro-crate"),
+        "File format.",
+        REQUIRED,
     )
     output: Path = option("-o --output", "File to write; a folder for samples of several runs.", REQUIRED)
     content: str = choice(

@@ -25,15 +25,16 @@ FORMATS = {
     "mat": N_("MATLAB (.mat)"),
     "uff58": N_("Universal file 58, for modal analysis"),
     "latex": N_("LaTeX table"),
+    "ro-crate": N_("RO-Crate, to publish"),
 }
 CONTENTS = {
     "both": N_("Samples and coefficients"),
     "samples": N_("Samples"),
     "coefficients": N_("Coefficients, one table of all runs"),
 }
-_SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
+_SUFFIXES = {"uff58": ".uff", "latex": ".tex", "ro-crate": ".zip"}
 _LABELS = {"-o": message("place")}
-_CONTENTS_OF = {"uff58": ("samples",), "latex": ("coefficients",)}
+_CONTENTS_OF = {"uff58": ("samples",), "latex": ("coefficients",), "ro-crate": ("coefficients",)}
 """Contents of the formats that do not support all."""
 
 

@@ -1,12 +1,13 @@
 """Formats of exported runs: each writes the samples of a run, or a table of coefficients, to a new file."""
 
 import csv
+import io
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import msgspec
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from analysis.catalogue import Place, QuantityDefinition, definition
 from analysis.formatting import format_value
 from app.runs.errors import UnsuitableRunError
-from app.runs.exchange import content, uff58
+from app.runs.exchange import content, ro_crate, uff58
 from app.runs.exchange.content import COEFFICIENT_COLUMNS, ExportedRun, SampleColumn
 
 # --- CSV ---------------------------------------------------------------------------------
@@ -40,11 +41,13 @@ def write_csv_samples(exported: ExportedRun, path: Path) -> None:
 def write_csv_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     """Write a line a quantity."""
     with path.open("x", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COEFFICIENT_COLUMNS)
-        writer.writerows(
-            [csv_cell(value) for value in row.values()] for row in content.coefficient_rows(runs)
-        )
+        _write_coefficient_lines(runs, file)
+
+
+def _write_coefficient_lines(runs: Iterable[ExportedRun], file: TextIO) -> None:
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COEFFICIENT_COLUMNS)
+    writer.writerows([csv_cell(value) for value in row.values()] for row in content.coefficient_rows(runs))
 
 
 def csv_cell(value: Any) -> str:
@@ -286,6 +289,29 @@ def _latex_cell(column: QuantityDefinition, result: dict[str, Any] | None) -> st
 # --- All formats -------------------------------------------------------------------------
 
 
+def unique_names(exported: Iterable[str]) -> list[str]:
+    """Names of files that do not meet: a second `run` becomes `run-2`."""
+    taken: set[str] = set()
+    names = []
+    for name in exported:
+        number, free = 2, name
+        while free.casefold() in taken:
+            free, number = f"{name}-{number}", number + 1
+        taken.add(free.casefold())
+        names.append(free)
+    return names
+
+
+# --- RO-Crate ----------------------------------------------------------------------------
+
+
+def _write_ro_crate(runs: Iterable[ExportedRun], path: Path) -> None:
+    exported, coefficients = list(runs), io.StringIO()
+    _write_coefficient_lines(exported, coefficients)
+    names = unique_names(one.name for one in exported)
+    ro_crate.write_crate(exported, names, coefficients.getvalue(), path)
+
+
 @dataclass(frozen=True, slots=True)
 class ExportFormat:
     """How a format is written."""
@@ -306,5 +332,8 @@ FORMATS = {
     "xlsx": ExportFormat(".xlsx", _write_xlsx_run, _write_xlsx_coefficients),
     "latex": ExportFormat(
         ".tex", lambda exported, path: _write_latex([exported], path), _write_latex, holds_samples=False
+    ),
+    "ro-crate": ExportFormat(
+        ".zip", lambda exported, path: _write_ro_crate([exported], path), _write_ro_crate, holds_samples=False
     ),
 }

@@ -1,6 +1,6 @@
 """From run files to exported ones: what to read, whether to analyse, and where it goes."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +12,12 @@ from app.runs.analyze import AnalysisRequest, analyze_run
 from app.runs.disk import atomic_write
 from app.runs.errors import RunError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
-from app.runs.exchange.export_formats import FORMATS, ExportFormat, write_csv_coefficients
+from app.runs.exchange.export_formats import (
+    FORMATS,
+    ExportFormat,
+    unique_names,
+    write_csv_coefficients,
+)
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
@@ -32,19 +37,6 @@ def write_exported_run(name: str, exported: ExportedRun, path: Path, *, replace:
     return [path, beside]
 
 
-def unique_names(exported: Iterable[str]) -> list[str]:
-    """Names of files that do not meet: a second `run` becomes `run-2`."""
-    taken: set[str] = set()
-    names = []
-    for name in exported:
-        number, free = 2, name
-        while free.casefold() in taken:
-            free, number = f"{name}-{number}", number + 1
-        taken.add(free.casefold())
-        names.append(free)
-    return names
-
-
 Progress = Callable[[int, str], None]
 Content = Literal["both", "samples", "coefficients"]
 
@@ -52,7 +44,7 @@ Content = Literal["both", "samples", "coefficients"]
 class ExportRequest(msgspec.Struct, frozen=True):
     """What to export of runs, and in which format."""
 
-    format: Literal["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"]
+    format: Literal["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex", "ro-crate"]
     content: Content = "both"
     replace: bool = False
 
