@@ -10,10 +10,13 @@ DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT))
 
+from docutils import nodes  # noqa: E402
+from latex2mathml.converter import convert  # noqa: E402
+
 from app.version import __version__  # noqa: E402
 
 project = "Slipstand"
-author = "the Slipstand maintainers"
+author = project_copyright = "the Slipstand maintainers"
 release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build", "README.md", "notebooks"]
@@ -24,6 +27,8 @@ myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_class_signature = "separated"
+default_role = "code"  # of docstrings
+html_math_renderer = "mathml"  # which browsers show without a network
 html_theme = "furo"
 html_title = f"Slipstand {__version__}"
 html_theme_options = {
@@ -70,8 +75,16 @@ def resolve_links(_app: Any, page: str, text: list[str]) -> None:
     text[0] = _LINK.sub(resolve, text[0])
 
 
+def write_math(translator: Any, node: Any) -> None:
+    """Write a formula as MathML."""
+    display = "inline" if isinstance(node, nodes.math) else "block"
+    translator.body.append(convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> None:
     """Connect to Sphinx."""
+    app.add_html_math_renderer("mathml", (write_math, None), (write_math, None))
     app.connect("builder-inited", copy_outside_pages)
     app.connect("source-read", resolve_links)
     app.connect("include-read", lambda app, _relative, page, text: resolve_links(app, page, text))
