@@ -49,6 +49,7 @@ _STEP_PERIOD_S = 0.1
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
 _PAUSE_S = 0.04
+_ENDED_BY_OPERATOR = (messages.EndReason.STOPPED, messages.EndReason.INTERRUPTED)
 _AWAITING_PAUSE_S = 0.003
 
 
@@ -228,7 +229,12 @@ class Engine:
             self._writer.abandon()
             self._writer = WriterClient.start()
         context = RecordingContext(
-            self._stream.read_queue, self._history, self._writer, self._stream.time_base, self._events.send
+            self._stream.read_queue,
+            self._history,
+            self._writer,
+            self._stream.time_base,
+            self._events.send,
+            self._port.simulated,
         )
         self._recording = Recording(run, metadata, self._rate_hz, journal, context, self._last_slip)
         _log.info("armed: series %s, trigger %s, journal %s", run.series, run.trigger, journal.path)
@@ -239,10 +245,11 @@ class Engine:
             self._recording.show_note(note)
 
     def _end_all(self, reason: messages.EndReason, message: Message = EMPTY) -> None:
-        """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
+        """End the run and keep it; one that is stopped, or armed itself, and only waits leaves nothing."""
         self._sequence.stop()
         if self._recording is not None:
-            self._recording.end(reason, message, keep_rest=not self._sequence.is_repeat)
+            keep_rest = not (self._sequence.is_repeat or reason in _ENDED_BY_OPERATOR)
+            self._recording.end(reason, message, keep_rest=keep_rest)
 
     def _continue_alone(self) -> None:
         """The owner is gone: continue only a run that comes to its end by itself."""

@@ -66,6 +66,10 @@ class PullbackSituation:
         return abs(self.table_m - (self.position.table_zero_m or 0.0))
 
     @property
+    def is_early_release(self) -> bool:
+        return self.position.early_release_m is not None
+
+    @property
     def must_recentre(self) -> bool:
         """Tell whether the operator should push the plate back before arming."""
         allowed = self.plate_range
@@ -85,11 +89,13 @@ class Guidance:
 def guidance_for(situation: PullbackSituation) -> Guidance:
     """Choose the instruction for a situation."""
     if situation.is_device_lost:
-        return Guidance(message("Plug the device in again"), _loss_detail(situation), is_warning=True)
+        template = N_("Wait for the device") if situation.simulated else N_("Plug the device in again")
+        return Guidance(message(template), _loss_detail(situation), is_warning=True)
+    is_plate_off = situation.must_recentre or situation.state is PullbackState.RECENTRE
     instruction, detail = _push_back(situation) if situation.must_recentre else _instruct(situation)
-    is_warning = bool(situation.note) or situation.must_recentre or situation.state is PullbackState.RECENTRE
     if situation.note:
         detail = _with_note(situation, detail)
+    is_warning = is_plate_off or situation.is_early_release or bool(situation.note)
     return Guidance(instruction, detail, is_warning)
 
 
@@ -100,13 +106,15 @@ def _loss_detail(situation: PullbackSituation) -> Message:
 
 
 def _with_note(situation: PullbackSituation, detail: Message) -> Message:
-    if situation.state not in _MOVED_BY_HAND:
+    if situation.state not in _MOVED_BY_HAND and not situation.is_early_release:
         return joined([situation.note])
     return joined([detail, situation.note], " " if detail.template.endswith(".") else ". ")
 
 
 def _instruct(situation: PullbackSituation) -> tuple[Message, Message]:
     state = situation.state
+    if situation.is_early_release:
+        return _early_release(situation)
     if situation.simulated and state in _SIMULATED_TEXTS:
         instruction, detail = _SIMULATED_TEXTS[state]
         return message(instruction), message(detail)
@@ -139,6 +147,13 @@ def _pull(situation: PullbackSituation) -> tuple[Message, Message]:
         detail = message("{now}, {length} too far", now=_now(situation), length=_mm(overshoot_m))
         return message("Ease the table back to {target}", target=target), detail
     return message("Pull the table back to {target}", target=target), _now(situation)
+
+
+def _early_release(situation: PullbackSituation) -> tuple[Message, Message]:
+    early = message("Let go too early, at {length}", length=_mm(situation.position.early_release_m or 0.0))
+    if situation.simulated:
+        return early, message("The stand puts the plate back and pulls again by itself.")
+    return early, message("Put the plate back and pull again.")
 
 
 def _push_back(situation: PullbackSituation) -> tuple[Message, Message]:

@@ -66,6 +66,8 @@ class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     device: dict[str, str] = {}  # the device's own settings, `--set KEY=VALUE`, checked by its driver
     relative_url: str = ""
     """Port of the device of gauge 2, where each gauge has a device and a port of its own."""
+    simulated: bool = False
+    """The device is known to be simulated; one that can be recognised is found out without this."""
 
 
 class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -145,6 +147,9 @@ class StandPosition(msgspec.Struct, frozen=True):
     plate_m: float | None = None  # reading of gauge 2 before the pull
     plate_wanted_m: float | None = None
     """Where the plate must be put, while it stands where its next slip does not fit."""
+    early_release_m: float | None = None
+    """How far the table had been pulled when it was let go too early, until the zero is known again."""
+    keeps_run: bool = False  # a run that is stopped now is kept: the table was pulled back
 
 
 class StateChanged(msgspec.Struct, frozen=True, tag=True):

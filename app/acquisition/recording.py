@@ -48,6 +48,7 @@ class RecordingContext:
     writer: WriterClient
     time_base: Callable[[int, int], TimeBase]
     emit: Callable[[messages.Event], None]
+    is_simulated: bool = False
 
 
 class Recording:
@@ -69,7 +70,7 @@ class Recording:
         self._context = context
         self._history = context.history
         self._armed_index = context.history.next_index
-        plan = _plan(metadata, rate_hz, last_slip)
+        plan = replace(_plan(metadata, rate_hz, last_slip), is_simulated=context.is_simulated)
         self._trigger = Trigger(settings, plan, self._armed_index, context.history)
         self._checkpoints = CheckpointWriter(journal, self._armed_index, rate_hz, context.time_base)
         self._tap = JournalTap(journal)
@@ -84,6 +85,8 @@ class Recording:
         self._state = (
             messages.PullbackState.RECORDING if settings.trigger == "none" else messages.PullbackState.ZERO
         )
+        self._note = EMPTY
+        self._keeps_run = False  # as reported last
         self._open_tap()
         self._update_checkpoint()
         self._send_state(self._state, self._armed_index, self._trigger.note)
@@ -225,6 +228,8 @@ class Recording:
                     self._store_note(transition.note)
                 if transition.end_reason is None:
                     self._send_state(transition.state, transition.index, transition.note)
+            if self._trigger.position.keeps_run is not self._keeps_run:
+                self.show_note(self._note)
         self._update_checkpoint()
         self._store(read)
 
@@ -318,8 +323,10 @@ class Recording:
         return sentences(*self._notes, omitted if self._omitted_notes else EMPTY)
 
     def _send_state(self, state: messages.PullbackState, index: int, note: Message = EMPTY) -> None:
-        self._state = state
-        self._context.emit(messages.StateChanged(state, index / self._rate_hz, note, self._trigger.position))
+        self._state, self._note = state, note
+        position = self._trigger.position
+        self._keeps_run = position.keeps_run
+        self._context.emit(messages.StateChanged(state, index / self._rate_hz, note, position))
 
 
 def _plan(metadata: RunMetadata, rate_hz: float, last_slip: ObservedSlip | None) -> PullbackPlan:

@@ -83,6 +83,8 @@ class ProgressPrinter:
         if event.path:
             more = f". {event.message}" if event.message else ""
             out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
+        elif event.ended in ("stopped", "interrupted"):
+            out.print_status("nothing was recorded: the table was not pulled back")
 
     def _sentence(self, event: StateChanged) -> str:
         note = str(event.note)

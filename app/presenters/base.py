@@ -89,6 +89,8 @@ class NoticeAction(Enum):
 
     RECONNECT = N_("Connect again")
     RECOVER = N_("Recover")
+    CLOSE = N_("Close the window")
+    SIMULATE = N_("Start the simulated stand")
 
 
 @dataclass(frozen=True, slots=True)

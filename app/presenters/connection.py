@@ -145,7 +145,9 @@ class Connection:
             friction = options.friction
             if friction is None:
                 friction = published_row(options.series).friction_dynamic
-            port = PortSettings(url=stand.port, protocol=options.protocol, device=options.device)
+            port = PortSettings(
+                url=stand.port, protocol=options.protocol, device=options.device, simulated=True
+            )
             return _Opened(self._start_engine(port), stand, SimulationStarted(options.series, friction))
         except BaseException:
             stand.stop()

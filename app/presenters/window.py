@@ -38,7 +38,7 @@ from app.presenters.start_screen import PortChoice, StartPresenter, StartState
 from app.presenters.worker import LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 from messages.message import Message
 
 if TYPE_CHECKING:
@@ -49,11 +49,12 @@ else:
 
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Shown screen, notice above it, and theme (`system`, `light` or `dark`)."""
+    """Shown screen, notice above it, and theme (`system`, `light` or `dark`); `is_closing` ends the window."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
     theme: str = "system"
+    is_closing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,8 @@ class WindowPresenter(Presenter[WindowState]):
         self._count_unfinished = context.count_unfinished
         self._folder = str(context.stand.directory)
         self._open_again: Callable[[], None] | None = None
+        self._open_stand_instead: Callable[[], None] | None = None
+        self._amplifier = ""  # connected or being connected; empty without one, and with a simulated stand
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
@@ -124,22 +127,48 @@ class WindowPresenter(Presenter[WindowState]):
     def execute_notice_action(self) -> None:
         action = self.state.notice.action if self.state.notice else None
         self._update(notice=None)
-        if action is NoticeAction.RECOVER:
-            self._recover_runs()
-        else:
-            self.reconnect()
+        match action:
+            case NoticeAction.RECOVER:
+                self._recover_runs()
+            case NoticeAction.RECONNECT:
+                self.reconnect()
+            case NoticeAction.CLOSE:
+                self.close_window()
+            case NoticeAction.SIMULATE if self._open_stand_instead is not None:
+                self._open_stand_instead()
+
+    def may_close(self) -> bool:
+        """Tell whether the window may close; while a run is recorded, ask and name what becomes of it."""
+        fate = "" if self.state.is_closing else self.record.fate_when_closed
+        if fate:
+            notice = Notice(fate, Tone.WARN, NoticeAction.CLOSE, N_("Go on recording"))
+            self._update(notice=notice)
+        return not fate
+
+    def close_window(self) -> None:
+        """Close the window without asking; a run that is being recorded is ended."""
+        self._update(is_closing=True)
 
     def open_simulated(self, series: str) -> None:
         self.open_stand(self.stand.select_series(series))
 
     def open_stand(self, options: SimulatedStandOptions) -> None:
+        """Start a simulated stand and connect it; ask first if it would take the place of an amplifier."""
         waiting_for = gettext("Starting the simulated stand")
-        open_it = partial(self._connection.open_simulated, options)
-        self._connect(gettext("Simulated stand"), waiting_for, open_it)
+        start = partial(self._connection.open_simulated, options)
+        open_it = partial(self._connect, gettext("Simulated stand"), waiting_for, start)
+        if not self._amplifier or self.record.is_recording:
+            open_it()
+            return
+        self._open_stand_instead = open_it
+        device = self.start.state.connected or self._amplifier
+        text = gettext("{device} is connected. The simulated stand would take its place", device=device)
+        self._update(notice=Notice(text, Tone.WARN, NoticeAction.SIMULATE, N_("Keep the amplifier")))
 
     def open_port(self, port: PortSettings) -> None:
         waiting_for = gettext("Connecting to {port}", port=port.url)
-        self._connect(port.url, waiting_for, partial(self._connection.open_port, port))
+        open_it = partial(self._connection.open_port, port)
+        self._connect(port.url, waiting_for, open_it, amplifier=port.url)
 
     def close_connection(self) -> None:
         if not self._refuse_while_recording():
@@ -212,11 +241,14 @@ class WindowPresenter(Presenter[WindowState]):
         self.campaign.set_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
 
-    def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
+    def _connect(
+        self, device: str, waiting_for: str, open_it: Callable[[], None], amplifier: str = ""
+    ) -> None:
         if self._refuse_while_recording():
             return
-        self._open_again = partial(self._connect, device, waiting_for, open_it)
+        self._open_again = partial(self._connect, device, waiting_for, open_it, amplifier)
         self._forget_connection()
+        self._amplifier = amplifier
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
@@ -232,6 +264,8 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
+        self._amplifier = ""
+        self._withdraw_question(NoticeAction.SIMULATE)
         self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
         self.start.set_connected("")
@@ -240,6 +274,8 @@ class WindowPresenter(Presenter[WindowState]):
         if isinstance(event, SimulationStarted):
             self._true_friction = event.true_friction
         self.record.dispatch(event)
+        if isinstance(event, RunEnded | Failed):
+            self._withdraw_question(NoticeAction.CLOSE)
         if isinstance(event, Connected):
             self.start.set_connected(event.device)
             self.gauges.on_connected(event)
@@ -248,6 +284,11 @@ class WindowPresenter(Presenter[WindowState]):
         elif isinstance(event, Failed):
             self._forget_connection()
             self._update(notice=self._failure_notice(event.message, NoticeAction.RECONNECT))
+
+    def _withdraw_question(self, action: NoticeAction) -> None:
+        """Drop a question whose reason is gone."""
+        if self.state.notice is not None and self.state.notice.action is action:
+            self._update(notice=None)
 
     def _on_run_ended(self, event: RunEnded) -> None:
         if event.message:

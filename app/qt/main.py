@@ -85,7 +85,7 @@ def _save_layout(layout: WindowLayout, errors: ErrorReporter) -> None:
 
 
 def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simulated: str | None) -> int:
-    interrupts = _close_on_interrupt(window)
+    interrupts = _close_on_interrupt(presenter)
     window.show()
     if simulated is None:
         QTimer.singleShot(0, window, window.show_last_screen)
@@ -108,13 +108,13 @@ def _refuse(reason: str) -> int:
     return 1
 
 
-def _close_on_interrupt(window: MainWindow) -> list[int]:
+def _close_on_interrupt(presenter: WindowPresenter) -> list[int]:
     """Let Ctrl-C and SIGTERM close the window; the returned list takes the received signals."""
     received: list[int] = []
 
     def close(number: int, _frame: object) -> None:
         received.append(number)
-        window.close()
+        presenter.close_window()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, close)

@@ -74,7 +74,8 @@ class StartScreen(QWidget):
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
         self._presenter.refresh_ports()
-        self._try.setFocus()
+        is_connected = bool(self._presenter.state.connected)
+        (self._open if is_connected else self._try).setFocus()
 
     def _lay_out(self) -> None:
         cards = make_row(

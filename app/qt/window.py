@@ -75,6 +75,8 @@ class MainWindow(QMainWindow):
         self._stack.setCurrentWidget(self._screen(state.screen))
         self._rail[state.screen].setChecked(True)
         self._notice.show_notice(state.notice)
+        if state.is_closing and not old.is_closing:
+            QTimer.singleShot(0, self, self.close)
 
     def show_last_screen(self) -> None:
         """Show the screen of the last session, unless another one is shown by now."""
@@ -125,7 +127,11 @@ class MainWindow(QMainWindow):
         self._help.show()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Hide at once, then finish a run that is being recorded and end all processes."""
+        """Hide at once, then end a run that is being recorded and all processes; ask before that."""
+        if not self._presenter.may_close():
+            event.ignore()
+            self._notice.take_focus()
+            return
         self._timer.stop()
         self.closed.emit(self._geometry.capture(self, self._shown.screen.value))
         self.hide()
@@ -230,6 +236,10 @@ class NoticeBar(QFrame):
             self._write(notice)
         self._shown = notice
         self.setVisible(notice is not None)
+
+    def take_focus(self) -> None:
+        """Focus the button that leaves all as it is."""
+        self._dismiss.setFocus()
 
     def _write(self, notice: Notice) -> None:
         for widget in (self, self._kind):

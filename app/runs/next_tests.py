@@ -1,5 +1,6 @@
 """What is to be recorded next in a folder of runs, kept there as `next-tests.json`."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -31,6 +32,8 @@ class NextTests(msgspec.Struct, frozen=True):
     series: str = ""
     operator: str = ""
     conditions: Conditions = Conditions()
+    undecided: tuple[str, ...] = ()
+    """Names of files of runs that the operator has neither kept nor moved to the trash."""
 
     def replace(self, **changes: Any) -> Self:
         return msgspec.structs.replace(self, **changes)
@@ -56,6 +59,10 @@ def save_next_tests(folder: Path, tests: NextTests) -> None:
         made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
 
 
-def counts_as_done(run: "RunSummary") -> bool:
-    """Tell whether a run counts as a test done: it was analysed and kept, or came to its end by itself."""
-    return not run.fault and (run.analyses > 0 or run.ended in _GOOD_ENDS)
+def counts_as_done(run: "RunSummary", undecided: Collection[str] = ()) -> bool:
+    """Tell whether a run counts as a test done: it was analysed and kept, or came to its end by itself.
+
+    The latter is not enough for a run whose name is among the `undecided`.
+    """
+    is_complete = run.ended in _GOOD_ENDS and Path(run.path).name not in undecided
+    return not run.fault and (run.analyses > 0 or is_complete)

@@ -14,19 +14,10 @@ from app.acquisition.pullback.averages import (
     fit_parabola_start,
     noise_m,
 )
+from app.acquisition.pullback.notes import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
 from app.acquisition.pullback.plan import Excursion, PullbackMeasurement, PullbackPlan, Transition
 from drivers.arrays import Floats
-from messages.message import EMPTY, Message, message
-
-LET_DOWN_NOTE = message(
-    "The table was let down, not released. Pull back again, hold still, and let go at once"
-)
-NO_SLIP_NOTE = message(
-    "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"
-)
-SILENT_PLATE_NOTE = message(
-    "Gauge 2 gives no reading, so it is unknown whether the plate slips. Check its cable"
-)
+from messages.message import EMPTY, Message
 
 _RELEASE_NOISES = 6.0
 """Standard deviations of the noise that a release must exceed: fewer would be noticed by chance."""
@@ -173,7 +164,7 @@ class FreeMotion:
             return [self._enter(PullbackState.RELEASED, measurement.release_index, self._remark)]
         if since_s > _CONFIRM_S:
             measurement.release_index = measurement.excursion = None
-            return [Transition(PullbackState.PULLING, round(index), LET_DOWN_NOTE)]
+            return [Transition(PullbackState.PULLING, round(index), self._plan.note(LET_DOWN_NOTE))]
         return []
 
     def _after_a_period(self, index: float) -> list[Transition]:
@@ -185,11 +176,11 @@ class FreeMotion:
         """No single average showed a slip: check whether their mean does."""
         if math.isnan(self._readings.relative.mean(_STUCK_S, index)):
             is_new, self._is_silence_said = not self._is_silence_said, True
-            return [self._enter(self._state, index, SILENT_PLATE_NOTE)] if is_new else []
+            return [self._enter(self._state, index, self._plan.note(SILENT_PLATE_NOTE))] if is_new else []
         level = self._readings.relative.stationary(_STUCK_S, _STUCK_M)
         limit_m = _SLIP_NOISES * self._from.relative_error_m + _STUCK_M
         if level is not None and not abs(level.mean_m - self._from.relative_m) > limit_m:
-            return [self._enter(PullbackState.NO_SLIP, index, NO_SLIP_NOTE)]
+            return [self._enter(PullbackState.NO_SLIP, index, self._plan.note(NO_SLIP_NOTE))]
         return [self._enter(PullbackState.SLIPPING, self._measurement.release_index or index)]
 
     def _look_for_tail(self) -> list[Transition]:

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 
 from app.acquisition.messages import EndReason, PullbackState
-from messages.message import EMPTY, Message
+from app.acquisition.pullback.notes import OperatorNote
+from messages.message import EMPTY, Message, joined
 
 _USUAL = 1.5  # largest slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand
 _MARGIN = 0.2  # fraction by which the next slip may exceed the last one
@@ -94,6 +95,7 @@ class PullbackPlan:
     expected_excursion: Excursion | None = None
     """How far the plate is expected to go; None takes the largest of any plate."""
     side: int = 0  # side to which the table was pulled last: 1, -1, or 0 if unknown
+    is_simulated: bool = False  # nobody can touch the stand
 
     @property
     def target_m(self) -> float | None:
@@ -119,6 +121,10 @@ class PullbackPlan:
         return allowed_plate_range(
             self.relative_range_m, self.expected_excursion or default_excursion(self.nominal_m)
         )
+
+    def note(self, note: OperatorNote) -> Message:
+        """Note to the operator, with its remedy unless the stand is simulated."""
+        return note.fact if self.is_simulated else joined(note, ". ")
 
 
 @dataclass(frozen=True, slots=True)

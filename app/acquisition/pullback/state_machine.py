@@ -16,38 +16,21 @@ from app.acquisition.pullback.averages import (
     ZeroLevel,
     noise_m,
 )
+from app.acquisition.pullback.early_release import EarlyReleaseDetector
 from app.acquisition.pullback.free_motion import FreeMotion, Hold, HoldReference
+from app.acquisition.pullback.notes import (
+    ALREADY_PULLED_NOTE,
+    NO_READING_NOTE,
+    NOT_HELD_NOTE,
+    NOT_RECENTRED_NOTE,
+    RESTLESS_NOTE,
+    TIMEOUT_CAUSES,
+    OperatorNote,
+)
 from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
 from drivers.arrays import Floats
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
-
-NOT_HELD_NOTE = message(
-    "The table came back without being held still. Pull back again and hold it for a moment"
-)
-ALREADY_PULLED_NOTE = message(
-    "The table was already pulled back when armed, so its zero before the pull is not known"
-)
-NOT_RECENTRED_NOTE = message(
-    "The plate was not pushed back before the pull: its slip may leave the range of gauge 2"
-)
-RESTLESS_NOTE = message("The table has not come to rest yet, so its zero cannot be taken. Still it")
-NO_READING_NOTE = message("Gauge 1 gives no reading. Check its cable, and whether it is overloaded")
-_TIMEOUT_CAUSES = {
-    PullbackState.RECENTRE: message(
-        "the plate was not pushed back. Push it to where the next slip fits gauge 2"
-    ),
-    PullbackState.ZERO: message(
-        "the table never came to rest, or gauge 1 gave no reading. Still it, check the gauge"
-    ),
-    PullbackState.PULLING: message(
-        "the table was never held at the pullback. Pull back, hold still, let go at once"
-    ),
-    PullbackState.HELD: message(
-        "the table was held, but never steadily. Hold it without drift and let go at once"
-    ),
-    PullbackState.ARMED: message("the table was held and never let go. Let go at once when armed"),
-}
 
 _TICK_S = 0.02  # interval of slow checks; the release is looked for at each bin
 _ZERO_S = 0.3  # length of a rest level: a longer one has less noise, but needs a calmer stand
@@ -104,6 +87,8 @@ class PullbackStateMachine:
         self._hold: Hold | None = None
         self._free: FreeMotion | None = None
         self._farthest_m = 0.0
+        self._early_release = EarlyReleaseDetector(plan.nominal_m, plan.rate_hz)
+        self._early_release_m: float | None = None
         self._timeout_index = armed_index + self._span(plan.trigger_timeout_s)
         self._warning_s = min(_WARNING_S, 0.5 * plan.trigger_timeout_s)
         self._entered_at = self._last_reading = float(armed_index)
@@ -133,6 +118,8 @@ class PullbackStateMachine:
             side=self._plan.side if facts.held_m is None else round(facts.side),
             plate_m=facts.plate_m,
             plate_wanted_m=self._room.best_m if must_move and self._room else None,
+            early_release_m=self._early_release_m,
+            keeps_run=not self.is_at_rest,
         )
 
     def add_samples(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Transition]:
@@ -223,6 +210,7 @@ class PullbackStateMachine:
         self._set_zero(self._rest.level_before(index, self._noticed_m()))
         self._is_pulled = True
         self._moved_at = index
+        self._early_release.reset()
         if self.state is PullbackState.RECENTRE:
             self._enter(PullbackState.PULLING, index, NOT_RECENTRED_NOTE, is_stored=True)
         elif self.state is PullbackState.ZERO:
@@ -236,6 +224,18 @@ class PullbackStateMachine:
             self._release(self._hold, index)
         elif is_tick and not (self._hold is not None and self._hold.is_leaving):
             self._check_hold(index)
+            self._look_for_early_release(index)
+
+    def _look_for_early_release(self, index: float) -> None:
+        table_m = self._readings.table.mean(_TICK_S, index)
+        released_m = self._early_release.update(index, table_m - self._zero_m())
+        if released_m is None or not self._is_pulled:
+            return
+        self._early_release_m = released_m
+        self._hold = None
+        self._farthest_m = 0.0
+        self._moved_at = index
+        self._enter(PullbackState.ZERO, index)
 
     def _check_hold(self, index: float) -> None:
         level = self._still(_HOLD_S)
@@ -250,7 +250,7 @@ class PullbackStateMachine:
 
     def _lose_hold(self, index: float) -> None:
         self._hold = None
-        if self.state is not PullbackState.PULLING:
+        if self.state in (PullbackState.HELD, PullbackState.ARMED):
             self._moved_at = index
             self._enter(PullbackState.PULLING, index)
 
@@ -288,13 +288,14 @@ class PullbackStateMachine:
         return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
     def _on_returned(self, index: float) -> None:
-        was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m
+        is_expected = self._early_release_m is not None
+        was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m and not is_expected
         self._is_pulled = False
         self._hold = None
         self._farthest_m = 0.0
         self._rest.reset()
-        if was_pulled or self.state is not PullbackState.PULLING:
-            self._enter(PullbackState.ZERO, index, NOT_HELD_NOTE)
+        if was_pulled:
+            self._enter(PullbackState.ZERO, index, self._plan.note(NOT_HELD_NOTE))
 
     def _release(self, hold: Hold, index: float) -> None:
         remark = self._remark(hold, index)
@@ -304,16 +305,15 @@ class PullbackStateMachine:
     def _remark(self, hold: Hold, index: float) -> Message:
         if self.state is PullbackState.ARMED:
             return EMPTY
-        if self.state is PullbackState.PULLING and self._plan.target_m is not None:
+        if self.state is not PullbackState.HELD and self._plan.target_m is not None:
             return message(
                 "Released from {pulled_mm:.2f} mm instead of {planned_mm:g} mm",
                 pulled_mm=1e3 * abs(self.measurement.pulled_m),
                 planned_mm=1e3 * self._plan.target_m,
             )
-        return message(
-            "Released before it was armed, {held_s:.1f} s after the pull. Hold still until it says armed",
-            held_s=(index - hold.since) / self._plan.rate_hz,
-        )
+        template = N_("Released before it was armed, {held_s:.1f} s after the pull")
+        held = message(template, held_s=(index - hold.since) / self._plan.rate_hz)
+        return self._plan.note(OperatorNote(held, message("Hold still until it says armed")))
 
     # --- released ---
 
@@ -323,6 +323,7 @@ class PullbackStateMachine:
                 self._hold = self._free = None
                 self._moved_at = bins.center[-1].item()
                 self._farthest_m = 0.0  # the note says that the table was let down; no second one
+                self._early_release.reset()
             self._add(transition)
 
     # --- in any state ---
@@ -344,7 +345,7 @@ class PullbackStateMachine:
             note = message(
                 "no release within {timeout_s:g} s: {cause}",
                 timeout_s=self._plan.trigger_timeout_s,
-                cause=_TIMEOUT_CAUSES[self.state],
+                cause=self._plan.note(TIMEOUT_CAUSES[self.state]),
             )
             reason = EndReason.TRIGGER_TIMEOUT
             self._add(Transition(PullbackState.CLOSING, round(self._timeout_index), note, True, reason))
@@ -361,18 +362,21 @@ class PullbackStateMachine:
             return EMPTY
         if self.state is PullbackState.ZERO:
             is_silent = now - self._last_reading > self._span(_SILENT_S)
-            return NO_READING_NOTE if is_silent else RESTLESS_NOTE
+            return self._plan.note(NO_READING_NOTE if is_silent else RESTLESS_NOTE)
         if self.state is PullbackState.HELD:
-            drift_m_per_s = self._readings.table.drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
-            if drift_m_per_s or now >= self._filled_index:
-                template = N_("The table drifts by {drift_mm_per_s:.2f} mm/s. Hold it still")
-                return message(template, drift_mm_per_s=1e3 * abs(drift_m_per_s))
-            return message(
-                "The {pretrigger_s:g} s that are kept from before the release are not there yet. Go on"
-                " holding",
-                pretrigger_s=self._plan.pretrigger_s,
-            )
+            return self._plan.note(self._hold_note(now))
         return EMPTY
+
+    def _hold_note(self, now: float) -> OperatorNote:
+        """Why a hold is not armed."""
+        drift_m_per_s = self._readings.table.drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
+        if drift_m_per_s or now >= self._filled_index:
+            template = N_("The table drifts by {drift_mm_per_s:.2f} mm/s")
+            drift = message(template, drift_mm_per_s=1e3 * abs(drift_m_per_s))
+            return OperatorNote(drift, message("Hold it still"))
+        template = N_("The {pretrigger_s:g} s that are kept from before the release are not there yet")
+        missing = message(template, pretrigger_s=self._plan.pretrigger_s)
+        return OperatorNote(missing, message("Go on holding"))
 
     def _enter(
         self, state: PullbackState, index: float, note: Message = EMPTY, *, is_stored: bool = False
@@ -382,6 +386,8 @@ class PullbackStateMachine:
     def _add(self, transition: Transition) -> None:
         if transition.state is not self.state:
             self.state = transition.state
+            if self.state is not PullbackState.ZERO:
+                self._early_release_m = None
             self._entered_at = transition.index
             self._hinted.clear()
         self._transitions.append(transition)

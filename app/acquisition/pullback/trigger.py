@@ -59,7 +59,7 @@ class Trigger:
 
     @property
     def position(self) -> StandPosition:
-        return StandPosition() if self._is_untriggered else self._test.position
+        return StandPosition(keeps_run=True) if self._is_untriggered else self._test.position
 
     @property
     def start_index(self) -> int | None:

@@ -34,6 +34,8 @@ _MEAN_S = 0.05  # readings are means over this time: noise is suppressed, a pull
 _READINGS_EVERY_S = 0.1  # digits that change more often cannot be read
 PIXELS_MIN = 64
 _SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
+_SIDE_KNOWN = 0.05
+"""Part of the pullback from which on the table counts as pulled to its side: above noise and a knock."""
 _LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
 """Axes grow in steps, so that they seldom change."""
 _AFTER_RELEASE = (PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL)
@@ -70,6 +72,7 @@ class LiveTraces:
     end_s: float | None = None
     """On the time axis of the samples; None as long as they have not happened."""
     is_pulled: bool = False  # the table is being pulled or held
+    side: int = 0  # side to which the table is pulled, or was pulled last: 1, -1, or 0 if unknown
     is_held: bool = False
     read_s: float = float("-inf")
     traces: Traces = field(default_factory=Traces)
@@ -126,7 +129,8 @@ class LiveTraces:
         zero_m = changed.zero_m
         if position.table_zero_m is not None:
             zero_m = np.array([position.table_zero_m, position.relative_zero_m or 0.0])
-        return replace(changed, state=state, tolerance_m=position.tolerance_m, zero_m=zero_m)
+        side = position.side or changed.side
+        return replace(changed, state=state, tolerance_m=position.tolerance_m, zero_m=zero_m, side=side)
 
     def with_rows(
         self, rows: RingRows, pullback_m: float, plate_range: AllowedPlateRange | None
@@ -137,7 +141,10 @@ class LiveTraces:
         """
         is_settled = self.is_settled
         self.samples.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
-        changed = self if is_settled else replace(self, traces=self._draw(pullback_m, plate_range))
+        changed = self
+        if not is_settled:
+            changed = replace(self, side=self._side(pullback_m)) if self.is_pulled else self
+            changed = replace(changed, traces=changed._draw(pullback_m, plate_range))
         newest_s = float(rows.time_s[-1])
         return changed if newest_s - self.read_s < _READINGS_EVERY_S else changed._read(newest_s)
 
@@ -183,7 +190,7 @@ class LiveTraces:
             before_release=(-BEFORE_RELEASE_S, 0.0) if is_released else None,
             release_s=0.0 if is_released else None,
             slip=self._slip_span(origin_s, span),
-            target_mm=self._target_mm(table, pullback_m) if self.is_pulled else None,
+            target_mm=self._target_mm(pullback_m) if self.is_pulled else None,
             table_range_mm=self._range_mm(0),
             relative_range_mm=self._range_mm(1),
             plate_range_mm=None if room is None else self._shown_mm(1, room.low_m, room.high_m),
@@ -206,10 +213,17 @@ class LiveTraces:
             return now_s, (-ROLLING_S, 0.0)
         return self.release_s, (-BEFORE_RELEASE_S, _step_up(now_s - self.release_s, _SPANS_S))
 
-    def _target_mm(self, table: Polyline, pullback_m: float) -> Span | None:
-        if len(table.value) == 0:
+    def _side(self, pullback_m: float) -> int:
+        """Side of the pull; as before until the table is far enough on one."""
+        pulled_m = float(self.newest_m()[0] - self.zero_m[0])
+        if not abs(pulled_m) > _SIDE_KNOWN * pullback_m:  # also NaN
+            return self.side
+        return 1 if pulled_m > 0.0 else -1
+
+    def _target_mm(self, pullback_m: float) -> Span | None:
+        if not self.side:
             return None
-        target_m = -pullback_m if table.value[-1] < 0.0 else pullback_m
+        target_m = self.side * pullback_m
         return 1e3 * (target_m - self.tolerance_m), 1e3 * (target_m + self.tolerance_m)
 
     def _range_mm(self, channel: int) -> Span | None:

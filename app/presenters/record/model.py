@@ -17,6 +17,8 @@ from app.presenters.results import FRICTION, Result, make_row
 from config.schema import Gauges
 from messages.i18n import gettext
 
+_ORDER = tuple(PullbackState)
+"""A test goes through its states in this order; from a state before, it begins again."""
 _NOT_RECORDING = {PullbackState.CONNECTING, PullbackState.IDLE, PullbackState.CLOSING}
 RECORDING_STATES = frozenset(PullbackState) - _NOT_RECORDING
 
@@ -90,6 +92,8 @@ class ArmedRun:
 class Session:
     engine: PullbackState | None = None  # state that the engine reported last; None without an engine
     is_command_pending: bool = False  # the engine has not yet answered a command
+    reached: frozenset[PullbackState] = frozenset()
+    """States that the present test has gone through; ZERO only if the zero was measured."""
     position: StandPosition = field(default_factory=StandPosition)
     note: str = ""
     loss_reason: str = ""
@@ -110,8 +114,23 @@ class Session:
         return self.engine in RECORDING_STATES
 
     @property
+    def disarms(self) -> bool:
+        """Tell whether stopping now leaves no run."""
+        return self.is_recording and not self.position.keeps_run
+
+    @property
     def is_idle(self) -> bool:
         return self.engine is PullbackState.IDLE
+
+    def reaching(self, state: PullbackState, position: StandPosition) -> frozenset[PullbackState]:
+        """States gone through when the test comes to `state`; going back, later ones are forgotten."""
+        number = _ORDER.index(state)
+        reached = {one for one in self.reached if _ORDER.index(one) < number} | {state}
+        if number > _ORDER.index(PullbackState.ZERO):
+            reached.discard(PullbackState.ZERO)
+            if position.table_zero_m is not None:
+                reached.add(PullbackState.ZERO)
+        return frozenset(reached)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +139,15 @@ class EndedRun:
 
     event: RunEnded
     run: ArmedRun
+    reached: frozenset[PullbackState] = frozenset()
+    true_friction: float | None = None
+    """f_d of the simulated stand that the run was recorded from; None of a real one."""
     result: Result | None = None
     """None while the run is being identified."""
+    is_identified: bool = False
     progress: Progress | None = None
+    is_left: bool = False
+    """Another device was connected since: going on with it decides nothing about the run."""
 
     @property
     def is_awaited(self) -> bool:
@@ -182,8 +207,17 @@ class RecordModel:
         elif session.is_idle:
             allowed.add(Action.TARE)
         if self.decisions.pending is not None:
-            allowed |= {Action.DISCARD} | ({Action.REPEAT} if session.is_idle else set())
+            allowed |= {Action.DISCARD} | ({Action.REPEAT} if self._can_repeat else set())
         return frozenset(allowed)
+
+    @property
+    def _can_repeat(self) -> bool:
+        """Tell whether the connected device can record the run that is shown once more."""
+        ended, next_runs = self.ended, self.next_runs
+        if ended is None or not self.session.is_idle:
+            return False
+        is_same_series = next_runs.can_choose_series or next_runs.series == ended.run.series
+        return is_same_series and self.session.simulated == (ended.true_friction is not None)
 
     @property
     def undo_text(self) -> str:

@@ -101,6 +101,7 @@ class NextRuns:
     def with_loaded_plan(self, loaded: LoadedPlan) -> "NextRuns":
         """Take what is stored in the folder; what was edited before stays."""
         changed = replace(self, is_loaded=True, saved=loaded.tests)
+        undecided = tuple(dict.fromkeys((*loaded.tests.undecided, *self.tests.undecided)))
         if not self.is_edited:
             stored = loaded.tests
             is_possible = stored.series in self.choices.all_series and not self.choices.series_fixed
@@ -109,6 +110,7 @@ class NextRuns:
             operator = stored.operator or self.choices.form.operator
             form = replace(self.choices.form, **texts, operator=operator)
             changed = replace(changed, tests=stored).with_choices(series=series, form=form)
+        changed = replace(changed, tests=changed.tests.replace(undecided=undecided))
         return changed.with_completed(loaded.completed).with_next_series()
 
     def with_completed(self, completed: CompletedRuns) -> "NextRuns":
@@ -120,8 +122,16 @@ class NextRuns:
         return self.with_completed((*others, (path, series)) if series else others)
 
     def with_undecided(self, path: str) -> "NextRuns":
-        """Do not count the run at `path` until it is decided about; none if empty."""
-        return replace(self, undecided_path=path)._counted()
+        """Do not count the run at `path` until it is decided about."""
+        names = dict.fromkeys((*self.tests.undecided, Path(path).name))
+        tests = self.tests.replace(undecided=tuple(names))
+        return replace(self, undecided_path=path, tests=tests)._counted()
+
+    def with_decision(self) -> "NextRuns":
+        """The run that waited for a decision, if there is one, has been decided about."""
+        decided = Path(self.undecided_path).name
+        tests = self.tests.replace(undecided=tuple(one for one in self.tests.undecided if one != decided))
+        return replace(self, undecided_path="", tests=tests)._counted()
 
     def with_next_series(self) -> "NextRuns":
         """Choose the next series of the plan if the current one is complete."""

@@ -11,7 +11,7 @@ from app.presenters.base import Chip, Presenter, Tone
 from app.presenters.connection import Connection
 from app.presenters.navigator import StandContext
 from app.presenters.record import state
-from app.presenters.record.model import RecordModel
+from app.presenters.record.model import EndedRun, RecordModel
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import Action, Cue, TaskDone, TaskFailed
 from app.presenters.results import sentence
@@ -24,16 +24,23 @@ if TYPE_CHECKING:
 else:
     tasks = LazyModule("app.presenters.record.tasks")
 
-_STEPS: tuple[tuple[str, frozenset[PullbackState]], ...] = (
-    (N_("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
-    (N_("Pull"), frozenset({PullbackState.PULLING})),
-    (N_("Hold"), frozenset({PullbackState.HELD})),
-    (N_("Armed"), frozenset({PullbackState.ARMED})),
-    (N_("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
-    (N_("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
-    (N_("Store"), frozenset({PullbackState.CLOSING})),
-    (N_("Result"), frozenset()),
+_HELD = frozenset({PullbackState.HELD, PullbackState.ARMED})
+_TAIL = frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})
+_STEPS: tuple[tuple[str, frozenset[PullbackState], frozenset[PullbackState]], ...] = (
+    (N_("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO}), frozenset({PullbackState.ZERO})),
+    (N_("Pull"), frozenset({PullbackState.PULLING}), _HELD | {PullbackState.RELEASED}),
+    (N_("Hold"), frozenset({PullbackState.HELD}), _HELD),
+    (N_("Armed"), frozenset({PullbackState.ARMED}), frozenset({PullbackState.ARMED})),
+    (
+        N_("Slip"),
+        frozenset({PullbackState.RELEASED, PullbackState.SLIPPING}),
+        frozenset({PullbackState.SLIPPING}),
+    ),
+    (N_("Tail"), _TAIL, _TAIL),
+    (N_("Store"), frozenset({PullbackState.CLOSING}), frozenset({PullbackState.CLOSING})),
 )
+"""Name of each step, the states during it, and those of which one shows afterwards that it happened."""
+_RESULT = N_("Result")
 _CUES = {
     PullbackState.RECENTRE: Cue.TROUBLE,
     PullbackState.PULLING: Cue.PULL,
@@ -41,6 +48,7 @@ _CUES = {
     PullbackState.ARMED: Cue.LET_GO,
     PullbackState.RELEASED: Cue.RELEASED,
 }
+_RELEASED = frozenset({PullbackState.RELEASED, PullbackState.SLIPPING, PullbackState.RECORDING}) | _TAIL
 _TARGET_SHOWN = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
@@ -63,6 +71,29 @@ class RecordPresenter(Presenter[state.RecordState]):
     def is_recording(self) -> bool:
         session = self._model.session
         return session.is_recording or session.engine is PullbackState.CLOSING
+
+    @property
+    def fate_when_closed(self) -> str:
+        """What becomes of the run that is being recorded if the window is closed; empty without one."""
+        session = self._model.session
+        if not session.is_recording:
+            return ""
+        if session.disarms:
+            return gettext(
+                "A run of {series} is armed. Closing the window disarms it: nothing is recorded",
+                series=session.run.series,
+            )
+        if session.reached & _RELEASED:
+            return gettext(
+                "A run of {series} is being recorded. Closing the window ends it now: it is kept without a"
+                " decision, and does not count in the plan",
+                series=session.run.series,
+            )
+        return gettext(
+            "A run of {series} is being recorded. Closing the window ends it before the release: it is kept"
+            " without a decision, and does not count in the plan",
+            series=session.run.series,
+        )
 
     def dispatch(self, event: state.RecordEvent) -> None:
         before = self._model
@@ -136,6 +167,7 @@ def record_state(model: RecordModel) -> state.RecordState:
         undo=model.undo_text,
         allowed=allowed,
         primary=primary if primary in allowed and not (ended and ended.is_awaited) else None,
+        disarms=session.disarms,
         connected=session.engine is not None,
     )
 
@@ -168,15 +200,22 @@ def _target(model: RecordModel) -> state.PullbackTarget | None:
 
 
 def _steps(model: RecordModel) -> tuple[state.Step, ...]:
-    engine, ended = model.session.engine, model.ended
-    now = next((number for number, (_, states) in enumerate(_STEPS) if engine in states), -1)
-    if ended is not None:
-        now = len(_STEPS) - (1 if ended.is_awaited else 0)
+    """Steps of the test; those that happened are ticked, whatever came after them."""
+    ended = model.ended
+    engine = model.session.engine if ended is None else None
+    reached = model.session.reached if ended is None else ended.reached
     steps = []
-    for number, (name, _) in enumerate(_STEPS):
-        status = state.StepStatus.DONE if number < now else state.StepStatus.AHEAD
-        steps.append(state.Step(gettext(name), state.StepStatus.NOW if number == now else status))
-    return tuple(steps)
+    for name, states, happened in _STEPS:
+        status = state.StepStatus.DONE if happened & reached else state.StepStatus.AHEAD
+        steps.append(state.Step(gettext(name), state.StepStatus.NOW if engine in states else status))
+    return (*steps, state.Step(gettext(_RESULT), _result_status(ended)))
+
+
+def _result_status(ended: EndedRun | None) -> state.StepStatus:
+    if ended is not None and ended.is_awaited:
+        return state.StepStatus.NOW
+    is_identified = ended is not None and ended.is_identified
+    return state.StepStatus.DONE if is_identified else state.StepStatus.AHEAD
 
 
 def _cue(model: RecordModel) -> Cue | None:
@@ -185,7 +224,9 @@ def _cue(model: RecordModel) -> Cue | None:
         return None if ended.is_awaited else Cue.RESULT
     if engine is None:
         return None
-    return Cue.TROUBLE if model.situation(engine).is_device_lost else _CUES.get(engine)
+    situation = model.situation(engine)
+    is_trouble = situation.is_device_lost or situation.is_early_release
+    return Cue.TROUBLE if is_trouble else _CUES.get(engine)
 
 
 def _status_message(model: RecordModel) -> Chip:

@@ -1,11 +1,12 @@
 """Reducer of the Record screen: model and event in, new model and effects out."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from app.acquisition import messages as engine
-from app.acquisition.messages import PullbackState
+from app.acquisition.messages import EndReason, PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
@@ -24,7 +25,7 @@ from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.state import Action, AnalysisFailed, AnalysisProgress, TaskDone, TaskFailed
 from app.presenters.results import Result, sentence
 from config.schema import Gauges, Settings
-from messages.i18n import gettext
+from messages.i18n import gettext, ngettext
 from messages.message import Message
 
 Effect = engine.Command | state.RecordTask  # a command for the engine, or a task for the worker
@@ -81,7 +82,7 @@ class _Reduction:
             case TaskFailed(task, message):
                 self._on_task_failed(task, message)
             case state.Connecting(device, waiting_for):
-                self._close_ended()
+                self._leave_ended()
                 self._set_session(true_friction=None, waiting_for=waiting_for)
                 self._load_plan()
                 self._start_over(PullbackState.CONNECTING, device)
@@ -148,8 +149,11 @@ class _Reduction:
 
     def _arm(self, count: int | None = None) -> None:
         """Send the next run to the engine, or show why it cannot be recorded."""
-        series = self.model.next_runs.series
+        series, ended = self.model.next_runs.series, self.model.ended
         reason = self.model.next_runs.why_not_armed(series)
+        if ended is not None and ended.is_left:
+            name = Path(ended.event.path).stem
+            reason = Chip(gettext("Decide about {name} first", name=name), Tone.WARN)
         if not reason.text:
             self._close_ended()
             reason = self.model.next_runs.why_not_armed(series)
@@ -194,13 +198,22 @@ class _Reduction:
         elif ended.result.path:
             self._set(snapshot=Snapshot(ended, model.live.traces, model.next_runs.series))
         run = self._decide()
-        next_runs = model.next_runs.with_undecided("")
+        next_runs = model.next_runs.with_decision()
         if run is not None:
             self._keep(run)
         if run is not None and run.has_results:
             next_runs = next_runs.with_run(run.path, ended.run.series).with_next_series()
-        self._set(next_runs=next_runs, live=self.model.live.restarted(), ended=None)
+        self._set(live=self.model.live.restarted(), ended=None)
+        self._save(next_runs)
         self._set_session(live_estimate=state.LiveEstimate())
+
+    def _leave_ended(self) -> None:
+        """Another device is connected: the run that is shown still waits for its decision."""
+        ended = self.model.ended
+        if ended is not None and ended.event.path:
+            self._set(ended=replace(ended, is_left=True))
+        else:
+            self._close_ended()
 
     def _undo(self) -> None:
         decisions = self.model.decisions
@@ -223,7 +236,7 @@ class _Reduction:
         ended = replace(snapshot.ended, result=replace(snapshot.ended.result, path=run.path))
         self._set(ended=ended, live=self.model.live.held(snapshot.traces))
         self._choose_series(snapshot.next_series)
-        self._set(next_runs=self.model.next_runs.with_undecided(run.path))
+        self._save(self.model.next_runs.with_undecided(run.path))
 
     # --- answers of the worker ---
 
@@ -232,6 +245,7 @@ class _Reduction:
         match task:
             case state.LoadPlan():
                 self._save(model.next_runs.with_loaded_plan(answer))
+                self._remind_of(answer.tests.undecided)
             case state.CountCompletedRuns():
                 self._set(next_runs=model.next_runs.with_completed(answer).with_next_series())
             case state.KeepRun(path):
@@ -279,6 +293,19 @@ class _Reduction:
         if isinstance(task, state.LoadPlan):  # the stored plan cannot be read; the runs can
             self._count_completed()
 
+    def _remind_of(self, undecided: Sequence[str]) -> None:
+        """Name the runs that were left without a decision when the window was closed."""
+        if undecided:
+            text = ngettext(
+                "{name} still waits for a decision, and does not count: analyse it on Runs to keep it, or"
+                " move it to the trash there",
+                "{count} runs still wait for a decision, and do not count: analyse them on Runs to keep"
+                " them, or move them to the trash there",
+                len(undecided),
+                name=Path(undecided[0]).stem,
+            )
+            self._set_decisions(message=Chip(text, Tone.WARN))
+
     def _load_plan(self) -> None:
         if not self.model.next_runs.is_requested:
             self._set(next_runs=replace(self.model.next_runs, is_requested=True))
@@ -306,7 +333,7 @@ class _Reduction:
             case AnalysisProgress(_, progress):
                 self._set(ended=replace(ended, progress=progress))
             case AnalysedRun():
-                result = results.make_result(event, model.session.true_friction)
+                result = results.make_result(event, ended.true_friction)
                 self._set_result(ended, result, RecordedRun.of(event))
             case AnalysisFailed(_, message):
                 result = results.failed_result(message, path, ended.event.ended)
@@ -325,7 +352,8 @@ class _Reduction:
             self._keep(RecordedRun.of(event))
 
     def _set_result(self, ended: EndedRun, result: Result, pending: RecordedRun) -> None:
-        self._set(ended=replace(ended, result=result, progress=None))
+        ended = replace(ended, result=result, is_identified=pending.has_results, progress=None)
+        self._set(ended=ended)
         self._set_decisions(pending=pending)
 
     # --- engine and connection ---
@@ -339,10 +367,13 @@ class _Reduction:
         if device:
             bar = state.StatusBar(live.device_chip(device), run=model.status_bar.run)
         gauges = model.stand.gauges
-        self._set(status_bar=bar, monitors=monitors_of(gauges), live=model.live.reconnected(gauges))
+        traces = model.live.reconnected(gauges)
         if model.ended is None:
-            self._set(live=self.model.live.cleared(model.pullback_m))
+            traces = traces.cleared(model.pullback_m)
             self._set_session(live_estimate=state.LiveEstimate())
+        else:
+            traces = traces.held(traces.traces)
+        self._set(status_bar=bar, monitors=monitors_of(gauges), live=traces)
 
     def _on_engine(self, event: engine.Event) -> None:
         self._set_session(heard_s=self.model.stand.clock())
@@ -363,6 +394,7 @@ class _Reduction:
                 self._set_session(live_estimate=live.live_estimate(event))
             case engine.RunStarted(path):
                 self._set_session(run=replace(self.model.session.run, name=Path(path).stem))
+                self._save(self.model.next_runs.with_undecided(path))
             case engine.RunEnded():
                 self._on_run_ended(event)
 
@@ -375,7 +407,8 @@ class _Reduction:
         if event.state in RECORDING_STATES and follows:  # without a command: the next run in a row
             remaining = max(remaining - 1, 0)
         self._set(live=self.model.live.on_state(event.state, event.since_s, event.position))
-        self._set_session(engine=event.state, position=event.position, note=event.note)
+        reached = session.reaching(event.state, event.position)
+        self._set_session(engine=event.state, reached=reached, position=event.position, note=event.note)
         self._set_session(remaining_runs=remaining, is_command_pending=False, waiting_for="")
         if event.state in _NEW_MOTION:
             self._set_session(live_estimate=state.LiveEstimate())
@@ -383,7 +416,11 @@ class _Reduction:
     def _on_run_ended(self, event: engine.RunEnded) -> None:
         session = self.model.session
         self._set_session(is_command_pending=False, remaining_runs=event.remaining)
-        ended = EndedRun(event, session.run)
+        if not event.path and event.ended is EndReason.STOPPED and not event.message:
+            self._on_disarmed()
+            return
+        self._set_session(run=replace(session.run, name=""))
+        ended = EndedRun(event, session.run, session.reached, session.true_friction)
         if event.path:
             self._save(self.model.next_runs.with_undecided(event.path).after_recording())
             ended = replace(ended, progress=Progress(gettext("Identifying")))
@@ -392,6 +429,12 @@ class _Reduction:
             ended = replace(ended, result=results.failed_result(reason, "", event.ended))
         self._set(ended=ended, live=self.model.live.stopped())
         self._forget_last()
+
+    def _on_disarmed(self) -> None:
+        """The operator stopped before the table was pulled back: there is no run."""
+        self._set(live=self.model.live.restarted())
+        self._forget_last()
+        self._set_decisions(message=Chip(gettext("Disarmed. Nothing was recorded")))
 
     def _set_loss(self, reason: str) -> None:
         self._set_session(loss_reason=reason)

@@ -227,6 +227,8 @@ class RecordState:
     cue: Cue | None = None
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
+    disarms: bool = False
+    """`Action.STOP` keeps no run, since the table has not been pulled back."""
     connected: bool = False
 
 

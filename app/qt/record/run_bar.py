@@ -26,11 +26,12 @@ from messages.i18n import N_, gettext, ngettext
 _BUTTONS = {
     Action.TARE: (N_("Tare"), "T", N_("Read both gauges from here; calibration and runs stay")),
     Action.ARM: (N_("Arm"), "A", N_("Record the next pullback")),
-    Action.STOP: (N_("Stop"), "Esc", N_("End the recording now and keep it")),
+    Action.STOP: (N_("Stop"), "Esc", N_("End the recording now and keep it; before the pull, disarm")),
     Action.NEXT: (N_("Next"), "Enter", N_("Make ready for the next run")),
 }
 """Label, key and description of each action."""
 _FOLD = N_("Operator, conditions, runs in a row, note")
+_DISARM = (N_("Disarm"), N_("End without a run: the table has not been pulled back"))
 _KEEP = (N_("Keep"), N_("Keep the run with what was found in it, and go on"))
 _STRIP_SPACING = 4
 _FORM_FIELDS = {
@@ -99,10 +100,11 @@ class RunBar(QFrame):
             button.setEnabled(action in allowed)
             is_primary = action is primary and not keeps  # the button of the decision panel is, then
             set_property(button, "primary", "true" if is_primary else "false")
-        text, key, description = _BUTTONS[Action.NEXT]
-        text, description = _KEEP if keeps else (text, description)
-        self._buttons[Action.NEXT].setText(f"{gettext(text)}   {key}")
-        set_button_hint(self._buttons[Action.NEXT], gettext(description))
+        self._name(Action.NEXT, _KEEP if keeps else None)
+
+    def show_stop(self, disarms: bool) -> None:
+        """Say whether Stop keeps a run or none."""
+        self._name(Action.STOP, _DISARM if disarms else None)
 
     def take_focus(self) -> None:
         usable = [button for button in self._buttons.values() if button.isEnabled()]
@@ -130,6 +132,13 @@ class RunBar(QFrame):
         button.setMinimumWidth(108)
         bind_button(button, ("Return", "Enter") if key == "Enter" else key, gettext(description), self)
         return button
+
+    def _name(self, action: Action, name: tuple[str, str] | None) -> None:
+        """Give a button another label and description for the present state; None its usual ones."""
+        text, key, description = _BUTTONS[action]
+        text, description = name or (text, description)
+        self._buttons[action].setText(f"{gettext(text)}   {key}")
+        set_button_hint(self._buttons[action], gettext(description))
 
     def _choose_series(self, series: str) -> None:
         self._dispatch(SeriesChosen(series))

@@ -57,6 +57,7 @@ class RecordScreen(QWidget):
             "live_estimate": self._guidance.show_live_estimate,
             "progress": self._guidance.show_progress,
             "result": self._show_result,
+            "disarms": self._bar.show_stop,
         }
         card = make_frame(self._plots)
         middle = make_row((card, 1), self._column, spacing=8)

@@ -110,3 +110,19 @@ def test_a_lost_device_comes_first():
     assert str(guidance.instruction) == "Plug the device in again"
     assert str(guidance.detail) == "COM7 is gone. The run goes on when it is back."
     assert guidance.is_warning
+
+
+def test_an_early_release_is_the_instruction_until_the_zero_is_known_again():
+    position = StandPosition(0.012, 0.24e-3, 0.2e-3, early_release_m=0.00404)
+    swinging = PullbackSituation(PullbackState.ZERO, position, 0.003, note="It swings")
+    guidance = guidance_for(swinging)
+    assert str(guidance.instruction) == f"Let go too early, at 4.0{MM}"
+    assert str(guidance.detail) == "Put the plate back and pull again. It swings"
+    assert guidance.is_warning
+    simulated = guidance_for(PullbackSituation(PullbackState.ZERO, position, simulated=True))
+    assert str(simulated.detail) == "The stand puts the plate back and pulls again by itself."
+
+
+def test_nobody_is_asked_to_plug_in_a_simulated_device():
+    lost = PullbackSituation(PullbackState.TAIL, AT_REST, simulated=True, loss_reason="the port is gone")
+    assert str(guidance_for(lost).instruction) == "Wait for the device"

@@ -10,16 +10,25 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 
 from app.acquisition.messages import EndReason
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.free_motion import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
-from app.acquisition.pullback.plan import PullbackPlan, Transition
-from app.acquisition.pullback.state_machine import (
+from app.acquisition.pullback.notes import (
     ALREADY_PULLED_NOTE,
+    LET_DOWN_NOTE,
     NO_READING_NOTE,
+    NO_SLIP_NOTE,
     NOT_HELD_NOTE,
     RESTLESS_NOTE,
+    SILENT_PLATE_NOTE,
+    OperatorNote,
 )
+from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.simulated_stand.options import Timetable
 from config.files import load_stand, published_table
+from messages.message import Message, joined
+
+
+def told(note: OperatorNote) -> Message:
+    """A note as an operator at a real stand reads it."""
+    return joined(note, ". ")
 
 
 def pullback_of(series):
@@ -123,7 +132,7 @@ def test_a_plate_that_stays_on_the_table_is_told_and_the_run_goes_on_to_its_end(
     test, turns, _ = follow(plan, table, relative)
     assert states(turns) == [*TO_RELEASE, State.NO_SLIP, State.CLOSING]
     (said,) = (turn for turn in turns if turn.note)
-    assert (said.note, said.is_stored) == (NO_SLIP_NOTE, True)
+    assert (said.note, said.is_stored) == (told(NO_SLIP_NOTE), True)
     assert test.measurement.slip_end_index is None
     assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
 
@@ -247,7 +256,7 @@ def test_a_gauge_1_without_a_reading_is_said():
     nothing = np.full(2000, np.nan)
     test, turns, _ = follow(PullbackPlan(1000.0, trigger_timeout_s=math.inf), nothing, nothing)
     assert test.state is State.ZERO
-    assert notes(turns) == [NO_READING_NOTE]
+    assert notes(turns) == [told(NO_READING_NOTE)]
 
 
 def test_a_table_already_pulled_back_when_armed_is_said_and_its_release_still_found():
@@ -271,7 +280,7 @@ def test_armed_in_the_middle_of_a_decay_it_says_so_and_waits_for_the_next_test()
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
     assert states(turns)[-5:] == [*TO_RELEASE, State.SLIPPING]
     assert states(turns).count(State.RELEASED) == 1
-    assert notes(turns) == [RESTLESS_NOTE]
+    assert notes(turns) == [told(RESTLESS_NOTE)]
     released_s = TIMETABLE.cycle_s + TIMETABLE.release_s
     release = next(turn for turn in turns if turn.state is State.RELEASED)
     assert release.index / rate_hz == pytest.approx(released_s, abs=0.004)
@@ -286,7 +295,7 @@ def test_a_table_let_down_by_hand_is_no_release(seconds):
     assert test.measurement.excursion is None
     assert turns[-1].state is State.PULLING
     assert test.is_at_rest
-    assert set(notes(turns)) & {LET_DOWN_NOTE, NOT_HELD_NOTE}
+    assert set(notes(turns)) & {told(LET_DOWN_NOTE), told(NOT_HELD_NOTE)}
 
 
 @pytest.mark.parametrize("seconds", [1.2, 1.4, 1.7])
@@ -314,7 +323,7 @@ def test_a_release_without_a_hold_is_said():
     table, relative = recording(rate_hz, 12.0, timetable=abrupt)
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
     # Either the hand's last smooth moment counted as a hold and the release was found, or it is said.
-    assert State.SLIPPING in states(turns) or NOT_HELD_NOTE in notes(turns)
+    assert State.SLIPPING in states(turns) or told(NOT_HELD_NOTE) in notes(turns)
 
 
 def test_a_creeping_hold_is_not_a_release_and_pulling_on_is_noticed():
@@ -340,7 +349,7 @@ def test_a_dead_gauge_2_does_not_hinder_and_is_said():
     plan = PullbackPlan(rate_hz, 0.012, duration_s=2.0, relative_range_m=0.033)
     test, turns, _ = follow(plan, table, np.full_like(relative, np.nan))
     assert states(turns) == [*TO_RELEASE, State.CLOSING]
-    assert notes(turns) == [SILENT_PLATE_NOTE]
+    assert notes(turns) == [told(SILENT_PLATE_NOTE)]
     assert test.measurement.slip_end_index is None
 
 

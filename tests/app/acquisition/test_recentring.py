@@ -16,7 +16,7 @@ from app.acquisition.pullback.plan import (
     allowed_plate_range,
     default_excursion,
 )
-from app.acquisition.pullback.state_machine import NOT_RECENTRED_NOTE
+from app.acquisition.pullback.notes import NOT_RECENTRED_NOTE
 from app.acquisition.pullback.trigger import Trigger
 from app.acquisition.stream.live_stream import ReadHistory
 from app.simulated_stand.motion import stand_truth

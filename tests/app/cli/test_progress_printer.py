@@ -73,3 +73,21 @@ def test_several_runs_are_numbered_and_each_end_is_told(capsys):
     lines = told(capsys)
     assert [line for line in lines if line.startswith("run ")] == ["run 1 of 2", "run 2 of 2"]
     assert lines[-1] == "stored 2.h5: 9 samples, ended: rest. It drifted"
+
+
+def test_a_release_that_came_too_early_is_told_with_what_to_do(capsys):
+    printer = ProgressPrinter(Line())
+    early = StandPosition(0.012, 0.24e-3, 0.2e-3, early_release_m=0.004)
+    printer.on_event(StateChanged(PullbackState.ZERO, 2.0, position=early))
+    note = "the table has not come to rest yet"
+    printer.on_event(StateChanged(PullbackState.ZERO, 4.0, note, early))
+    assert told(capsys) == [
+        "Let go too early, at 4.0\u202fmm: put the plate back and pull again.",
+        "Let go too early, at 4.0\u202fmm: put the plate back and pull again. The table has not come to rest yet",
+    ]
+
+
+def test_a_recording_that_was_interrupted_before_the_pull_says_that_there_is_none(capsys):
+    printer = ProgressPrinter(Line())
+    printer.on_event(RunEnded("", EndReason.INTERRUPTED, 0, 0, 0, 0, 0, 1e3))
+    assert told(capsys) == ["nothing was recorded: the table was not pulled back"]

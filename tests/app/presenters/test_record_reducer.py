@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import msgspec
 import pytest
 from stage import RUN, analysed, bench, ended, health, rows_between, standing
 
@@ -14,6 +15,7 @@ from app.presenters.record.presenter import record_state
 from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import (
     Action,
+    AnalysisFailed,
     AnalysisProgress,
     Connecting,
     KeepRun,
@@ -24,6 +26,7 @@ from app.presenters.record.state import (
     StepStatus,
 )
 from messages.i18n import ENGLISH, gettext, use_language
+from messages.message import message
 
 PULLBACK_M = 0.012
 
@@ -204,3 +207,83 @@ def test_a_note_is_a_warning_and_a_lost_reading_hides_the_target() -> None:
     assert target is not None
     assert (target.target_mm, target.now_mm) == pytest.approx((12.0, 12.0), abs=0.02)
     assert target.is_reached
+
+
+def ticked(screen: Screen) -> list[str]:
+    steps = record_state(screen.model).guidance.steps
+    return [step.name for step in steps if step.status is StepStatus.DONE]
+
+
+def go(screen: Screen, *states: PullbackState) -> None:
+    for state in states:
+        screen.send(StateChanged(state, 0.0, position=standing(state)))
+
+
+@pytest.mark.parametrize(
+    ("states", "names"),
+    [
+        ([PullbackState.RELEASED, PullbackState.NO_SLIP], ["Zero", "Pull", "Tail"]),
+        (
+            [PullbackState.HELD, PullbackState.RELEASED, PullbackState.SLIPPING],
+            ["Zero", "Pull", "Hold", "Slip"],
+        ),
+        ([PullbackState.HELD, PullbackState.PULLING], ["Zero"]),
+        ([PullbackState.HELD, PullbackState.ARMED], ["Zero", "Pull", "Hold", "Armed"]),
+    ],
+)
+def test_a_stopped_run_has_those_steps_ticked_that_happened(
+    states: list[PullbackState], names: list[str]
+) -> None:
+    screen = Screen()
+    screen.send(Connecting("COM7"))
+    go(screen, PullbackState.ZERO, PullbackState.PULLING, *states, PullbackState.CLOSING)
+    assert ticked(screen) == names
+    screen.send(ended(reason=EndReason.STOPPED))
+    go(screen, PullbackState.IDLE)
+    assert ticked(screen) == [*names, "Store"]
+    screen.send(AnalysisFailed(RUN, message("no release")))
+    assert ticked(screen) == [*names, "Store"], "there is no result"
+
+
+def test_a_zero_that_was_not_taken_is_not_ticked() -> None:
+    screen = Screen()
+    screen.send(Connecting("COM7"))
+    for state in (PullbackState.ZERO, PullbackState.PULLING, PullbackState.HELD):
+        screen.send(StateChanged(state, 0.0))
+    assert ticked(screen) == ["Pull"]
+
+
+def test_steps_of_an_early_release_are_taken_back() -> None:
+    screen = Screen()
+    screen.send(Connecting("COM7"))
+    go(screen, PullbackState.ZERO, PullbackState.PULLING)
+    assert ticked(screen) == ["Zero"]
+    early = msgspec.structs.replace(standing(PullbackState.PULLING), early_release_m=0.004)
+    screen.send(StateChanged(PullbackState.ZERO, 1.0, position=early))
+    guidance = record_state(screen.model).guidance
+    assert ticked(screen) == []
+    assert (guidance.instruction, guidance.detail, guidance.tone) == (
+        "Let go too early, at 4.0\u202fmm",
+        "Put the plate back and pull again.",
+        Tone.WARN,
+    )
+
+
+def test_the_band_to_hold_in_does_not_jump_with_the_noise() -> None:
+    live = LiveTraces().on_state(PullbackState.PULLING, 1.0, standing(PullbackState.PULLING))
+    seen = set()
+    for start in range(10, 20):  # at rest: the noise has either sign
+        live = live.with_rows(rows_between(0.1 * start, 0.1 * (start + 1)), PULLBACK_M, None)
+        seen.add(live.traces.marks.target_mm)
+    assert seen == {None}, "the side of the pull is not known yet"
+    live = live.with_rows(rows_between(2.0, 3.0), PULLBACK_M, None)
+    assert live.traces.marks.target_mm == pytest.approx((11.76, 12.24))
+
+
+def test_the_band_is_at_the_side_of_the_last_pull_until_the_table_goes_to_the_other() -> None:
+    position = msgspec.structs.replace(standing(PullbackState.PULLING), side=-1)
+    live = LiveTraces().on_state(PullbackState.PULLING, 1.0, position)
+    live = live.with_rows(rows_between(1.0, 2.0), PULLBACK_M, None)
+    assert live.traces.marks.target_mm == pytest.approx((-12.24, -11.76))
+    live = live.with_rows(rows_between(2.0, 3.0), PULLBACK_M, None)
+    assert live.traces.marks.target_mm == pytest.approx((11.76, 12.24))

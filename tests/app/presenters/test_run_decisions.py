@@ -8,9 +8,11 @@ from stage import RUN, FakeRecorder, FakeWorker, analysed, bench, ended, rows_be
 
 from app.acquisition.messages import (
     Connected,
+    EndReason,
     PullbackState,
     Reconnected,
     Reconnecting,
+    RunStarted,
     StateChanged,
 )
 from app.presenters.analysed_run import AnalysedRun
@@ -49,6 +51,7 @@ class Desk:
     def __init__(self, tests: NextTests | None = None, done: tuple[tuple[str, str], ...] = ()) -> None:
         self.recorder = FakeRecorder()
         self.worker = FakeWorker()
+        self.saved: list[NextTests] = []
         self.now_s = 0.0
         around = replace(bench(), clock=lambda: self.now_s)
         self.record = RecordPresenter(self.recorder, around, self.worker, "me")  # type: ignore[arg-type]
@@ -58,14 +61,17 @@ class Desk:
         self.record.dispatch(Connected("GSV-8", "1.2", 1000.0, "/ring"))
         self.come_to(PullbackState.IDLE)
         self.tasks()
+        self.saved.clear()
 
     def come_to(self, state: PullbackState, at_s: float = 0.0) -> None:
         self.record.dispatch(StateChanged(state, at_s))
 
     def tasks(self) -> list[RecordTask]:
+        """Tasks since the last call; the plans among them are in `saved`."""
         asked = [call.arguments[0] for call in self.worker.calls]
         self.worker.calls.clear()
-        return asked
+        self.saved += [task.tests for task in asked if isinstance(task, SavePlan)]
+        return [task for task in asked if not isinstance(task, SavePlan)]
 
     def answer(self, task: RecordTask, answer: object) -> None:
         self.record.dispatch(TaskDone(task, answer))
@@ -82,6 +88,15 @@ class Desk:
         if not remaining:
             self.come_to(PullbackState.IDLE)
         self.tasks()
+
+    def connect(self, device: str, true_friction: float | None = None) -> None:
+        """Connect another device instead, a simulated one if its friction is known."""
+        self.record.dispatch(Notification.DISCONNECTED)
+        self.record.dispatch(Connecting(device))
+        if true_friction is not None:
+            self.record.dispatch(SimulationStarted("1FFM0", true_friction))
+        self.record.dispatch(Connected(device, "1.2", 1000.0, "/ring"))
+        self.come_to(PullbackState.IDLE)
 
     def result(self, note: str = "") -> None:
         self.record.dispatch(Action.ARM)
@@ -245,7 +260,7 @@ def test_closing_waits_until_what_was_decided_is_stored() -> None:
     desk = Desk()
     desk.result()
     desk.record.dispatch(Action.NEXT)
-    (call,) = desk.worker.calls
+    (call,) = [call for call in desk.worker.calls if isinstance(call.arguments[0], KeepRun)]
     desk.worker.is_busy = True
 
     def store() -> None:
@@ -329,6 +344,106 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     assert desk.tasks() == []
 
 
+def test_another_device_decides_nothing_about_a_run() -> None:
+    desk = Desk()
+    desk.result()
+    shown = desk.record.state
+    desk.connect("GSV-4")
+    assert desk.tasks() == []
+    state = desk.record.state
+    assert (state.decision, state.result, state.plan.done) == ("", shown.result, 0)
+    assert state.status_bar.device.text == "GSV-4"
+    desk.recorder.rows = rows_between(0.0, 0.5)
+    desk.record.tick()
+    assert desk.record.state.traces is shown.traces, "what the other device reads is not this run"
+    desk.record.dispatch(Action.ARM)
+    assert len(desk.recorder.armed) == 1
+    assert desk.record.state.status_message.text == "Decide about 20260112_1FFM0_001 first"
+    desk.record.dispatch(Action.NEXT)
+    assert [type(task) for task in desk.tasks()] == [KeepRun]
+    assert desk.record.state.plan.done == 1
+    desk.record.dispatch(Action.ARM)
+    assert len(desk.recorder.armed) == 2
+
+
+def test_a_run_that_is_not_identified_yet_is_asked_about_with_another_device_too() -> None:
+    desk = Desk()
+    desk.record.dispatch(Action.ARM)
+    desk.run()
+    desk.connect("Slipstand simulator", true_friction=0.2)
+    desk.record.dispatch(found())
+    state = desk.record.state
+    assert desk.tasks() == []
+    assert state.decision == ""
+    assert state.result is not None
+    assert state.result.comparison == "", "the truth of the stand that was connected later"
+    assert Action.REPEAT not in state.allowed, "a simulated run would take its place"
+    desk.record.dispatch(Action.DISCARD)
+    assert desk.tasks() == [MoveToTrash(RUN, "me", None)]
+
+
+def test_a_simulated_run_is_compared_with_its_own_truth_whatever_is_connected_next() -> None:
+    desk = Desk()
+    desk.connect("Slipstand simulator", true_friction=0.2)
+    desk.record.dispatch(Action.ARM)
+    desk.run()
+    desk.connect("GSV-4")
+    desk.record.dispatch(found())
+    assert desk.record.state.result is not None
+    assert desk.record.state.result.comparison.startswith("True value 0.20000")
+
+
+def test_a_run_waits_for_its_decision_beyond_the_end_of_the_window() -> None:
+    desk = Desk()
+    desk.record.dispatch(Action.ARM)
+    desk.come_to(PullbackState.RELEASED)
+    desk.record.dispatch(RunStarted(RUN))
+    desk.tasks()
+    name = "20260112_1FFM0_001.h5"
+    assert desk.saved[-1].undecided == (name,), "from its beginning, should the window be killed"
+    desk.record.dispatch(ended())
+    desk.come_to(PullbackState.IDLE)
+    desk.record.dispatch(found())
+    desk.record.dispatch(Action.NEXT)
+    desk.tasks()
+    assert desk.saved[-1].undecided == ()
+    desk.record.dispatch(Action.UNDO)
+    desk.tasks()
+    assert desk.saved[-1].undecided == (name,)
+    desk.record.dispatch(Action.DISCARD)
+    desk.tasks()
+    assert desk.saved[-1].undecided == ()
+
+
+def test_runs_left_without_a_decision_are_named_and_stay_so_until_they_are_decided_about() -> None:
+    desk = Desk(NextTests(plan=PLAN, undecided=("20260111_1FFM0_007.h5",)))
+    text = desk.record.state.status_message.text
+    assert text.startswith("20260111_1FFM0_007 still waits for a decision, and does not count")
+    desk.result()
+    desk.record.dispatch(Action.NEXT)
+    desk.tasks()
+    assert desk.saved[-1].undecided == ("20260111_1FFM0_007.h5",)
+
+
+def test_a_stop_before_the_pull_leaves_nothing_to_decide() -> None:
+    desk = Desk()
+    desk.record.dispatch(RunForm(note="third plate", run_in_number="4"))
+    desk.record.dispatch(Action.ARM)
+    desk.come_to(PullbackState.ZERO)
+    assert desk.record.state.disarms
+    desk.record.dispatch(Action.STOP)
+    desk.record.dispatch(ended("", EndReason.STOPPED))
+    desk.come_to(PullbackState.IDLE)
+    desk.tasks()
+    state = desk.record.state
+    assert (state.result, state.decision, state.undo) == (None, None, "")
+    assert state.status_message.text == "Disarmed. Nothing was recorded"
+    assert state.guidance.instruction == "Arm when the stand is at rest"
+    assert (state.choices.form.note, state.choices.form.run_in_number) == ("third plate", "4")
+    assert not state.disarms
+    assert not any(tests.undecided for tests in desk.saved)
+
+
 def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk = Desk()
     desk.record.dispatch(Action.ARM)
@@ -384,11 +499,10 @@ def test_a_plan_is_kept_and_what_is_none_is_said() -> None:
     desk = Desk(NextTests())
     desk.record.dispatch(PlanEdited("9ZZ x3"))
     assert desk.record.state.plan.error.startswith("9ZZ is no series of this stand")
-    assert desk.tasks() == []
+    assert desk.tasks() == desk.saved == []
     desk.record.dispatch(PlanEdited("2SSM1 x2"))
-    (task,) = desk.tasks()
-    assert isinstance(task, SavePlan)
-    assert task.tests.plan == (PlannedSeries("2SSM1", 2),)
+    desk.tasks()
+    assert [tests.plan for tests in desk.saved] == [(PlannedSeries("2SSM1", 2),)]
     assert desk.record.state.choices.series == "2SSM1"
     assert desk.record.state.plan.error == ""
 

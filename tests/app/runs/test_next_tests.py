@@ -62,3 +62,10 @@ def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
 )
 def test_a_run_is_done_that_ended_by_itself_or_was_analysed(run: RunSummary, done: bool) -> None:
     assert counts_as_done(run) is done
+
+
+def test_a_run_that_waits_for_a_decision_does_not_count_by_its_end_alone() -> None:
+    run = RunSummary("/runs/a.h5", ended="rest")
+    assert not counts_as_done(run, ("a.h5",))
+    assert counts_as_done(run, ("b.h5",))
+    assert counts_as_done(RunSummary("/runs/a.h5", ended="rest", analyses=1), ("a.h5",)), "analysed on Runs"
