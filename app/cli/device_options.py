@@ -78,6 +78,10 @@ class StandOptions:
     count: int | None = option("--count", "Tests before it rests for good; no end if absent.")
     recentre_every: int = option("--recentre-every", "Put the plate back after so many tests; 0 never.", 1)
     plate_offset_m: float = option("--plate-offset", "Position of the plate at first (m).", 0.0)
+    on_demand: bool = flag("--on-demand", "Begin a test only when told `pull` (--control).")
+    early_release_m: float | None = option(
+        "--early-release", "Let the first test go too early, when pulled so far (m)."
+    )
     drop: float = option("--drop", "Fraction of frames that lose a byte.", 0.0)
     flip: float = option("--flip", "Fraction of frames with a bit flipped.", 0.0)
     truncate: float = option("--truncate", "Fraction of frames cut short.", 0.0)
@@ -104,7 +108,7 @@ class SimulateDeviceOptions:
 
     stand: StandOptions
     settings: list[str] | None = shared.device_settings()
-    control: bool = flag("--control", "Read such faults from stdin, too, one a line.")
+    control: bool = flag("--control", "Read such faults from stdin, too, one a line; pull, early.")
     as_json: bool = shared.as_json()
 
 

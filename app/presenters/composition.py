@@ -49,7 +49,7 @@ def make_window_presenter(
 
     Start offers a simulated stand with options `simulation`. Settings are read unless `personal` is given.
     """
-    simulation = simulation or SimulatedStandOptions()
+    simulation = simulation or SimulatedStandOptions(on_demand=True)
     personal = personal or read_personal()
     errors = errors or ErrorReporter()
     stand, gauges = files.load_stand(), files.load_gauges()

@@ -8,17 +8,27 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from app.acquisition.engine_client import EngineClient
-from app.acquisition.messages import Command, Event, Failed, PortSettings
+from app.acquisition.messages import (
+    Command,
+    Event,
+    Failed,
+    PortSettings,
+    PullbackState,
+    RunEnded,
+    StateChanged,
+)
 from app.acquisition.ring import RingRows
 from app.presenters.base import SimulationStarted
 from app.presenters.error_reports import ErrorReport, error_report
 from app.simulated_stand.client import SimulatedStand
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from config.files import published_row
 from messages.message import message, message_of
 
 _log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
+_WAITING = (PullbackState.RECENTRE, PullbackState.ZERO, PullbackState.PULLING)
+"""States in which a run begins."""
 
 
 @dataclass(slots=True)
@@ -26,6 +36,16 @@ class _Opened:
     engine: EngineClient
     stand: SimulatedStand | None = None
     started: SimulationStarted | None = None
+    has_pulled: bool = False  # for the run that is being recorded
+
+    def pull_for_each_run(self, event: Event | SimulationStarted) -> None:
+        """Ask the simulated stand for a test when a run begins to wait for one."""
+        if isinstance(event, RunEnded):
+            self.has_pulled = False
+        elif isinstance(event, StateChanged) and event.state in _WAITING and not self.has_pulled:
+            self.has_pulled = True
+            if self.stand is not None:
+                self.stand.ask(Gesture.PULL)
 
 
 class Connection:
@@ -70,6 +90,8 @@ class Connection:
         if self._opened is None:
             return started
         events: list[Event | SimulationStarted] = [*started, *self._opened.engine.poll()]
+        for event in events:
+            self._opened.pull_for_each_run(event)
         if any(isinstance(event, Failed) for event in events):
             self.disconnect()
         return events

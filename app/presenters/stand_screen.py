@@ -13,7 +13,7 @@ from app.presenters.number_text import format_in, normalize_number, parse_field
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.effects import parse_effects
-from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError
@@ -101,6 +101,10 @@ class StandPresenter(Presenter[StandState]):
         stand = self._running()
         if stand is None:
             self._update(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
+            return
+        if kind == Gesture.EARLY:
+            stand.ask(Gesture.EARLY)
+            self._update(message=Chip(gettext("The next pull is let go too early")))
             return
         text = f"{kind} {self.state.fault_duration_s.strip().replace(',', '.')}".strip()
         try:

@@ -49,7 +49,7 @@ else:
 
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Shown screen, notice above it, and theme (`system`, `light` or `dark`); `is_closing` ends the window."""
+    """Shown screen, notice above it, theme (`system`, `light`, `dark`); the window ends if `is_closing`."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None

@@ -11,6 +11,7 @@ from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_sc
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
 from app.simulated_stand.effects import LISTED
+from app.simulated_stand.options import Gesture
 from messages.i18n import N_, gettext
 
 _FIELDS = {
@@ -31,6 +32,7 @@ _FAULTS = {
     "power": (N_("Switch off"), N_("The device loses its power and begins anew")),
     "rubbish": (N_("Rubbish"), N_("Random bytes come instead of samples")),
     "jump": (N_("Clock leaps"), N_("The device's time leaps by so many seconds")),
+    Gesture.EARLY: (N_("Let go early"), N_("The next pull is let go at a third of the pullback")),
 }
 _NOT_RUNNING = N_("Faults can be asked for while the simulated stand is connected.")
 

@@ -10,7 +10,7 @@ from typing import Self
 import msgspec
 
 from app.child_process import ChildProcess, json_decoder, spawn
-from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from drivers.simulated.faults import parse_disturbance
 
@@ -94,6 +94,11 @@ class SimulatedStand:
         if self._truth is None:
             raise SimulatedStandError("the simulated stand has not started")
         return self._truth
+
+    def ask(self, gesture: Gesture) -> None:
+        """Ask the operator of the stand for something; nothing happens where the stand has ended."""
+        if self._child.is_running:
+            self._child.send(gesture, self._STOP_S)
 
     def disturb(self, text: str) -> None:
         """Disturb the device now or later: `unplug 1.5`, `jump -5 at 3`. Raises DriverError."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Literal
 
 import msgspec
@@ -13,6 +14,13 @@ from drivers.registry import find_driver
 from drivers.simulated.faults import parse_disturbance
 
 PULLBACK_MAX_M = 0.1  # no stand is pulled back farther; larger numbers are millimetres by mistake
+
+
+class Gesture(StrEnum):
+    """What the operator of a simulated stand is asked to do."""
+
+    PULL = "pull"  # begin a test, where they begin on demand and the last one was released
+    EARLY = "early"  # let the next test go too early
 
 
 class SimulatedStandError(DriverError):
@@ -54,6 +62,7 @@ _LIMITS = {
     "rest_s": (0.05, 3600.0), "pull_s": (0.05, 3600.0), "hold_s": (0.05, 3600.0),
     "decay_s": (0.05, 3600.0), "recentre_s": (0.05, 3600.0), "count": (0, 1_000_000),
     "recentre_every": (0, 1_000_000), "plate_offset_m": (-0.1, 0.1), "table_clip_m": (1e-6, 1.0),
+    "early_release_m": (1e-4, PULLBACK_MAX_M),
     "relative_clip_m": (1e-6, 1.0), "rate_error": (-0.5, 1.0), "first_sequence": (0, (1 << 32) - 1),
     "lag_s": (-1.0, 1.0), "first_time_s": (0.0, 1e6), "tcp_port": (0, 65535), "start_at_unix_s": (0.0, 1e11),
 }  # fmt: skip
@@ -115,6 +124,9 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     count: int | None = None  # tests before the stand rests for good; None goes on for ever
     recentre_every: int = 1  # the plate is put back after each so many tests; 0 leaves it where it slid to
     plate_offset_m: float = 0.0
+    on_demand: bool = False  # a test begins when it is asked for, `Gesture.PULL`; the stand rests before it
+    early_release_m: float | None = None
+    """Distance at which the first test is let go while it is being pulled; a full one follows at once."""
 
     start_at_unix_s: float | None = None
     """Time of day (Unix, s) at which the stand's own time is 0, so that several with the same one show one

@@ -14,7 +14,7 @@ from analysis.record import AnalysisError
 from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
 from app.simulated_stand.client import Ready, Refused, StandEvent, Started, TruthChanged
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from app.simulated_stand.stand import SimulatedStandDevice
 from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
@@ -29,7 +29,7 @@ def serve(
     on_ready: Callable[[Ready], None],
     has_ended: Callable[[], bool],
     on_truth: Callable[[Truth], None] | None = None,
-    next_disturbance: Callable[[], Disturbance | None] = lambda: None,
+    next_disturbance: Callable[[], Disturbance | Gesture | None] = lambda: None,
 ) -> None:
     """Run a simulated stand in this process until `has_ended()`.
 
@@ -89,14 +89,17 @@ def main() -> int:
     return 0
 
 
-def read_disturbances(on_invalid: Callable[[Exception], None] = lambda _: None) -> CommandReader[Disturbance]:
-    """Read disturbances as lines on standard input; `on_invalid` receives what is wrong with a line."""
+def read_disturbances(
+    on_invalid: Callable[[Exception], None] = lambda _: None,
+) -> CommandReader[Disturbance | Gesture]:
+    """Read disturbances and gestures as lines on standard input; `on_invalid` receives faulty lines."""
     return CommandReader(0, LineDecoder(_decode_disturbance, on_invalid).feed)
 
 
-def _decode_disturbance(line: bytes) -> Disturbance:
+def _decode_disturbance(line: bytes) -> Disturbance | Gesture:
+    text = line.decode(errors="replace").strip()
     try:
-        return parse_disturbance(line.decode(errors="replace").strip())
+        return Gesture(text) if text in set(Gesture) else parse_disturbance(text)
     except SettingsError as error:
         raise ValueError(str(error)) from None
 

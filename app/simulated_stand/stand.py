@@ -1,13 +1,14 @@
 """The simulated stand: motion, gauges, converter and device of one set of options."""
 
-import math
 import time
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 
+from analysis.motion.two_mass import Motion
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from app.simulated_stand.signal import StandSignal, SwappedChannels
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
@@ -36,11 +37,16 @@ class SimulatedStandDevice:
         self._timetable = options.timetable()
         released = released_motion(self._true, self._timetable, options.effects)
         self._motion = RepeatedPullback(
-            self._true.pullback_m, released, self._timetable, options.plate_offset_m
+            self._true.pullback_m,
+            released,
+            self._timetable,
+            options.plate_offset_m,
+            on_demand=options.on_demand,
+            release_from=self._release_from,
         )
         self._gauges = load_gauges(options.gauges_file)
         # Compiles the motion after a release before a reader waits for it.
-        self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
+        released.sample_displacements(np.array([0.1]))
         settings, self._is_swapped = options.device_settings()
         protocol = find_driver(options.protocol).make_simulated(settings)
         self._max_count = protocol.max_count
@@ -58,15 +64,14 @@ class SimulatedStandDevice:
         return wait_s
 
     def truth(self) -> Truth:
-        tests = np.arange(self._releases(), dtype=np.float64)
-        releases = tests * self._timetable.cycle_s + self._timetable.release_s
+        tests = self._motion.first_tests(self._releases())
         return Truth(
             port=self._transport.url,
             stand=self._true,
             options=self._options,
             timetable=self._timetable,
-            release_s=releases.tolist(),
-            plate_offset_m=self._motion.initial_offset_m(tests).tolist(),
+            release_s=[test.release_s for test in tests],
+            plate_offset_m=[test.offset_m for test in tests],
             residual_displacement_m=self._motion.released.residual_displacement_m,
             streams=self._device.streams,
             wire=self._device.log,
@@ -74,10 +79,24 @@ class SimulatedStandDevice:
             disturbances=list(self._device.disturbances),
         )
 
-    def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
-        self._device.disturb(disturbance, now_ns)
+    def disturb(self, disturbance: Disturbance | Gesture, now_ns: int) -> None:
+        match disturbance:
+            case Gesture.PULL:
+                self._motion.request(self._device.time_s(now_ns))
+            case Gesture.EARLY:
+                self._motion.let_go_early(self._options.early_release_m)
+            case Disturbance():
+                self._device.disturb(disturbance, now_ns)
+
+    def _release_from(self, pullback_m: float) -> Motion:
+        true = msgspec.structs.replace(self._true, pullback_m=pullback_m)
+        return released_motion(true, self._timetable, self._options.effects)
 
     def _signal_at(self, rate_hz: float, started_s: float) -> Signal:
+        if not self._device.earlier_logs:  # the stand's own time begins anew
+            self._motion.restart()
+            if self._options.early_release_m is not None:
+                self._motion.let_go_early(self._options.early_release_m)
         lag_s = self._options.lag_s
         timing = rate_hz, started_s - lag_s
         signal = StandSignal(self._motion, self._gauges, self._options, *timing, self._max_count)
@@ -86,9 +105,7 @@ class SimulatedStandDevice:
     def _releases(self) -> int:
         """Releases until the last sample of this session."""
         log = self._device.log
-        shown_s = log.started_s + log.samples / log.true_rate_hz - self._timetable.release_s
-        shown = max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
-        return shown if self._timetable.count is None else min(shown, self._timetable.count)
+        return self._motion.count_releases(log.started_s + log.samples / log.true_rate_hz)
 
 
 def _setup(options: SimulatedStandOptions) -> DeviceSetup:

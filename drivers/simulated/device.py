@@ -105,7 +105,7 @@ class SimulatedDevice:
 
     def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
         _log.info("disturbance: %s", disturbance)
-        self._schedule.add(disturbance, self._time_s(now_ns))
+        self._schedule.add(disturbance, self.time_s(now_ns))
 
     def step(self, now_ns: int) -> float:
         """Do what is due at `now_ns` of the host's monotonic clock; returns seconds to wait at most."""
@@ -123,13 +123,14 @@ class SimulatedDevice:
             self._stream, self._was_interrupted = None, True
         return wait_s
 
-    def _time_s(self, now_ns: int) -> float:
+    def time_s(self, now_ns: int) -> float:
+        """The stand's own time."""
         if self._session_ns is None:
             self._session_ns = now_ns
         return (now_ns - self._session_ns) * 1e-9
 
     def _follow_cable(self, now_ns: int) -> None:
-        fault = self._schedule.cable_fault(self._time_s(now_ns))
+        fault = self._schedule.cable_fault(self.time_s(now_ns))
         if fault is self._cable_fault:
             return
         if self._cable_fault is None:
@@ -156,7 +157,7 @@ class SimulatedDevice:
 
     def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
         answer = self._protocol.respond(command, is_done, self._rate_hz)
-        is_stalled = self._schedule.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
+        is_stalled = self._schedule.wire_fault(self.time_s(now_ns)) is DisturbanceKind.STALL
         if answer and not is_stalled:
             self._transport.send(answer)
 
@@ -183,7 +184,7 @@ class SimulatedDevice:
         self.streams += 1
         device_rate_hz = self._rate_hz * (1.0 + self._setup.rate_error)
         true_rate_hz = device_rate_hz * (1.0 + self._setup.clock_ppm * 1e-6)
-        self.log = TransmissionLog(self._rate_hz, true_rate_hz, self._time_s(now_ns))
+        self.log = TransmissionLog(self._rate_hz, true_rate_hz, self.time_s(now_ns))
         signal = self._signal_at(true_rate_hz, self.log.started_s)
         self._stream = self._make_stream(signal, device_rate_hz, now_ns)
 
@@ -231,7 +232,7 @@ class PolledDevice(SimulatedDevice):
         answer = self._protocol.respond(command, is_done, self._rate_hz)
         if not answer:
             return
-        sent, fault = self._output.distort(answer, self._time_s(due_ns))
+        sent, fault = self._output.distort(answer, self.time_s(due_ns))
         self.log.add(0, fault)
         self.log.bytes_sent += len(sent)
         if sent:

@@ -33,7 +33,7 @@ from app.presenters.base import TaskFailure
 from app.presenters.navigator import StandContext
 from app.presenters.worker import CANCELLED, WorkerPool
 from app.simulated_stand.motion import stand_truth
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
 from drivers.simulated.faults import parse_disturbance
@@ -239,6 +239,7 @@ class FakeSimulation:
         self.port = "fake://"
         self.options = options
         self.disturbed: list[str] = []
+        self.asked: list[Gesture] = []
         self.stopped = False
 
     def truth(self) -> Truth:
@@ -256,6 +257,9 @@ class FakeSimulation:
             wire=TransmissionLog(2000.0, 2000.0, frames=640, frames_damaged=7),
             disturbances=happened,
         )
+
+    def ask(self, gesture: Gesture) -> None:
+        self.asked.append(gesture)
 
     def disturb(self, text: str) -> None:
         parse_disturbance(text)

@@ -40,7 +40,9 @@ def test_a_release_before_the_hold_is_noticed_within_half_a_second(pulled_mm, ti
 @pytest.mark.parametrize("series", list(published_table())[::4])
 def test_whatever_the_friction_is(series):
     pullback_m = load_stand().series(series).pullback_m
-    made = recording(RATE_HZ, HURRIED.release_s + 0.7, series=series, pullback_m=0.7 * pullback_m, timetable=HURRIED)
+    made = recording(
+        RATE_HZ, HURRIED.release_s + 0.7, series=series, pullback_m=0.7 * pullback_m, timetable=HURRIED
+    )
     test, _, _ = follow(PullbackPlan(RATE_HZ, pullback_m), *made)
     assert test.position.early_release_m == pytest.approx(0.7 * pullback_m, rel=0.02)
 
@@ -55,7 +57,9 @@ def test_it_is_said_until_the_zero_is_known_again_and_the_next_release_is_found(
     assert test.measurement.release_confirmed
     released_s = HELD.cycle_s + TIMETABLE.release_s
     assert test.measurement.release_index / RATE_HZ == pytest.approx(released_s, abs=0.004)
-    assert test.measurement.relative_zero_m == pytest.approx(relative[round(HELD.cycle_s * RATE_HZ)], abs=60e-6)
+    assert test.measurement.relative_zero_m == pytest.approx(
+        relative[round(HELD.cycle_s * RATE_HZ)], abs=60e-6
+    )
 
 
 def test_a_table_that_has_come_to_rest_again_is_as_before_the_pull():

@@ -9,6 +9,7 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 from analysis.motion.two_mass import TwoMassParameters
 from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.messages import PullbackState as State
+from app.acquisition.pullback.notes import NOT_RECENTRED_NOTE
 from app.acquisition.pullback.plan import (
     Excursion,
     ObservedSlip,
@@ -16,7 +17,6 @@ from app.acquisition.pullback.plan import (
     allowed_plate_range,
     default_excursion,
 )
-from app.acquisition.pullback.notes import NOT_RECENTRED_NOTE
 from app.acquisition.pullback.trigger import Trigger
 from app.acquisition.stream.live_stream import ReadHistory
 from app.simulated_stand.motion import stand_truth

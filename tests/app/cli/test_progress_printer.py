@@ -83,7 +83,8 @@ def test_a_release_that_came_too_early_is_told_with_what_to_do(capsys):
     printer.on_event(StateChanged(PullbackState.ZERO, 4.0, note, early))
     assert told(capsys) == [
         "Let go too early, at 4.0\u202fmm: put the plate back and pull again.",
-        "Let go too early, at 4.0\u202fmm: put the plate back and pull again. The table has not come to rest yet",
+        "Let go too early, at 4.0\u202fmm: put the plate back and pull again."
+        " The table has not come to rest yet",
     ]
 
 

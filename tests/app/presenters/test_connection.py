@@ -5,14 +5,25 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from stage import FakeEngine, FakeLauncher, FakeSimulation
+from stage import FakeEngine, FakeLauncher, FakeSimulation, ended
 
-from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
+from app.acquisition.messages import (
+    Arm,
+    Connected,
+    Event,
+    Failed,
+    PortSettings,
+    PullbackState,
+    RunEnded,
+    RunSettings,
+    StateChanged,
+    Stop,
+)
 from app.acquisition.ring import RingRows
 from app.presenters.base import SimulationStarted
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from config.files import published_row
 from drivers.errors import PortUnavailableError
 
@@ -231,3 +242,17 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorRe
     assert thread.daemon, "it would keep the program from ending"
     Hangs.go_on.set()
     thread.join(5.0)
+
+
+def test_the_simulated_stand_pulls_once_for_each_run(session: Connection, launcher: FakeLauncher) -> None:
+    session.open_simulated(SimulatedStandOptions(on_demand=True))
+    poll_until(session, Connected)
+    (stand,), (engine,) = launcher.simulations, launcher.engines
+    assert stand.asked == []
+    states = (PullbackState.ZERO, PullbackState.PULLING, PullbackState.ZERO, PullbackState.TAIL)
+    for number in (1, 2):  # the second run arms itself
+        for state in states:
+            engine.say(StateChanged(state, 0.0))
+        engine.say(ended())
+        poll_until(session, RunEnded)
+        assert stand.asked == [Gesture.PULL] * number

@@ -111,3 +111,17 @@ def test_a_folder_that_is_not_there_yet_holds_nothing_and_takes_a_plan(tmp_path:
     tests = NextTests(plan=(PlannedSeries("1FFM0", 3),), operator="N. N.")
     done(SavePlan(folder, tests))
     assert done(LoadPlan(folder)) == LoadedPlan(tests)
+
+
+def test_runs_that_wait_for_a_decision_do_not_count_until_they_are_analysed_or_gone(run: Path) -> None:
+    folder = str(run.parent)
+    tests = NextTests(undecided=(run.name, "20260101_1FFM0_009.h5"))
+    done(SavePlan(folder, tests))
+    loaded = done(LoadPlan(folder))
+    assert isinstance(loaded, LoadedPlan)
+    assert loaded.tests.undecided == (run.name,), "the other one is gone"
+    done(KeepRun(str(run), "me", has_results=True))
+    assert done(CountCompletedRuns(folder)) == ((str(run), "1FFM0"),)
+    loaded = done(LoadPlan(folder))
+    assert isinstance(loaded, LoadedPlan)
+    assert (loaded.tests.undecided, loaded.completed) == ((), ((str(run), "1FFM0"),))

@@ -7,7 +7,7 @@ from stage import FakeSimulation
 
 from app.presenters.base import EMPTY_CHIP, Tone
 from app.presenters.stand_screen import StandForm, StandPresenter, stand_options
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 
 BASE = SimulatedStandOptions(decay_s=30.0, seed=1)
 
@@ -103,3 +103,10 @@ def test_faults_happen_while_it_runs_and_the_truth_tells_of_them(desk: Desk) -> 
     desk.pass_ticks()
     assert not desk.presenter.state.is_running
     assert desk.presenter.state.truth == ()
+
+
+def test_the_next_pull_is_let_go_early_where_that_is_asked_for(desk: Desk) -> None:
+    desk.stand = FakeSimulation(BASE)
+    desk.presenter.inject_fault(Gesture.EARLY)
+    assert desk.stand.asked == [Gesture.EARLY]
+    assert desk.presenter.state.message.text == "The next pull is let go too early"

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 from stage import (
     END_S,
@@ -15,9 +16,10 @@ from stage import (
     analysed,
     bench,
     ended,
+    standing,
 )
 
-from app.acquisition.messages import EndReason, Failed, PortSettings
+from app.acquisition.messages import EndReason, Failed, PortSettings, StateChanged
 from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
@@ -243,3 +245,99 @@ def test_record_measures_with_other_calibrations(desk: Desk) -> None:
     gauges = load_gauges()
     desk.window.set_gauges(gauges)
     assert desk.window.record._model.stand.gauges is gauges
+
+
+def connect_amplifier(desk: Desk) -> None:
+    desk.window.open_port(PortSettings("COM7", "csv"))
+    desk.tick_until_connected()
+
+
+def test_the_simulated_stand_does_not_take_the_place_of_an_amplifier_unasked(desk: Desk) -> None:
+    window = desk.window
+    connect_amplifier(desk)
+    window.start.start_simulation()
+    window.stand.start()
+    assert desk.launcher.simulations == []
+    notice = window.state.notice
+    assert notice is not None
+    assert notice.text == "Slipstand simulator is connected. The simulated stand would take its place"
+    assert (notice.action, notice.dismiss) == (NoticeAction.SIMULATE, "Keep the amplifier")
+    window.dismiss_notice()
+    assert window.start.state.connected
+    window.start.start_simulation()
+    window.execute_notice_action()
+    desk.tick_until_connected()
+    assert len(desk.launcher.simulations) == 1
+    assert window.state.notice is None
+    window.start.start_simulation()
+    desk.tick_until_connected()
+    assert window.state.notice is None, "a simulated stand is replaced without a question"
+
+
+def test_the_question_of_the_amplifier_leaves_with_it(desk: Desk) -> None:
+    connect_amplifier(desk)
+    desk.window.start.start_simulation()
+    desk.window.close_connection()
+    assert desk.window.state.notice is None
+    desk.window.start.start_simulation()
+    desk.tick_until_connected()
+    assert len(desk.launcher.simulations) == 1
+
+
+def test_a_window_in_which_nothing_is_recorded_closes_at_once(desk: Desk) -> None:
+    assert desk.window.may_close()
+    connect_amplifier(desk)
+    assert desk.window.may_close()
+    assert desk.window.state.notice is None
+
+
+@pytest.mark.parametrize(
+    ("until_s", "keeps_run", "words"),
+    [
+        (1.5, False, "A run of 1FFM0 is armed. Closing the window disarms it: nothing is recorded"),
+        (
+            3.0,
+            True,
+            "A run of 1FFM0 is being recorded. Closing the window ends it before the release: it is kept"
+            " without a decision, and does not count in the plan",
+        ),
+        (
+            6.0,
+            True,
+            "A run of 1FFM0 is being recorded. Closing the window ends it now: it is kept without a"
+            " decision, and does not count in the plan",
+        ),
+    ],
+)
+def test_closing_in_a_recording_names_what_becomes_of_the_run(
+    desk: Desk, until_s: float, keeps_run: bool, words: str
+) -> None:
+    window = desk.window
+    connect_amplifier(desk)
+    window.record.dispatch(Action.ARM)
+    desk.play(until_s)
+    state = window.record._model.session.engine
+    assert state is not None
+    position = msgspec.structs.replace(standing(state), keeps_run=keeps_run)
+    desk.launcher.engines[-1].say(StateChanged(state, until_s, "", position))
+    window.tick()
+    assert not window.may_close()
+    notice = window.state.notice
+    assert notice is not None
+    assert (notice.text, notice.action, notice.dismiss) == (words, NoticeAction.CLOSE, "Go on recording")
+    assert not window.state.is_closing
+    window.dismiss_notice()
+    assert not window.may_close()
+    window.execute_notice_action()
+    assert window.state.is_closing
+    assert window.may_close()
+
+
+def test_the_question_of_closing_leaves_with_the_recording(desk: Desk) -> None:
+    connect_amplifier(desk)
+    desk.window.record.dispatch(Action.ARM)
+    desk.play(3.0)
+    assert not desk.window.may_close()
+    desk.play(END_S + 0.1)
+    assert desk.window.state.notice is None
+    assert desk.window.may_close()

@@ -77,7 +77,7 @@ def offsets_at_rest(**options) -> tuple[np.ndarray, float]:
     starts_s = np.arange(4) * timetable.cycle_s
     table, relative = motion.displacements(starts_s + 0.5)
     np.testing.assert_allclose(table, 0.0, atol=1e-12)
-    np.testing.assert_allclose(motion.initial_offset_m(np.arange(4.0)), relative, atol=1e-12)
+    np.testing.assert_allclose([test.offset_m for test in motion.first_tests(4)], relative, atol=1e-12)
     return relative, motion.released.residual_displacement_m
 
 
@@ -236,3 +236,68 @@ def test_a_device_of_one_gauge_has_it_on_its_first_channel():
         status == SampleStatus.OVERLOAD_RELATIVE, flags == SampleStatus.OVERLOAD_TABLE
     )
     assert flags.any()
+
+
+def on_demand(**options) -> RepeatedPullback:
+    """A motion whose tests begin when they are asked for, and which may be let go early."""
+    true = stand_truth(SimulatedStandOptions(), load_stand())
+
+    def release_from(pullback_m: float):
+        return released_motion(msgspec.structs.replace(true, pullback_m=pullback_m), TIMETABLE)
+
+    released = released_motion(true, TIMETABLE)
+    return RepeatedPullback(0.012, released, TIMETABLE, release_from=release_from, **options)
+
+
+def test_a_test_on_demand_begins_when_it_is_asked_for_and_is_as_any_other():
+    motion, usual = on_demand(on_demand=True), stand_motion()
+    time_s = np.arange(0.0, 30.0, 0.01)
+    assert not np.any(motion.displacements(time_s))
+    motion.request(3.0)  # what was sent until 30 s is sent
+    within_s = np.arange(0.0, TIMETABLE.cycle_s, 0.01)
+    shown = motion.displacements(time_s[-1] + within_s)
+    np.testing.assert_allclose(shown, usual.displacements(within_s), atol=1e-12)
+    assert not np.any(motion.displacements(time_s + 60.0)), "it rests until it is asked again"
+    assert motion.count_releases(100.0) == 1
+
+
+def test_a_request_before_the_release_changes_nothing_and_one_after_it_stills_the_table():
+    motion = on_demand(on_demand=True)
+    motion.request(0.0)
+    motion.displacements(np.array([2.0]))
+    motion.request(2.0)
+    assert motion.count_releases(100.0) == 1
+    asked_s = TIMETABLE.release_s + 2.0
+    before = motion.displacements(np.array([asked_s]))
+    motion.request(asked_s)
+    np.testing.assert_array_equal(motion.displacements(np.array([asked_s])), before)
+    time_s = np.arange(asked_s, asked_s + 30.0, 1e-3)
+    table, relative = motion.displacements(time_s)
+    assert np.abs(np.diff(table)).max() < 0.4e-3
+    assert np.abs(np.diff(relative)).max() < 0.4e-3
+    stilled_s = asked_s + TIMETABLE.recentre_s
+    resting = (time_s > stilled_s + 1e-6) & (time_s < stilled_s + TIMETABLE.rest_s)
+    np.testing.assert_allclose(table[resting], 0.0, atol=1e-12)
+    second = motion.first_tests(2)[1]
+    assert second.release_s == pytest.approx(stilled_s + TIMETABLE.release_s)
+
+
+@pytest.mark.parametrize("asks", [True, False])
+def test_a_test_that_is_let_go_too_early_is_followed_by_a_full_one(asks):
+    motion = on_demand(on_demand=asks)
+    motion.let_go_early(0.004)
+    motion.request(0.0)
+    time_s = np.arange(0.0, 20.0, 1e-3)
+    table, _ = motion.displacements(time_s)
+    early, full = motion.first_tests(2)
+    assert early.release_s == pytest.approx(TIMETABLE.rest_s + TIMETABLE.pull_s + 0.1)
+    assert table[time_s <= early.release_s].max() == pytest.approx(0.004)
+    swinging = (time_s > early.release_s) & (time_s < early.release_s + 0.3)
+    assert table[swinging].min() < -0.002
+    assert table[time_s >= full.release_s - 0.5][0] == pytest.approx(0.012)
+    assert np.abs(np.diff(table)).max() < 0.4e-3
+    assert full.offset_m == 0.0, "the plate was put back"
+    motion.restart()
+    motion.request(0.0)
+    table, _ = motion.displacements(time_s[time_s < TIMETABLE.release_s])
+    assert table.max() == pytest.approx(0.012)
