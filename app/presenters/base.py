@@ -95,13 +95,17 @@ class NoticeAction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Message above the screen, shown until it is dismissed; `details` can be unfolded and copied."""
+    """Message above the screen, shown until it is dismissed; `details` can be unfolded and copied.
+
+    A question is answered by its action, or by its dismissal, which leaves all as it is.
+    """
 
     text: str
     tone: Tone = Tone.BAD
     action: NoticeAction | None = None
     dismiss: str = N_("Dismiss")
     details: str = ""
+    is_question: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,8 +141,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Tell whether the window may close; while a run is recorded, ask and name what becomes of it."""
         fate = "" if self.state.is_closing else self.record.fate_when_closed
         if fate:
-            notice = Notice(fate, Tone.WARN, NoticeAction.CLOSE, N_("Go on recording"))
-            self._update(notice=notice)
+            self._ask(fate, NoticeAction.CLOSE, N_("Go on recording"))
         return not fate
 
     def close_window(self) -> None:
@@ -163,7 +162,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._open_stand_instead = open_it
         device = self.start.state.connected or self._amplifier
         text = gettext("{device} is connected. The simulated stand would take its place", device=device)
-        self._update(notice=Notice(text, Tone.WARN, NoticeAction.SIMULATE, N_("Keep the amplifier")))
+        self._ask(text, NoticeAction.SIMULATE, N_("Keep the amplifier"))
 
     def open_port(self, port: PortSettings) -> None:
         waiting_for = gettext("Connecting to {port}", port=port.url)
@@ -284,6 +283,9 @@ class WindowPresenter(Presenter[WindowState]):
         elif isinstance(event, Failed):
             self._forget_connection()
             self._update(notice=self._failure_notice(event.message, NoticeAction.RECONNECT))
+
+    def _ask(self, text: str, action: NoticeAction, dismiss: str) -> None:
+        self._update(notice=Notice(text, Tone.WARN, action, dismiss, is_question=True))
 
     def _withdraw_question(self, action: NoticeAction) -> None:
         """Drop a question whose reason is gone."""

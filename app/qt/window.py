@@ -5,8 +5,9 @@ from typing import Any, cast
 
 import qtawesome
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QIcon
+from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QHideEvent, QIcon
 from PySide6.QtWidgets import (
+    QApplication,
     QDialog,
     QFileDialog,
     QFrame,
@@ -16,6 +17,7 @@ from PySide6.QtWidgets import (
     QToolButton,
     QWidget,
 )
+from shiboken6 import isValid
 
 from app.presenters.base import Notice
 from app.presenters.screens import Screen
@@ -130,7 +132,6 @@ class MainWindow(QMainWindow):
         """Hide at once, then end a run that is being recorded and all processes; ask before that."""
         if not self._presenter.may_close():
             event.ignore()
-            self._notice.take_focus()
             return
         self._timer.stop()
         self.closed.emit(self._geometry.capture(self, self._shown.screen.value))
@@ -221,6 +222,7 @@ class NoticeBar(QFrame):
         super().__init__()
         self.setProperty("role", "notice")
         self._shown: Notice | None = None
+        self._focused_before: QWidget | None = None
         self._kind = label()
         self._text = label(wrap=True)
         self._fold = make_button("", lambda: self._unfold(self._details.isHidden()))
@@ -232,14 +234,21 @@ class NoticeBar(QFrame):
         self.hide()
 
     def show_notice(self, notice: Notice | None) -> None:
-        if notice is not None and notice != self._shown:
-            self._write(notice)
+        is_new = notice != self._shown
         self._shown = notice
+        if notice is not None and is_new:
+            self._write(notice)
         self.setVisible(notice is not None)
+        if is_new and notice is not None and notice.is_question:
+            self._focused_before = QApplication.focusWidget()
+            self._dismiss.setFocus()
 
-    def take_focus(self) -> None:
-        """Focus the button that leaves all as it is."""
-        self._dismiss.setFocus()
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802
+        """Give the focus back that a question has taken."""
+        before, self._focused_before = self._focused_before, None
+        if before is not None and isValid(before):
+            before.setFocus()
+        super().hideEvent(event)
 
     def _write(self, notice: Notice) -> None:
         for widget in (self, self._kind):

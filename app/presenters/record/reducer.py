@@ -43,6 +43,10 @@ def reduce(model: RecordModel, event: state.RecordEvent) -> tuple[RecordModel, t
     return reduction.model, tuple(reduction.effects)
 
 
+def _disarmed() -> Chip:
+    return Chip(gettext("Disarmed. Nothing was recorded"))
+
+
 class _Reduction:
     """Changes by one event: replaces `model` step by step, and collects `effects`."""
 
@@ -163,6 +167,8 @@ class _Reduction:
         next_runs = self.model.next_runs
         run, count = next_runs.run_settings(self.model.stand.directory), count or next_runs.run_count
         armed = ArmedRun(run.series or "", note=run.note)
+        if self.model.decisions.message == _disarmed():
+            self._set_decisions(message=EMPTY_CHIP)
         self._set_session(is_command_pending=True, remaining_runs=count - 1, run=armed)
         self.effects.append(engine.Arm(run, count))
 
@@ -433,8 +439,7 @@ class _Reduction:
     def _on_disarmed(self) -> None:
         """The operator stopped before the table was pulled back: there is no run."""
         self._set(live=self.model.live.restarted())
-        self._forget_last()
-        self._set_decisions(message=Chip(gettext("Disarmed. Nothing was recorded")))
+        self._set_decisions(message=_disarmed())
 
     def _set_loss(self, reason: str) -> None:
         self._set_session(loss_reason=reason)
