@@ -4,6 +4,7 @@ import math
 import time
 from typing import Self
 
+import msgspec
 import numpy as np
 
 from analysis.catalogue import Place, definition
@@ -67,8 +68,8 @@ class ProgressPrinter:
             self._line.update(self._sentence(self._state))
 
     def _on_state(self, event: StateChanged) -> None:
-        self._state = event
-        if event.state in ("connecting", "idle"):
+        before, self._state = self._state, event
+        if event.state in ("connecting", "idle") or (before is not None and _shown(event) == _shown(before)):
             return
         if event.state in ("recentre", "zero", "recording") and self._count > 1 and not self._last_sentence:
             out.print_status(f"run {self._done + 1} of {self._count}")
@@ -79,7 +80,7 @@ class ProgressPrinter:
 
     def _on_run_ended(self, event: RunEnded) -> None:
         self._done += 1
-        self._last_sentence = ""
+        self._state, self._last_sentence = None, ""
         if event.path:
             more = f". {event.message}" if event.message else ""
             out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
@@ -103,6 +104,11 @@ class ProgressPrinter:
         if detail[1:2].islower():  # it goes on as one sentence
             detail = detail[0].lower() + detail[1:]
         return f"{guidance.instruction}: {detail}" if detail else str(guidance.instruction)
+
+
+def _shown(event: StateChanged) -> tuple[object, ...]:
+    """What a line is printed for; that a run would be kept now is no news."""
+    return event.state, event.note, msgspec.structs.replace(event.position, keeps_run=False)
 
 
 _WAITING = ("recentre", "pulling", "held", "armed")

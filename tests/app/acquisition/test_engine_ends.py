@@ -30,9 +30,12 @@ from app.acquisition.messages import (
     Reconnecting,
     RunEnded,
     RunStarted,
+    StandPosition,
     StateChanged,
+    Stop,
 )
 from app.runs.reader import open_run
+from app.simulated_stand.options import Gesture
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -46,6 +49,41 @@ def test_quitting_ends_a_run_and_keeps_it(tmp_path, shared):
     assert engine.has_ended
     assert len(closed_run(tmp_path)) > 500
     assert gone(engine.process_id)
+
+
+def test_a_stop_before_the_pull_leaves_neither_run_nor_journal(tmp_path):
+    with stand(on_demand=True) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path)))
+        waiting = until(engine, StateChanged, state=PullbackState.PULLING)
+        assert not waiting.position.keeps_run
+        engine.send(Stop())
+        ended = until(engine, RunEnded)
+        assert (ended.ended, ended.path, ended.samples) == (EndReason.STOPPED, "", 0)
+        until(engine, StateChanged, state=PullbackState.IDLE)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_is_worth_keeping_from_the_pull_on(tmp_path):
+    with stand(on_demand=True) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path)))
+        until(engine, StateChanged, state=PullbackState.PULLING)
+        simulated.ask(Gesture.PULL)
+        position = StandPosition()
+        while not position.keeps_run:
+            position = until(engine, StateChanged).position
+        engine.send(Stop())
+        assert until(engine, RunEnded).path
+
+
+def test_a_release_that_came_too_early_is_noticed_and_the_next_one_is_recorded(tmp_path):
+    with stand(early_release_m=0.004) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path)))
+        until(engine, StateChanged, state=PullbackState.PULLING)
+        early = until(engine, StateChanged, state=PullbackState.ZERO)
+        assert early.position.early_release_m == pytest.approx(0.004, abs=0.1e-3)
+        ended = until(engine, RunEnded)
+        assert ended.ended is EndReason.DURATION
+        assert ended.release_s == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_device_that_vanishes_ends_the_run_which_is_kept(tmp_path):

@@ -182,6 +182,7 @@ def test_states_and_file_are_told_in_order(tmp_path):
     assert bench.states() == [
         PullbackState.ZERO,
         PullbackState.PULLING,
+        PullbackState.PULLING,  # the pull has begun: from here on the run is kept
         PullbackState.HELD,
         PullbackState.ARMED,
         PullbackState.RELEASED,
@@ -189,6 +190,8 @@ def test_states_and_file_are_told_in_order(tmp_path):
         PullbackState.SLIPPING,
         PullbackState.CLOSING,
     ]
+    told = [event for event in bench.events if isinstance(event, StateChanged)]
+    assert [event.position.keeps_run for event in told[:4]] == [False, False, True, True]
     assert [event for event in bench.events if isinstance(event, RunStarted)] == [RunStarted(ended.path)]
     ending = bench.writer.ending
     assert ending.ended == "duration"

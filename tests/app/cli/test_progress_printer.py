@@ -1,5 +1,6 @@
 """What the command line says while it records."""
 
+import msgspec
 import numpy as np
 import pytest
 from ring_kit import ring_rows
@@ -40,6 +41,9 @@ def test_sentences_with_figures_each_once(capsys):
     printer.on_rows(rows(0.2))
     printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
+    printer.on_rows(rows(0.6))
+    pulled = msgspec.structs.replace(STANDING, keeps_run=True)
+    printer.on_event(StateChanged(PullbackState.PULLING, 1.5, position=pulled))
     printer.on_event(StateChanged(PullbackState.IDLE, 9.0))
     assert told(capsys) == [
         "Leave the stand alone: its zero is being taken.",

@@ -27,6 +27,7 @@ from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
+from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
@@ -325,3 +326,41 @@ def test_the_window_speaks_russian(
         assert words in desk.words()
         assert clipped_words(desk.window) == []
     desk.window.close()
+
+
+def test_closing_the_window_in_a_recording_asks_and_the_safe_answer_has_the_focus(desk: Desk) -> None:
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.presenter.record.dispatch(Action.ARM)
+    desk.launcher.engines[0].play(6.0)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.is_recording, timeout=5000)
+    desk.window.activateWindow()
+    before = QApplication.focusWidget()
+    desk.window.close()
+    assert desk.window.isVisible()
+    assert "Closing the window" in desk.words()
+    assert clipped_words(desk.window._notice) == []
+    assert desk.button("Go on recording").hasFocus()
+    desk.qtbot.keyClick(desk.button("Go on recording"), Qt.Key.Key_Space)
+    assert QApplication.focusWidget() is before
+    assert desk.window.isVisible()
+    desk.window.close()
+    desk.click("Close the window")
+    desk.qtbot.waitUntil(lambda: not desk.window.isVisible(), timeout=5000)
+    assert desk.launcher.engines[0].closed
+
+
+def test_no_key_on_start_lets_the_simulator_take_the_place_of_an_amplifier(desk: Desk) -> None:
+    desk.presenter.open_port(PortSettings("COM7", "csv"))
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.presenter.show_screen(Screen.START)
+    desk.window.activateWindow()
+    assert not desk.button("Try with the simulated stand").hasFocus()
+    desk.button("Try with the simulated stand").setFocus()
+    desk.qtbot.keyClick(desk.button("Try with the simulated stand"), Qt.Key.Key_Space)
+    assert "The simulated stand would take its place" in desk.words()
+    assert clipped_words(desk.window) == []
+    assert desk.button("Keep the amplifier").hasFocus()
+    desk.qtbot.keyClick(desk.button("Keep the amplifier"), Qt.Key.Key_Space)
+    assert desk.presenter.start.state.connected
+    assert desk.launcher.simulations == []

@@ -5,6 +5,7 @@ import wave
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
@@ -36,6 +37,7 @@ from app.presenters.record.state import (
     PlanState,
     RecordTask,
     RunForm,
+    SavePlan,
     TaskDone,
 )
 from app.qt.record import sound
@@ -85,9 +87,10 @@ class Stage:
         self.presenter.tick()
 
     def tasks(self) -> list[RecordTask]:
+        """Tasks since the last call, without those that store the plan."""
         asked = [call.arguments[0] for call in self.files.calls]
         self.files.calls.clear()
-        return asked
+        return [task for task in asked if not isinstance(task, SavePlan)]
 
     def record(self) -> None:
         """Up to the result."""
@@ -368,6 +371,15 @@ def test_nothing_is_filled_in_while_a_run_is_recorded(stage: Stage) -> None:
     stage.presenter.dispatch(StateChanged(PullbackState.ZERO, 1.0))
     assert not stage.field("Operator").isEnabled()
     assert not stage.button("1FFM2").isEnabled()
+
+
+def test_the_button_of_esc_says_whether_there_will_be_a_run(stage: Stage) -> None:
+    at_rest = standing(PullbackState.PULLING)
+    stage.presenter.dispatch(StateChanged(PullbackState.PULLING, 1.0, position=at_rest))
+    assert stage.button("Disarm   Esc").isEnabled()
+    pulled = msgspec.structs.replace(at_rest, keeps_run=True)
+    stage.presenter.dispatch(StateChanged(PullbackState.PULLING, 2.0, position=pulled))
+    assert stage.button("Stop   Esc").isEnabled()
 
 
 def test_every_cue_is_a_short_tone_of_its_own() -> None:

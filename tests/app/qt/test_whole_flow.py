@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from looking import visible_words
 from PySide6.QtCore import Qt
@@ -148,12 +149,56 @@ def test_closing_the_window_while_it_records_keeps_the_run(
     arm_when_possible(window, presenter, qtbot)
     qtbot.waitUntil(lambda: seconds_after_release(presenter) > 2.0, timeout=PATIENCE_MS)
     window.close()
+    assert "Closing the window ends it now" in visible_words(window)
+    presenter.execute_notice_action()
+    qtbot.waitUntil(lambda: not window.isVisible(), timeout=PATIENCE_MS)
     (path,) = tmp_path.glob("*.h5")
     run = open_run(path, trusted=True)
     assert run.end is not None
     assert run.end.ended == "stopped"
     assert run.end.events.release_s == pytest.approx(1.0, abs=0.01)
     assert run.time_s[-1] > 2.9
+
+
+def test_esc_before_the_pull_leaves_nothing(
+    theme: Theme, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path))
+    presenter = make_window_presenter(msgspec.structs.replace(QUICK, on_demand=True, rest_s=30.0))
+    window = MainWindow(theme, presenter)
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitExposed(window)
+    arm_when_possible(window, presenter, qtbot)
+    qtbot.waitUntil(lambda: presenter.record.state.disarms, timeout=PATIENCE_MS)
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: "Disarmed. Nothing was recorded" in visible_words(window), timeout=PATIENCE_MS)
+    assert presenter.record.state.result is None
+    assert presenter.record.state.primary is Action.ARM
+    assert [path.name for path in tmp_path.iterdir()] == ["next-tests.json"]
+    window.close()
+
+
+def test_a_release_that_came_too_early_is_said_and_the_next_one_is_recorded(
+    theme: Theme, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path))
+    early = msgspec.structs.replace(QUICK, on_demand=True, early_release_m=0.002)
+    presenter = make_window_presenter(early)
+    window = MainWindow(theme, presenter)
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitExposed(window)
+    arm_when_possible(window, presenter, qtbot)
+    guidance = "Let go too early, at 2.0\u202fmm"
+    qtbot.waitUntil(lambda: guidance in visible_words(window), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: seconds_after_release(presenter) > 2.0, timeout=PATIENCE_MS)
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: presenter.record.state.result is not None, timeout=PATIENCE_MS)
+    result = presenter.record.state.result
+    assert result is not None
+    assert float(result.headline.value) == pytest.approx(0.12, rel=0.01), result
+    window.close()
 
 
 def test_a_port_that_does_not_exist_is_said_in_the_window(
