@@ -4,7 +4,6 @@ import math
 import time
 from typing import Self
 
-import msgspec
 import numpy as np
 
 from analysis.catalogue import Place, definition
@@ -107,8 +106,8 @@ class ProgressPrinter:
 
 
 def _shown(event: StateChanged) -> tuple[object, ...]:
-    """What a line is printed for; that a run would be kept now is no news."""
-    return event.state, event.note, msgspec.structs.replace(event.position, keeps_run=False)
+    """What a line is printed for: readings and zero are no news."""
+    return event.state, event.note, event.position.early_release_m
 
 
 _WAITING = ("recentre", "pulling", "held", "armed")

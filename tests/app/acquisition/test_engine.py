@@ -56,11 +56,12 @@ def test_a_pullback_is_recorded_sample_by_sample(tmp_path):
     assert run.metadata.port == simulated.port
     assert len(load_raw_bytes(run).data) > 1500 * 8
     states = [event.state for event in events if isinstance(event, StateChanged)]
-    assert states[:5] == [
+    assert states[:6] == [
         PullbackState.CONNECTING,
         PullbackState.IDLE,
         PullbackState.ZERO,
         PullbackState.PULLING,
+        PullbackState.PULLING,  # the pull has begun
         PullbackState.HELD,
     ]
     health = [event for event in events if isinstance(event, Health)]

@@ -42,7 +42,7 @@ def test_sentences_with_figures_each_once(capsys):
     printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     printer.on_rows(rows(0.6))
-    pulled = msgspec.structs.replace(STANDING, keeps_run=True)
+    pulled = msgspec.structs.replace(STANDING, table_zero_m=0.19e-3, keeps_run=True)
     printer.on_event(StateChanged(PullbackState.PULLING, 1.5, position=pulled))
     printer.on_event(StateChanged(PullbackState.IDLE, 9.0))
     assert told(capsys) == [
