@@ -37,7 +37,7 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     options: SimulatedStandOptions
     timetable: Timetable
     release_s: list[float]
-    """Times of the releases of this session, on the stand's own time (s).
+    """Times of the releases of this session, early ones among them, on the stand's own time (s).
 
     A session begins with a stream that is started afresh; where that is the only one, sample
     `release_s * wire.true_rate_hz` is the release."""
