@@ -49,8 +49,8 @@ _STEP_PERIOD_S = 0.1
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
 _PAUSE_S = 0.04
-_ENDED_BY_OPERATOR = (messages.EndReason.STOPPED, messages.EndReason.INTERRUPTED)
 _AWAITING_PAUSE_S = 0.003
+_ENDED_BY_OPERATOR = (messages.EndReason.STOPPED, messages.EndReason.INTERRUPTED)
 
 
 class PollSchedule:

@@ -86,7 +86,7 @@ class Recording:
             messages.PullbackState.RECORDING if settings.trigger == "none" else messages.PullbackState.ZERO
         )
         self._note = EMPTY
-        self._keeps_run = False  # as reported last
+        self._is_at_rest = True  # as reported last
         self._open_tap()
         self._update_checkpoint()
         self._send_state(self._state, self._armed_index, self._trigger.note)
@@ -228,7 +228,7 @@ class Recording:
                     self._store_note(transition.note)
                 if transition.end_reason is None:
                     self._send_state(transition.state, transition.index, transition.note)
-            if self._trigger.position.keeps_run is not self._keeps_run:
+            if self._trigger.is_at_rest is not self._is_at_rest:
                 self.show_note(self._note)
         self._update_checkpoint()
         self._store(read)
@@ -323,10 +323,8 @@ class Recording:
         return sentences(*self._notes, omitted if self._omitted_notes else EMPTY)
 
     def _send_state(self, state: messages.PullbackState, index: int, note: Message = EMPTY) -> None:
-        self._state, self._note = state, note
-        position = self._trigger.position
-        self._keeps_run = position.keeps_run
-        self._context.emit(messages.StateChanged(state, index / self._rate_hz, note, position))
+        self._state, self._note, self._is_at_rest = state, note, self._trigger.is_at_rest
+        self._context.emit(messages.StateChanged(state, index / self._rate_hz, note, self._trigger.position))
 
 
 def _plan(metadata: RunMetadata, rate_hz: float, last_slip: ObservedSlip | None) -> PullbackPlan:

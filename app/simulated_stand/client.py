@@ -98,7 +98,7 @@ class SimulatedStand:
     def ask(self, gesture: Gesture) -> None:
         """Ask the operator of the stand for something; nothing happens where the stand has ended."""
         if self._child.is_running:
-            self._child.send(gesture, self._STOP_S)
+            self._child.send(gesture)
 
     def disturb(self, text: str) -> None:
         """Disturb the device now or later: `unplug 1.5`, `jump -5 at 3`. Raises DriverError."""

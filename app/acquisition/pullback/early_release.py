@@ -36,7 +36,7 @@ class EarlyReleaseDetector:
 
     def reset(self) -> None:
         self._turns.clear()
-        self._turns += [_Turn(0.0, 0.0), _Turn(0.0, 0.0)]
+        self._turns += [_Turn(0.0, 0.0) for _ in range(3)]
 
     def update(self, index: float, displacement_m: float) -> float | None:
         """Take the table's displacement from its zero (m); NaN is no reading.
@@ -56,8 +56,6 @@ class EarlyReleaseDetector:
 
     def _released_m(self, index: float) -> float | None:
         """Distance of a release, if the half swing that ends at `index` is the first one after it."""
-        if len(self._turns) < 3:
-            return None
         before, pulled, swung = self._turns
         is_pull = pulled.distance_m >= self._least_m and pulled.distance_m > before.distance_m
         is_decaying = _SWUNG * pulled.distance_m <= swung.distance_m <= pulled.distance_m

@@ -288,8 +288,8 @@ class PullbackStateMachine:
         return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
     def _on_returned(self, index: float) -> None:
-        is_expected = self._early_release_m is not None
-        was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m and not is_expected
+        is_said = self._early_release_m is not None
+        was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m and not is_said
         self._is_pulled = False
         self._hold = None
         self._farthest_m = 0.0
@@ -305,7 +305,7 @@ class PullbackStateMachine:
     def _remark(self, hold: Hold, index: float) -> Message:
         if self.state is PullbackState.ARMED:
             return EMPTY
-        if self.state is not PullbackState.HELD and self._plan.target_m is not None:
+        if self.state is PullbackState.PULLING and self._plan.target_m is not None:
             return message(
                 "Released from {pulled_mm:.2f} mm instead of {planned_mm:g} mm",
                 pulled_mm=1e3 * abs(self.measurement.pulled_m),
