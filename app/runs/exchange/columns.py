@@ -14,8 +14,13 @@ from messages.message import Message, message
 
 Floats = NDArray[np.float64]
 ReportShare = Callable[[float], object]
-"""Is called with the share of a file that has been read, 0 where that is not known, at least every few
-seconds."""
+"""Is called with the share of a file that has been read, which grows at least every few seconds."""
+_SHOWN_NAMES, _SHOWN_CHARACTERS = 20, 40  # columns in a message, and of the name of each
+
+
+def part_of(report: ReportShare, first: float, last: float) -> ReportShare:
+    """What reports the share of a part of the work that goes from one share of the whole to another."""
+    return lambda share: report(first + (last - first) * share)
 
 
 @dataclass(eq=False, slots=True)
@@ -107,7 +112,16 @@ def _find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
         return names.index(name)
     if name.isdecimal() and int(name) < width:
         return int(name)
-    there = ", ".join(filter(None, names)) or f"numbers 0 to {width - 1}"
+    named = [one[:_SHOWN_CHARACTERS] for one in names if one]
+    if len(named) > _SHOWN_NAMES:
+        raise ImportFileError(
+            "{path} has no column {wanted!r}. Choose one of {count}: {there}, ...",
+            path=path,
+            wanted=wanted,
+            count=len(named),
+            there=", ".join(named[:_SHOWN_NAMES]),
+        )
+    there = ", ".join(named) or f"numbers 0 to {width - 1}"
     raise ImportFileError(
         "{path} has no column {wanted!r}. Choose from: {there}", path=path, wanted=wanted, there=there
     )

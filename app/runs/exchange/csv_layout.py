@@ -14,7 +14,7 @@ import msgspec
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import DATE, SECOND, TABLE, TIME
 from app.runs.exchange.stamps import DateOrder, find_form
-from app.runs.exchange.tables import SHOWN_ROWS
+from app.runs.exchange.tables import SHOWN_ROWS, WIDTH_MOST, too_wide
 from app.runs.exchange.text_files import HEAD_BYTES, TextFile, open_text
 from app.runs.exchange.units import parse_unit, unit_in_name
 from messages.i18n import N_
@@ -32,6 +32,8 @@ _CANDIDATES = ("\t", ";", ",", "|", " ")
 _DECIMALS: tuple[Decimal, ...] = (".", ",")
 _SAMPLE_LINES = 40  # of the head, the middle and the end each
 _HEAD_LINES = 1000
+_KINDS_MOST, _KINDS_CHARACTERS = 256, 4096
+"""Cells of a line, and characters that they are in, whose kinds tell the layout."""
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -133,8 +135,9 @@ class _Format(NamedTuple):
         return split_line(line, self.delimiter)
 
     def kinds(self, line: str) -> str:
-        """A letter for each cell: n number, s date or time, e empty, x text."""
-        return "".join(_kind(cell, self.decimal) for cell in self.cells(line))
+        """A letter for each of the first cells: n number, s date or time, e empty, x text."""
+        cells = self.cells(line[:_KINDS_CHARACTERS])[:_KINDS_MOST]
+        return "".join(_kind(cell, self.decimal) for cell in cells)
 
 
 _COMMAS, _DECIMAL_COMMAS = _Format(",", "."), _Format(" ", ",")
@@ -152,6 +155,8 @@ def survey_csv(path: Path, layout: FileLayout) -> CsvText:
     more = [line for place in (0.5, 0.9) for line in file.tail_lines(place, _SAMPLE_LINES) if is_data(line)]
     sample = [*(line.text for line in lines[-_SAMPLE_LINES:]), *more]
     form = _format(path, layout, given, lines, sample)
+    if (width := max(_width(form, line) for line in sample)) > WIDTH_MOST:
+        raise too_wide(path, width)
     pattern = _pattern(form, sample, layout)
     first = _first_row(path, layout, form, lines, pattern)
     names, units = _names(path, layout, form, lines, first, pattern, comments)
@@ -224,7 +229,7 @@ def _head(file: TextFile, layout: FileLayout) -> tuple[list[Line], list[Line], s
                 comments.append(Line(number, text.lstrip().lstrip("#")))
             if len(lines) >= _HEAD_LINES:
                 break
-        if lines and (len(lines) >= _HEAD_LINES or piece.end_bytes >= HEAD_BYTES):
+        if len(lines) > 1 and (len(lines) >= _HEAD_LINES or piece.end_bytes >= HEAD_BYTES):
             break
     if not lines:
         template = N_("{path} holds no line of data. Give a file with numbers, and check {option} {skip}")

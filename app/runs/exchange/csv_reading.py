@@ -34,7 +34,7 @@ from app.runs.exchange.stamps import (
     to_datetime,
     unwrap_times,
 )
-from app.runs.exchange.tables import TimeAxis
+from app.runs.exchange.tables import TimeAxis, check_count
 from app.runs.exchange.text_files import PIECE_BYTES, Piece
 from messages.i18n import N_
 from messages.message import Message, MessageError, message, option
@@ -43,6 +43,7 @@ _FOOTER_BYTES = 1 << 16
 """Lines at the end that are no rows are a footer if they are no more than this."""
 _ROOM, _SHARE_MIN = 1.02, 1e-3
 """Room beyond the rows expected from the share of the file that was read; that share is at least this."""
+_NUMBERS_MOST = 1 << 26  # with what is needed beside them they take 0.9 GB
 _NUMERIC = re.compile(r"\s*[-+.,]*\d")
 _ROWS_AT_ONCE = 1 << 17
 _SHOWN = 40  # characters of a footer in a note
@@ -98,7 +99,9 @@ class _Reader:
                 values, ended = self._thorough(piece)
             end, share = rows + len(values[0]), min(piece.end_bytes / size_bytes, 1.0)
             if end > len(joined[0]):
+                check_count(self._source.path, end * len(joined), _NUMBERS_MOST)
                 room = int(_ROOM * end / max(share, _SHARE_MIN)) + 1
+                room = max(min(room, _NUMBERS_MOST // len(joined)), end)
                 joined = [_with_room(column[:rows], room) for column in joined]
             for column, part in zip(joined, values, strict=True):
                 column[rows:end] = part

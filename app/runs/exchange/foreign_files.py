@@ -34,8 +34,9 @@ def read_foreign(path: Path, layout: FileLayout, report: ReportShare = lambda _:
         columns = read_columns(path, layout, report)
     else:
         _check_layout(path, found, layout)
+        steps = _Steps(report, 1 + len(list(layout.wanted)))
         with _faults_named(path, found):
-            columns = _read(path, _open(found, path, layout, report), layout, report)
+            columns = _read(path, _open(found, path, layout, steps), layout, steps)
         columns.check()
     columns.leave_out(layout.missing_values)
     return columns
@@ -84,9 +85,9 @@ def unpacked(path: Path, report: ReportShare = lambda _: None) -> Iterator[Path]
 
 
 def _unpack(path: Path, plain: Path, report: ReportShare) -> None:
-    done = 0
+    done, size_bytes = 0, max(path.stat().st_size, 1)
     try:
-        with gzip.open(path) as packed, plain.open("wb") as file:
+        with path.open("rb") as source, gzip.open(source) as packed, plain.open("wb") as file:
             while data := packed.read(_PIECE_BYTES):
                 done += len(data)
                 if done > _UNPACKED_MOST_BYTES:
@@ -96,7 +97,7 @@ def _unpack(path: Path, plain: Path, report: ReportShare) -> None:
                         gigabytes=_UNPACKED_MOST_BYTES / 2**30,
                     )
                 file.write(data)
-                report(0.0)
+                report(min(source.tell() / size_bytes, 1.0))
     except (EOFError, gzip.BadGzipFile, zlib.error):
         raise ImportFileError("{path} is a damaged gzip file. Pack it again", path=path) from None
 
@@ -156,14 +157,31 @@ def _check_layout(path: Path, found: Format, layout: FileLayout) -> None:
         )
 
 
-def _read(path: Path, table: Table, layout: FileLayout, report: ReportShare) -> ForeignColumns:
+class _Steps:
+    """Reports the share of steps of equal length: what opens a file, and each of its columns."""
+
+    def __init__(self, report: ReportShare, count: int) -> None:
+        self._report = report
+        self._count = count
+        self._done = 0
+
+    def __call__(self, share: float) -> None:
+        self._report((self._done + share) / self._count)
+
+    def end_one(self) -> None:
+        self._done += 1
+        self(0.0)
+
+
+def _read(path: Path, table: Table, layout: FileLayout, steps: _Steps) -> ForeignColumns:
     wanted = list(layout.wanted)
     names = list(table.names)
     positions = find_columns(path, wanted, names, len(names))
+    table.check_size(path, positions)
     columns: list[NDArray[Any]] = []
-    for number, at in enumerate(positions, start=1):
+    for at in positions:
+        steps.end_one()
         columns.append(table.column(at))
-        report(number / (len(positions) + 1))
     shown = [names[at] or str(at) for at in positions]
     units = [table.unit(at) for at in positions]
     if wanted[0][0] == TIME:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.runs.blocks import RunBlock
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import ForeignColumns, ReportShare
+from app.runs.exchange.columns import ForeignColumns, ReportShare, part_of
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
@@ -40,6 +40,8 @@ _SINCE, _SPAN = datetime.datetime(2001, 1, 1, tzinfo=datetime.UTC), _EPOCHS[0] -
 a record gets there, and no times lie there from both epochs."""
 _BLOCK_ROWS = 1 << 17
 _HASHED_BYTES = 1 << 22
+_UNPACKED_SHARE, _SURVEYED_SHARE, _READ_SHARE = 0.05, 0.1, 0.95
+"""What of the time of reading is over when a file is unpacked, when its columns are found, and are read."""
 
 
 class ImportPlan(msgspec.Struct, frozen=True):
@@ -130,10 +132,10 @@ def read_record(
     `app.runs.exchange.reading_process` does it in a process with limits.
     """
     check_plan(plan)
-    with unpacked(path, report) as plain:
-        plan = _with_time(plain, plan, report)
-        columns = read_foreign(plain, plan.layout, report)
-        return _record(path, plan, columns, report, keep)
+    with unpacked(path, part_of(report, 0.0, _UNPACKED_SHARE)) as plain:
+        plan = _with_time(plain, plan, part_of(report, _UNPACKED_SHARE, _SURVEYED_SHARE))
+        columns = read_foreign(plain, plan.layout, part_of(report, _SURVEYED_SHARE, _READ_SHARE))
+        return _record(path, plan, columns, part_of(report, _READ_SHARE, 1.0), keep)
 
 
 def _record(
@@ -178,11 +180,11 @@ def even_rate_hz(time_s: Floats) -> float | None:
 
 
 def _source(path: Path, report: ReportShare) -> SourceFile:
-    digest = hashlib.sha256()
+    digest, size_bytes = hashlib.sha256(), max(path.stat().st_size, 1)
     with path.open("rb") as file:
         while data := file.read(_HASHED_BYTES):
             digest.update(data)
-            report(1.0)
+            report(min(file.tell() / size_bytes, 1.0))
         return SourceFile(name=path.name, sha256=digest.hexdigest(), size_bytes=file.tell())
 
 

@@ -9,9 +9,9 @@ import functools
 import importlib
 import itertools
 import math
-import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,13 +32,14 @@ from app.runs.exchange.importing import (
     check_plan,
     read_record,
 )
+from app.runs.exchange.memory_limit import limit_memory
 from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
 from messages.i18n import N_
 from messages.message import Message, Option, Value
 
 MEMORY_BYTES = 1 << 30
 PROGRESS_S = 10.0
-"""A reader that shows no progress for so long hangs. It reports at least every few megabytes."""
+"""A reader whose share of the file does not grow for so long hangs."""
 _IDLE_S = 60.0
 _LARGE_BYTES = 1 << 26
 """A process that has read a record of more ends, since its libraries need more than the start of another."""
@@ -105,6 +106,10 @@ class ReadingProcess:
         self._process: RequestProcess[Request, Event] = RequestProcess(__name__, _decode_event)
         self._turn = threading.Lock()
 
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
     @contextlib.contextmanager
     def read(
         self, path: Path, plan: ImportPlan, report: Callable[[float], object] = lambda _: None
@@ -127,9 +132,11 @@ class ReadingProcess:
             facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
             yield ForeignRecord(facts, arrays[0], tuple(arrays[1:]))
 
-    def preview(self, path: Path, options: ParseOptions) -> FilePreview:
+    def preview(
+        self, path: Path, options: ParseOptions, report: Callable[[float], object] = lambda _: None
+    ) -> FilePreview:
         """Look into a file as `recognition.preview_file` does. Raises RunError."""
-        answer = self._ask(PreviewRequest(str(path.absolute()), options), path, lambda _: None)
+        answer = self._ask(PreviewRequest(str(path.absolute()), options), path, report)
         if not isinstance(answer, PreviewRead):
             raise _crashed(path)
         return answer.preview
@@ -143,24 +150,33 @@ class ReadingProcess:
                 self._process.stop()
             if not self._process.send(request):
                 raise RunError("the process that reads foreign files does not start. Run `slipstand doctor`")
-            timeout_s = PROGRESS_S
-            while isinstance(event := self._next(timeout_s, path), ReadingProgress):
-                timeout_s = START_S if event.is_loading else PROGRESS_S
-                report(event.share)
+            event = self._last_event(path, report)
         if isinstance(event, ReadingFault):
             kind: type[RunError] = ExtraMissingError if event.is_extra_missing else ImportFileError
             raise kind(_unpacked(event.message))
         return event
 
-    def _next(self, timeout_s: float, path: Path) -> Event:
+    def _last_event(self, path: Path, report: Callable[[float], object]) -> Event:
+        """Wait for an answer as long as the share of the file that is read grows."""
+        limit_s, share = PROGRESS_S, -1.0
+        until_s = time.monotonic() + limit_s
+        while isinstance(event := self._next(path, until_s, limit_s), ReadingProgress):
+            if event.is_loading or limit_s != PROGRESS_S or event.share > share:
+                limit_s = START_S if event.is_loading else PROGRESS_S
+                until_s = time.monotonic() + limit_s
+            share = max(share, event.share)
+            report(share)
+        return event
+
+    def _next(self, path: Path, until_s: float, limit_s: float) -> Event:
         try:
-            event = self._process.receive(timeout_s)
+            event = self._process.receive(max(until_s - time.monotonic(), 0.0))
         except TimeoutError:
             template = N_(
                 "{path}: reading it shows no progress for {seconds:g} s. The file is damaged, or its disk too"
                 " slow: copy it to this computer and try again"
             )
-            raise ImportFileError(template, path=path, seconds=timeout_s) from None
+            raise ImportFileError(template, path=path, seconds=limit_s) from None
         if event is None:
             raise _crashed(path)
         return event
@@ -178,7 +194,7 @@ def main() -> None:
     """Answer requests until stdin ends: one a line as JSON, with events on stdout."""
     start_log("reader")
     child_process.ignore_session_signals()
-    _limit_memory()
+    limit_memory(MEMORY_BYTES)
     events: EventSender[Event] = EventSender(
         child_process.reserve_stdout(), lambda event: isinstance(event, ReadingProgress)
     )
@@ -190,16 +206,6 @@ def main() -> None:
             _load_reader(Path(request.path), events.send)
             events.send(_answer(request, lambda share: events.send(ReadingProgress(share))))
     events.close()
-
-
-def _limit_memory() -> None:
-    """Limit what the process may write to; address space alone costs nothing, and libraries reserve much."""
-    if sys.platform == "linux":
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
 
 
 def _load_reader(path: Path, send: Callable[[Event], object]) -> None:

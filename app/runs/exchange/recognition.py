@@ -9,7 +9,7 @@ from typing import Literal
 import msgspec
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.columns import ReportShare
+from app.runs.exchange.columns import ReportShare, part_of
 from app.runs.exchange.csv_layout import CsvText, FileLayout, is_number, survey_csv
 from app.runs.exchange.foreign_files import is_csv, open_foreign, unpacked
 from app.runs.exchange.stamps import find_form, has_date, has_time
@@ -64,8 +64,8 @@ def preview_file(
     path: Path, given: ParseOptions | None = None, report: ReportShare = lambda _: None
 ) -> FilePreview:
     """Look into a file that `import_foreign_file` can read. Raises ImportFileError, ExtraMissingError."""
-    with unpacked(path, report) as plain:
-        return _preview(plain, given or ParseOptions(), report)
+    with unpacked(path, part_of(report, 0.0, 0.5)) as plain:
+        return _preview(plain, given or ParseOptions(), part_of(report, 0.5, 1.0))
 
 
 def _preview(path: Path, given: ParseOptions, report: ReportShare) -> FilePreview:

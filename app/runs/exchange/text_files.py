@@ -16,7 +16,8 @@ from messages.message import option
 PIECE_BYTES = 1 << 20
 HEAD_BYTES = 1 << 18
 """Header, units and the first rows of a record lie within them; a header of more is none."""
-_LINE_BYTES = 1 << 24  # more without a line end is no text of a record
+LINE_BYTES = 1 << 20
+"""More without a line end is no text of a record."""
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")
 )  # fmt: skip
@@ -55,13 +56,8 @@ class TextFile:
                 if newline:
                     yield Piece(line, whole + newline, file.tell())
                     line += whole.count(b"\n") + 1
-                elif len(rest) > _LINE_BYTES:
-                    raise ImportFileError(
-                        "{path}, line {line}: it has more than {bytes} bytes. Give a file with a row a line",
-                        path=self.path,
-                        line=line,
-                        bytes=_LINE_BYTES,
-                    )
+                if len(rest) > LINE_BYTES:
+                    raise line_too_long(self.path, line)
         if rest:
             yield Piece(line, rest + b"\n", self.size_bytes)
 
@@ -94,6 +90,16 @@ class TextFile:
             if b"\r" in data:
                 data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
             yield data
+
+
+def line_too_long(path: Path, line: int) -> ImportFileError:
+    """Error for a line that is no row."""
+    return ImportFileError(
+        "{path}, line {line}: it has more than {bytes} bytes. Give a file with a row a line",
+        path=path,
+        line=line,
+        bytes=LINE_BYTES,
+    )
 
 
 def open_text(path: Path, encoding: str | None = None) -> TextFile:

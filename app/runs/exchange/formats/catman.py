@@ -85,7 +85,8 @@ def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     def column(at: int) -> NDArray[Any]:
         return _read(path, channels[at], places[at])
 
-    return Table([one.name for one in channels], column, units=[one.unit for one in channels])
+    names, units = [one.name for one in channels], [one.unit for one in channels]
+    return Table(names, column, units=units, lengths=[one.rows for one in channels])
 
 
 def _channel(reader: _Reader) -> _Channel:

@@ -1,5 +1,6 @@
 """HDF5 files of other programs, and MATLAB files of version 7.3, by h5py."""
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ _MATLAB_TEXT = "MATLAB_int_decode"
 class _Column(NamedTuple):
     name: str
     unit: str
+    rows: int
     read: Callable[[h5py.File], NDArray[Any]]
 
 
@@ -52,7 +54,8 @@ def _table(path: Path, columns: list[_Column]) -> Table:
         with h5py.File(path, "r", locking=False) as file:
             return columns[at].read(file)
 
-    return Table([one.name for one in columns], column, units=[one.unit for one in columns])
+    names, units = [one.name for one in columns], [one.unit for one in columns]
+    return Table(names, column, units=units, lengths=[one.rows for one in columns])
 
 
 def _datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
@@ -73,9 +76,9 @@ def _columns(dataset: h5py.Dataset) -> Iterator[_Column]:
     if kind.names and dataset.ndim == 1:
         for field in kind.names:
             if kind[field].kind in "iuf" and not kind[field].shape:
-                yield _Column(f"{name}.{field}", "", partial(_read_field, path, field))
+                yield _Column(f"{name}.{field}", "", _rows(dataset, 0), partial(_read_field, path, field))
     elif kind.kind in "iuf" and dataset.ndim == 1:
-        yield _Column(name, unit, partial(_read_vector, path))
+        yield _Column(name, unit, _rows(dataset, 0), partial(_read_vector, path))
     elif kind.kind in "iuf" and dataset.ndim == 2:
         yield from _of_matrix(dataset, name, unit, is_by_column=False)
 
@@ -96,15 +99,19 @@ def _matlab_columns(dataset: h5py.Dataset) -> Iterator[_Column]:
 def _of_matrix(dataset: h5py.Dataset, name: str, unit: str, *, is_by_column: bool) -> Iterator[_Column]:
     path, shape = dataset.name, dataset.shape
     if 1 in shape:
-        yield _Column(name, unit, partial(_read_vector, path))
+        yield _Column(name, unit, _rows(dataset, shape.index(max(shape))), partial(_read_vector, path))
         return
     if shape[0 if is_by_column else 1] > COLUMNS_MOST:
         is_by_column = not is_by_column
+    rows = _rows(dataset, 1 if is_by_column else 0)
     for at in range(min(shape[0 if is_by_column else 1], COLUMNS_MOST)):
-        if is_by_column:
-            yield _Column(f"{name}:{at}", unit, partial(_read_row, path, at))
-        else:
-            yield _Column(f"{name}:{at}", unit, partial(_read_column, path, at))
+        read = partial(_read_row if is_by_column else _read_column, path, at)
+        yield _Column(f"{name}:{at}", unit, rows, read)
+
+
+def _rows(dataset: h5py.Dataset, along: int) -> int:
+    """Length along a dimension; of a dataset that unpacks larger chunks, as if it were one of them."""
+    return max(int(dataset.shape[along]), math.prod(dataset.chunks or (1,)))
 
 
 def _unit(dataset: h5py.Dataset) -> str:

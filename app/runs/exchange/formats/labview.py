@@ -19,7 +19,8 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_layout import FileLayout
-from app.runs.exchange.tables import Table, TimeAxis, even_axis
+from app.runs.exchange.tables import WIDTH_MOST, Table, TimeAxis, check_count, even_axis, too_wide
+from app.runs.exchange.text_files import LINE_BYTES, line_too_long
 
 _HEADER_LINES = 1000
 _ROWS = 100_000  # read at once
@@ -61,6 +62,8 @@ class _File:
         self.content: dict[Any, Any] = self._read_lines(self._header, separator=self._separator)
         self.segment: dict[str, Any] = self.content[0]
         self.channels = int(self.segment["Channels"])
+        if self.channels > WIDTH_MOST:
+            raise too_wide(path, self.channels)
         x_columns = str(self.content.get("X_Columns", "One")).strip()
         self.has_x, self.is_multi = x_columns != "No", x_columns == "Multi"
         self.columns = [2 * at + 1 if self.is_multi else at + self.has_x for at in range(self.channels)]
@@ -69,11 +72,13 @@ class _File:
     def data(self) -> NDArray[np.float64]:
         """(n, columns) float64: rows of the first segment, NaN where a cell is empty."""
         size_bytes = max(self._path.stat().st_size, 1)
-        parts = [np.empty((0, self.columns[-1] + 1))]
+        parts, numbers = [np.empty((0, self.columns[-1] + 1))], 0
         with _open(self._path) as file:
-            rows = self._rows(itertools.islice(file, len(self._header), None))
+            rows = self._rows(itertools.islice(_lines(self._path, file), len(self._header), None))
             while lines := list(itertools.islice(rows, _ROWS)):
                 parts.append(self._numbers(lines))
+                numbers += parts[-1].size
+                check_count(self._path, 2 * numbers)  # all parts, and joined
                 self._report(min(file.buffer.tell() / size_bytes, 1.0))
         return np.concatenate(parts)
 
@@ -103,10 +108,21 @@ def _open(path: Path) -> TextIO:
     return path.open(encoding="utf-8", errors="ignore")
 
 
+def _lines(path: Path, file: TextIO) -> Iterator[str]:
+    """Lines of a file. Raises ImportFileError for one that is no row."""
+    for number in itertools.count(1):
+        line = file.readline(LINE_BYTES)
+        if len(line) >= LINE_BYTES:
+            raise line_too_long(path, number)
+        if not line:
+            return
+        yield line
+
+
 def _header(path: Path, file: TextIO) -> list[str]:
     """Lines up to the names of the first segment. Raises ImportFileError."""
     lines: list[str] = []
-    for line in itertools.islice(file, _HEADER_LINES):
+    for line in itertools.islice(_lines(path, file), _HEADER_LINES):
         lines.append(line)
         if line.startswith("X_Value"):
             return lines

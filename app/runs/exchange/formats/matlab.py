@@ -1,9 +1,13 @@
 """MATLAB files: up to version 7 by scipy, of version 7.3 by h5py."""
 
+import functools
 import math
-from collections.abc import Iterator
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,31 +16,103 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.formats.hdf5 import COLUMNS_MOST, open_matlab
-from app.runs.exchange.tables import LARGEST_BYTES, Table
+from app.runs.exchange.tables import Table, check_count
+
+_HEADER_BYTES = 128
+_COMPRESSED = 15  # type of an element (MathWorks, "MAT-File Format", table 1-1)
+_PIECE_BYTES = 1 << 16
+_STRUCT_BYTES = 1 << 26
+"""Unpacked: names and lengths of the fields of a struct are known when all of it is loaded."""
+_NUMBERS = (
+    "double",
+    "single",
+    "logical",
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+)
 
 
-def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
+class _Column(NamedTuple):
+    name: str
+    rows: int
+    read: Callable[[], NDArray[Any]]
+
+
+def open_table(path: Path, layout: FileLayout, _report: ReportShare) -> Table:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
-    from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
+    from scipy.io import whosmat  # a third of a second that only this format needs
 
     with path.open("rb") as file:
-        if file.read(128)[124:128] in (b"\x00\x02IM", b"\x02\x00MI"):
+        if file.read(_HEADER_BYTES)[124:] in (b"\x00\x02IM", b"\x02\x00MI"):
             return open_matlab(path)
-    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > LARGEST_BYTES:
-        raise ImportFileError("{path} holds more numbers than can be loaded. Save a part of them", path=path)
-    content = loadmat(path, simplify_cells=True)
-    vectors = dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
-    values = list(vectors.values())
-    return Table(list(vectors), values.__getitem__)
+    columns: list[_Column] = []
+    load = functools.lru_cache(maxsize=1)(partial(_load, path))  # columns of a matrix come one by one
+    for number, (name, shape, kind) in enumerate(whosmat(path)):
+        if kind in _NUMBERS:
+            columns += _columns(name, shape, partial(load, name, shape))
+        elif kind == "struct" and not _is_too_large(path, number):
+            for field, values in _fields(name, load(name, shape)):
+                columns += _columns(field, values.shape, partial(np.asarray, values))
+        elif kind == "struct" and any(wanted.startswith(f"{name}.") for _, wanted in layout.wanted):
+            raise ImportFileError(
+                "{path}: the struct {name} takes more than {megabytes} MB. Save its fields as variables",
+                path=path,
+                name=name,
+                megabytes=_STRUCT_BYTES >> 20,
+            )
+    names, lengths = [one.name for one in columns], [one.rows for one in columns]
+    return Table(names, lambda at: columns[at].read(), lengths=lengths)
 
 
-def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def _columns(name: str, shape: tuple[int, ...], read: Callable[[], NDArray[Any]]) -> Iterator[_Column]:
+    """Columns of a vector or matrix; its rows, where it has too many columns."""
+    sides = [side for side in shape if side != 1]
+    if len(sides) == 1:
+        yield _Column(name, sides[0], lambda: read().ravel())
+    elif len(sides) == 2:
+        is_by_column = sides[1] <= COLUMNS_MOST
+        rows, width = sides if is_by_column else reversed(sides)
+        for at in range(min(width, COLUMNS_MOST)):
+            yield _Column(f"{name}:{at}", rows, partial(_column, read, at, is_by_column=is_by_column))
+
+
+def _column(read: Callable[[], NDArray[Any]], at: int, *, is_by_column: bool) -> NDArray[Any]:
+    matrix = np.squeeze(read())
+    return np.array(matrix[:, at] if is_by_column else matrix[at])
+
+
+def _fields(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Arrays of numbers in a struct, also in those within it."""
     if isinstance(value, dict):
         for key, item in value.items():
-            yield from _vectors(f"{name}.{key}" if name else str(key), item)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim in (1, 2):
-        if value.ndim == 1 or 1 in value.shape:
-            yield name, value.ravel().astype(np.float64)
-        else:
-            columns = value.T if value.shape[1] <= COLUMNS_MOST else value[:COLUMNS_MOST]
-            yield from ((f"{name}:{i}", column.astype(np.float64)) for i, column in enumerate(columns))
+            yield from _fields(f"{name}.{key}", item)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        yield name, value
+
+
+def _load(path: Path, name: str, shape: tuple[int, ...]) -> Any:
+    """A variable. Raises ImportFileError for a matrix that is too large, whichever of its columns is read."""
+    from scipy.io import loadmat
+
+    check_count(path, math.prod(shape))
+    return loadmat(path, variable_names=[name], simplify_cells=True)[name]
+
+
+def _is_too_large(path: Path, number: int) -> bool:
+    """Tell whether a variable of a file of version 5, counted from 0, unpacks to more than a struct may."""
+    with path.open("rb") as file:
+        order = "<" if file.read(_HEADER_BYTES).endswith(b"IM") else ">"
+        for _ in range(number):
+            _, size_bytes = struct.unpack(f"{order}II", file.read(8))
+            file.seek(size_bytes, 1)
+        kind, size_bytes = struct.unpack(f"{order}II", file.read(8))
+        if kind != _COMPRESSED:
+            return bool(size_bytes > _STRUCT_BYTES)
+        unpacker, unpacked = zlib.decompressobj(), 0
+        while (
+            size_bytes > 0
+            and unpacked <= _STRUCT_BYTES
+            and (data := file.read(min(size_bytes, _PIECE_BYTES)))
+        ):
+            size_bytes -= len(data)
+            unpacked += len(unpacker.decompress(data))
+    return unpacked > _STRUCT_BYTES

@@ -39,4 +39,5 @@ def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
         return TimeAxis(np.array(signal(at).timestamps, np.float64), start)
 
     units = [str(file.get_channel_unit(group=group, index=index)) for group, index in places]
-    return Table(names, column, units=units, axis=axis, has_axis=True)
+    lengths = [int(file.groups[group].channel_group.cycles_nr) for group, _ in places]
+    return Table(names, column, units=units, axis=axis, has_axis=True, lengths=lengths)

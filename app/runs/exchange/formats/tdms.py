@@ -41,7 +41,7 @@ def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
 
     units = [str(told.get("unit_string", "")) for told in properties]
     has_axis = any("wf_increment" in one for one in properties)
-    return Table(names, column, units=units, axis=axis, has_axis=has_axis, has_zone=True)
+    return Table(names, column, units=units, axis=axis, has_axis=has_axis, has_zone=True, lengths=lengths)
 
 
 def _start(value: Any) -> datetime.datetime | None:

@@ -10,13 +10,14 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.content import import_optional
 from app.runs.exchange.csv_layout import FileLayout
-from app.runs.exchange.tables import Table, TimeAxis, even_axis
+from app.runs.exchange.tables import Table, TimeAxis, check_file_size, even_axis
 
 _TIME_RESPONSE = 1
 
 
 def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Time responses by their second line of text; one that comes twice has node and direction beside."""
+    check_file_size(path)
     file = import_optional("pyuff", "UFF 58").UFF(str(path))
     places = [place for place, kind in enumerate(file.get_set_types()) if int(kind) == 58]
     sets: list[dict[str, Any]] = [file.read_sets(place) for place in places]

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from app.runs.exchange.columns import ReportShare
 from app.runs.exchange.csv_layout import FileLayout
-from app.runs.exchange.tables import Table, TimeAxis, even_axis
+from app.runs.exchange.tables import Table, TimeAxis, check_file_size, even_axis
 
 
 def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
     """Channels by their numbers from 0; a cell of 1 is full scale."""
     from scipy.io import wavfile  # a third of a second that only this format needs
 
+    check_file_size(path)
     rate_hz, data = wavfile.read(path)
     data = data[:, np.newaxis] if data.ndim == 1 else data
 
@@ -29,4 +30,5 @@ def open_table(path: Path, _layout: FileLayout, _report: ReportShare) -> Table:
         return even_axis(len(data), 1.0 / rate_hz)
 
     names = [f"channel {at}" for at in range(data.shape[1])]
-    return Table(names, column, units=["full scale"] * len(names), axis=axis, has_axis=True)
+    lengths = [len(data)] * len(names)
+    return Table(names, column, units=["full scale"] * len(names), axis=axis, has_axis=True, lengths=lengths)
