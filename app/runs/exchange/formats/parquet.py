@@ -33,9 +33,7 @@ def open_table(path: Path, _layout: FileLayout, report: ReportShare) -> Table:
             template = N_("{path}, column {name}: {type} is no number. Export plain numbers")
             raise ImportFileError(template, path=path, name=names[at], type=fields[at].type)
         if chunks.get(names[at], 0) > _CHUNK_BYTES:
-            template = N_(
-                "{path}, column {name}: a row group of it is too large to be loaded. Export smaller ones"
-            )
+            template = N_("{path}, column {name}: a row group is too large to be loaded. Export smaller ones")
             raise ImportFileError(template, path=path, name=names[at])
         parts, done = [np.empty(0)], 0
         for batch in file.iter_batches(_BATCH_ROWS, columns=[names[at]], use_threads=False):

@@ -515,12 +515,6 @@ def test_the_process_that_read_a_large_record_frees_its_memory(tmp_path, monkeyp
         process.stop()
 
 
-def test_what_needs_too_much_memory_is_one_line(tmp_path):
-    path = tmp_path / "huge.h5"
-    path.write_bytes(huge_hdf5(tmp_path))
-    assert "memory" in fault_of(path, FileLayout("t", "u1"))
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a file that never ends is a pipe here")
 def test_a_reader_without_progress_is_ended(tmp_path, monkeypatch):
     monkeypatch.setattr(reading_process, "PROGRESS_S", 0.5)

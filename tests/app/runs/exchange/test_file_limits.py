@@ -1,0 +1,157 @@
+"""Foreign files that are larger than they look: refused by their declared sizes, before they are read."""
+
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange import reading_process
+from app.runs.exchange.csv_layout import FileLayout
+from app.runs.exchange.formats import matlab
+from app.runs.exchange.importing import ImportPlan, read_record
+from app.runs.exchange.memory_limit import MEMORY_EXIT
+from app.runs.exchange.reading_process import ReadingProcess, ReadingProgress
+from app.runs.exchange.recognition import preview_file
+
+PLAN = ImportPlan(FileLayout("t", "u1"))
+ROWS = 60
+
+
+def fault_of(path, plan=PLAN):
+    with pytest.raises(ImportFileError) as caught:
+        read_record(path, plan)
+    return str(caught.value).replace(f"{path.parent}/", "")
+
+
+@pytest.mark.parametrize("chunk", [1 << 20, 1 << 26])
+def test_more_numbers_than_can_be_loaded_are_refused(tmp_path, chunk):
+    """As the shape of a dataset tells, or that of its chunks, of which one is unpacked at least."""
+    path = tmp_path / "huge.h5"
+    with h5py.File(path, "w") as file:
+        for name in ("t", "u1"):
+            shape = (12_500_000_000 if chunk == 1 << 20 else 60,)
+            file.create_dataset(name, shape, "f8", chunks=(chunk,), maxshape=(None,), compression="gzip")
+    start_s = time.monotonic()
+    said = fault_of(path)
+    assert said.startswith("huge.h5: the columns hold ")
+    assert said.endswith("numbers, too many to be loaded: 33554432 at most. Export a part")
+    assert time.monotonic() - start_s < 5.0
+
+
+def test_cells_and_large_structs_of_matlab_are_not_loaded(tmp_path, monkeypatch):
+    path = tmp_path / "workspace.mat"
+    content = {
+        "cells": np.array([np.zeros(5), "a"], object),
+        "S": {"t": np.arange(100_000) * 1.0, "u1": np.arange(100_000) * 2.0},
+        "both": np.column_stack([np.arange(ROWS), np.arange(ROWS) * 3.0]),
+    }
+    of_struct = ImportPlan(FileLayout("S.t", "S.u1"))
+    for compressed in (False, True):
+        savemat(path, content, do_compression=compressed)
+        monkeypatch.setattr(matlab, "_STRUCT_BYTES", 2 << 20)
+        assert preview_file(path).columns == ("S.t", "S.u1", "both:0", "both:1")
+        assert np.array_equal(read_record(path, of_struct).cells[0], 2.0 * np.arange(100_000))
+        monkeypatch.setattr(matlab, "_STRUCT_BYTES", 1 << 20)
+        assert preview_file(path).columns == ("both:0", "both:1")
+        by_matrix = read_record(path, ImportPlan(FileLayout("both:0", "both:1")))
+        assert list(by_matrix.cells[0]) == [3.0 * row for row in range(ROWS)]
+        assert fault_of(path, of_struct) == (
+            "workspace.mat: the struct S takes more than 1 MB. Save its fields as variables"
+        )
+
+
+def test_a_part_of_a_parquet_file_is_unpacked_only_if_it_is_not_too_large(tmp_path, monkeypatch):
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "log.parquet"
+    parquet.write_table(
+        pa.table({"t": np.arange(ROWS) * 1.0, "u1": np.ones(ROWS), "note": ["x" * 1000] * ROWS}),
+        path,
+        use_dictionary=False,
+    )
+    monkeypatch.setattr("app.runs.exchange.formats.parquet._CHUNK_BYTES", 2000)
+    assert preview_file(path).rows[1] == ("1.0", "1.0", "")
+    assert len(read_record(path, PLAN)) == ROWS
+    assert fault_of(path, ImportPlan(FileLayout("t", "note"))) == (
+        "log.parquet, column note: string is no number. Export plain numbers"
+    )
+    monkeypatch.setattr("app.runs.exchange.formats.parquet._CHUNK_BYTES", 100)
+    assert fault_of(path) == (
+        "log.parquet, column t: a row group is too large to be loaded. Export smaller ones"
+    )
+
+
+@pytest.mark.parametrize("above", ["", "t,u1\n", "t,u1\n" + "".join(f"{row},1\n" for row in range(ROWS))])
+def test_a_line_of_more_than_a_megabyte_is_no_row(tmp_path, above):
+    path = tmp_path / "line.csv"
+    path.write_text(above + "0.1,2," * 400_000, encoding="utf-8")
+    line = above.count("\n") + 1
+    assert (
+        fault_of(path)
+        == f"line.csv, line {line}: it has more than 1048576 bytes. Give a file with a row a line"
+    )
+
+
+def test_a_table_of_too_many_columns_is_refused_at_once(tmp_path):
+    """Each cell of each line was looked at once for each delimiter, which took minutes."""
+    path = tmp_path / "wide.csv"
+    path.write_text(("x," * 150_000 + "\n") * 20, encoding="utf-8")
+    start_s = time.process_time()
+    assert fault_of(path).endswith("Check --skip, --delimiter and --decimal")
+    path.write_text(("1," * 150_000 + "\n") * 20, encoding="utf-8")
+    assert fault_of(path) == "wide.csv has 150000 columns, more than 16384. Export those of the record"
+    assert time.process_time() - start_s < 5.0
+
+
+def test_a_message_names_no_more_columns_than_can_be_read(tmp_path):
+    names = [f"channel {number} of the laboratory's large amplifier" for number in range(500)]
+    path = tmp_path / "many.csv"
+    rows = "".join(",".join([str(row)] * 500) + "\n" for row in range(ROWS))
+    path.write_text(",".join(names) + "\n" + rows, encoding="utf-8")
+    said = fault_of(path)
+    assert said.startswith("many.csv has no column 't'. Choose one of 500: channel 0 of the laboratory")
+    assert said.endswith("...")
+    assert len(said) < 1000
+
+
+class RepeatedProgress:
+    """A process that says again and again that the same share is read."""
+
+    has_ended, pid = False, None
+
+    def send(self, _request):
+        return True
+
+    def receive(self, timeout_s):
+        time.sleep(0.01)
+        if timeout_s <= 0.0:
+            raise TimeoutError
+        return ReadingProgress(0.5)
+
+
+def test_progress_that_is_none_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading_process, "PROGRESS_S", 0.1)
+    reader, shares = ReadingProcess(), []
+    reader._process = RepeatedProgress()
+    fault = pytest.raises(ImportFileError, match=r"a.csv: reading it shows no progress for 0.1 s")
+    with fault, reader.read(tmp_path / "a.csv", PLAN, shares.append):
+        pass
+    assert set(shares) == {0.5}
+
+
+TAKE = "import numpy as np; held = [np.ones(1 << 22) for _ in range(20)]; time.sleep(5)"
+
+
+@pytest.mark.parametrize("limit", ["limit_memory", "watch_memory"])
+def test_a_process_that_takes_too_much_memory_ends(limit):
+    """By the system, or by a thread where the system has no such limit."""
+    code = f"import time; from app.runs.exchange.memory_limit import *; {limit}(400_000_000); {TAKE}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if limit == "watch_memory" or sys.platform != "linux":
+        assert done.returncode == MEMORY_EXIT
+    else:
+        assert "MemoryError" in done.stderr
