@@ -15,7 +15,7 @@ from app.cli.run_file_options import FileOptions, ImportOptions, WatchOptions
 from app.runs.errors import RunError
 from app.runs.exchange.import_run import ImportedRun, free_path, import_foreign_file
 from app.runs.exchange.importing import ImportPlan
-from config.files import load_stand
+from config.files import load_gauges, load_stand
 
 _HEADER = ("run", "length", "rate", "gauge 1", "gauge 2", "release")
 
@@ -88,7 +88,7 @@ def _import(
 ) -> ImportedRun:
     with out.progress_bar(f"reading {file.name}", total=1.0) as update:
         return import_foreign_file(
-            file, plan, output, load_stand(), replace=replace, report=update, **metadata
+            file, plan, output, load_stand(), gauges=load_gauges(), replace=replace, report=update, **metadata
         )
 
 
@@ -175,7 +175,7 @@ def import_plan(source: FileOptions) -> ImportPlan:
         "encoding": source.encoding,
     }
     same = ("unit", "gain", "unit_name", "gain_uncertainty", "quantity", "time_unit", "from_s", "until_s",
-            "segment")  # fmt: skip
+            "segment", "any_size")  # fmt: skip
     fields = {name: getattr(source, name) for name in same} | {
         "layout": layout,
         "measures": "relative" if source.plate is None else "plate",

@@ -57,6 +57,9 @@ class FileOptions:
     from_s: float | None = option("--from", "First time that is kept (s); the file's first if absent.")
     until_s: float | None = option("--until", "Last time that is kept (s); the file's last if absent.")
     segment: int | None = option("--segment", "Which stretch, from 0, where times go back between stretches.")
+    any_size: bool = flag(
+        "--any-size", "Take displacements beyond the gauge's range, or a thousand times below a pullback."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -229,7 +229,7 @@ class Observed:
     def read(self, path: Path) -> int:
         """Look into a file, and read two of its columns; count the rows. Raises RunError."""
         self.begin()
-        self.reader.preview(path, ParseOptions(), self.on_progress)
+        self.reader.survey(path, ParseOptions(), self.on_progress)
         self.begin()
         with self.reader.read(path, ImportPlan(FileLayout("t", "u1")), self.on_progress) as record:
             return len(record)

@@ -14,8 +14,9 @@ from analysis.preparation.oscillation import find_releases
 from analysis.record import RecordError
 from app.runs.exchange.importing import ForeignRecord, ImportPlan
 from app.runs.exchange.reading_process import shared_reading_process
+from app.runs.exchange.sizes import check_size
 from app.runs.exchange.storing import store_record
-from config.schema import Stand
+from config.schema import Gauges, Stand
 from messages.message import Message
 
 _READ_SHARE = 0.7
@@ -49,15 +50,19 @@ def import_foreign_file(
     output: Path,
     stand: Stand,
     *,
+    gauges: Gauges | None = None,
     replace: bool = False,
     report: Callable[[float], object] = lambda _: None,
     **metadata: Any,
 ) -> ImportedRun:
     """Make a run of a foreign file. Raises RunError, ConfigError.
 
-    `report` gets the share that is done. `metadata` as for `storing.store_record`.
+    Displacements are checked against the ranges of `gauges`, those of the stand, if they are given. `report`
+    gets the share that is done. `metadata` as for `storing.store_record`.
     """
     with shared_reading_process().read(path, plan, lambda share: report(_READ_SHARE * share)) as record:
+        if gauges is not None:
+            check_size(path, record, plan, gauges)
         stored, unit = store_record(
             path, record, plan, output, stand, replace=replace,
             report=lambda share: report(_READ_SHARE + (1.0 - _READ_SHARE) * share), **metadata,

@@ -16,7 +16,7 @@ from app.runs.blocks import RunBlock
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns, ReportShare, part_of
 from app.runs.exchange.csv_layout import FileLayout
-from app.runs.exchange.foreign_files import has_own_time, read_foreign, unpacked
+from app.runs.exchange.foreign_files import has_own_time, is_csv, read_foreign, unpacked
 from app.runs.exchange.recognition import ParseOptions, preview_file
 from app.runs.exchange.rounded_times import even_times
 from app.runs.exchange.units import parse_unit
@@ -27,8 +27,9 @@ from messages.i18n import N_
 from messages.message import Message, message, option
 
 Floats = NDArray[np.float64]
+LengthUnit = Literal["m", "mm", "um"]
 _TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-_LENGTH_UNITS_M = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+LENGTH_UNITS_M: dict[LengthUnit, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _EVEN = 0.01
 """Relative spread of the time steps up to which a record has a rate."""
 
@@ -52,7 +53,7 @@ class ImportPlan(msgspec.Struct, frozen=True):
     """What the second column is: plate against table, or plate against base."""
     time_unit: Literal["s", "ms", "us"] | None = None
     """None takes what the file names, else s."""
-    unit: Literal["m", "mm", "um"] | None = None
+    unit: LengthUnit | None = None
     """Of the cells: this length, or this length per s or s^2; None takes what the file names, else m."""
     gain: float | None = None
     offset: float = 0.0
@@ -66,6 +67,8 @@ class ImportPlan(msgspec.Struct, frozen=True):
     segment: int | None = None  # which of the stretches between times that go back, counted from 0
     begun: datetime.datetime | None = None
     """Time of the file's first row; None takes what the file tells."""
+    any_size: bool = False
+    """Whether displacements are taken that are beyond the gauge's range, or far below a pullback."""
 
 
 class RecordFacts(msgspec.Struct, frozen=True):
@@ -195,11 +198,13 @@ def _with_time(path: Path, plan: ImportPlan, report: ReportShare) -> ImportPlan:
         return plan
     lines = ParseOptions(layout.delimiter, layout.decimal, layout.skip, layout.header, layout.encoding)
     found = preview_file(path, lines, report)
-    if not found.time:
+    if not found.time and not is_csv(path):
         return plan
-    if {found.time, str(found.columns.index(found.time))} & {layout.table, layout.second}:
+    numbers = dict(zip(found.columns, found.numbers, strict=True))
+    if not found.time or {found.time, str(numbers[found.time])} & {layout.table, layout.second}:
         raise ImportFileError(
-            "{path}: no column of times is found. Add {time_option} COL, or {rate_option} HZ",
+            "{path}: no column of times is found. Choose it by {time_option}, or give rows a second by"
+            " {rate_option}",
             path=path,
             time_option=option("--time"),
             rate_option=option("--rate"),
@@ -304,7 +309,7 @@ def _gauge(path: Path, plan: ImportPlan, columns: ForeignColumns, number: int) -
     """Calibration that turns cells of a column into readings. Raises ImportFileError."""
     gain = plan.gain
     if gain is None:
-        gain = _LENGTH_UNITS_M[plan.unit] if plan.unit else _named_gain(path, plan, columns, number)
+        gain = LENGTH_UNITS_M[plan.unit] if plan.unit else _named_gain(path, plan, columns, number)
     return Gauge(
         gain_m_per_count=gain,
         zero_count=-plan.offset / gain if plan.offset else 0.0,

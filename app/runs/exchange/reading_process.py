@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from app.runs.exchange.importing import (
     read_record,
 )
 from app.runs.exchange.memory_limit import limit_memory
-from app.runs.exchange.recognition import FilePreview, ParseOptions, preview_file
+from app.runs.exchange.recognition import FileSurvey, ParseOptions, survey_file
 from messages.i18n import N_
 from messages.message import Message, Option, Value
 
@@ -55,7 +56,7 @@ class ReadRequest(msgspec.Struct, frozen=True, tag=True):
     folder: str
 
 
-class PreviewRequest(msgspec.Struct, frozen=True, tag=True):
+class SurveyRequest(msgspec.Struct, frozen=True, tag=True):
     """Look into a file for its columns."""
 
     path: str
@@ -81,10 +82,10 @@ class RecordRead(msgspec.Struct, frozen=True, tag=True):
     columns: int
 
 
-class PreviewRead(msgspec.Struct, frozen=True, tag=True):
-    """What is in the file."""
+class FileSurveyed(msgspec.Struct, frozen=True, tag=True):
+    """What can be seen of the file."""
 
-    preview: FilePreview
+    survey: FileSurvey
 
 
 class ReadingFault(msgspec.Struct, frozen=True, tag=True):
@@ -94,8 +95,8 @@ class ReadingFault(msgspec.Struct, frozen=True, tag=True):
     is_extra_missing: bool = False
 
 
-Request = ReadRequest | PreviewRequest
-Event = ReaderReady | ReadingProgress | RecordRead | PreviewRead | ReadingFault
+Request = ReadRequest | SurveyRequest
+Event = ReaderReady | ReadingProgress | RecordRead | FileSurveyed | ReadingFault
 _decode_event: Callable[[bytes], Event] = child_process.json_decoder(Event)
 
 
@@ -132,14 +133,14 @@ class ReadingProcess:
             facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
             yield ForeignRecord(facts, arrays[0], tuple(arrays[1:]))
 
-    def preview(
+    def survey(
         self, path: Path, options: ParseOptions, report: Callable[[float], object] = lambda _: None
-    ) -> FilePreview:
-        """Look into a file as `recognition.preview_file` does. Raises RunError."""
-        answer = self._ask(PreviewRequest(str(path.absolute()), options), path, report)
-        if not isinstance(answer, PreviewRead):
+    ) -> FileSurvey:
+        """Look into a file as `recognition.survey_file` does. Raises RunError."""
+        answer = self._ask(SurveyRequest(str(path.absolute()), options), path, report)
+        if not isinstance(answer, FileSurveyed):
             raise _crashed(path)
-        return answer.preview
+        return replace(answer.survey, fault=_unpacked(answer.survey.fault))
 
     def stop(self) -> None:
         self._process.stop()
@@ -222,8 +223,9 @@ def _load_reader(path: Path, send: Callable[[Event], object]) -> None:
 def _answer(request: Request, report: Callable[[float], object]) -> Event:
     path = Path(request.path)
     try:
-        if isinstance(request, PreviewRequest):
-            return PreviewRead(preview_file(path, request.options, report))
+        if isinstance(request, SurveyRequest):
+            survey = survey_file(path, request.options, report)
+            return FileSurveyed(replace(survey, fault=_packed(survey.fault)))
         files = (Path(request.folder) / f"{number}.npy" for number in itertools.count(1))
         record = read_record(path, request.plan, report, lambda cells: _on_disk(next(files), cells))
         _on_disk(Path(request.folder) / "0.npy", record.time_s)

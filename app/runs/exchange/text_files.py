@@ -4,6 +4,7 @@ import codecs
 import contextlib
 import io
 import re
+import string
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +17,19 @@ from messages.message import option
 PIECE_BYTES = 1 << 20
 HEAD_BYTES = 1 << 18
 """Header, units and the first rows of a record lie within them; a header of more is none."""
+_START_BYTES = 4096
 LINE_BYTES = 1 << 20
 """More without a line end is no text of a record."""
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")
 )  # fmt: skip
-_ZEROS = 0.25  # share of zero bytes from which a text is UTF-16: half of the bytes of digits are
-_HIGH = re.compile(rb"[\x80-\xff]{2,}")
+_ZEROS = 0.01
+"""Share of zero bytes from which a text is UTF-16: half of the bytes of digits and line ends are."""
+_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+_HIGH = re.compile(rb"[A-Za-z]?[\x80-\xff]+[A-Za-z]?")
+_SYMBOLS = frozenset(range(0x80, 0xC0)) - {0xA8, 0xB8}
+"""In Windows-1251 and -1252; both have the sign for micro and that for degrees at the same places."""
+_ASCII_LETTERS = string.ascii_letters.encode()
 _RUSSIAN = ("cp1251", "cp866")
 _SMALL_RUSSIAN = frozenset("абвгдежзийклмнопрстуфхцчшщъыьэюяё")
 
@@ -60,6 +67,14 @@ class TextFile:
                     raise line_too_long(self.path, line)
         if rest:
             yield Piece(line, rest + b"\n", self.size_bytes)
+
+    def first_lines(self, count: int, characters: int) -> tuple[str, ...]:
+        """First lines as they are, cut to so many characters; what cannot be shown is replaced."""
+        with _open(self.path) as file:
+            data = file.read(HEAD_BYTES)[self.bom_bytes :]
+        text = codecs.getincrementaldecoder(self.encoding)("replace").decode(data)
+        lines = re.split(r"\r\n|\n|\r", text)[:count]
+        return tuple(_UNSHOWN.sub("\ufffd", line[:characters]) for line in lines)
 
     def decode(self, data: bytes) -> str:
         """Text of a piece."""
@@ -140,11 +155,10 @@ def _open(path: Path) -> BinaryIO:
 
 
 def _guess(path: Path, head: bytes) -> str:
-    start = head[:4096]
+    start = head[:_START_BYTES]  # a logger may have made room with zeros behind its rows
     if b"\0" in start:
-        even, odd = start[::2].count(0), start[1::2].count(0)
-        if max(even, odd) > _ZEROS * len(start) and min(even, odd) == 0:
-            return "utf-16-le" if odd else "utf-16-be"
+        if found := _guess_16_bit(start):
+            return found
         raise ImportFileError(
             "{path} is not a text file. Export it as CSV from the program that wrote it", path=path
         )
@@ -155,10 +169,29 @@ def _guess(path: Path, head: bytes) -> str:
     return "utf-8"
 
 
+def _guess_16_bit(start: bytes) -> str:
+    """UTF-16 without a mark at its beginning: zeros at even places or at odd ones; "" of no text."""
+    even, odd = start[::2].count(0), start[1::2].count(0)
+    if min(even, odd) > 0 or max(even, odd) < _ZEROS * len(start):
+        return ""
+    name = "utf-16-le" if odd else "utf-16-be"
+    try:
+        text = codecs.getincrementaldecoder(name)().decode(start)
+    except UnicodeDecodeError:
+        return ""
+    return "" if _UNSHOWN.search(text) else name
+
+
 def _guess_8_bit(head: bytes) -> str:
-    """Western where letters beyond ASCII stand alone, else the Russian one that has more small letters."""
-    runs = b"".join(_HIGH.findall(head))
-    if 2 * len(runs) < sum(byte > 0x7F for byte in head):
+    """Western where letters beyond ASCII stand beside others, else the Russian one that fits better."""
+    western, runs = 0, b""
+    for run in _HIGH.findall(head):
+        high = run.strip(_ASCII_LETTERS)
+        if len(high) < len(run):
+            western += len(high)
+        elif len(high) > 1 or high[0] not in _SYMBOLS:
+            runs += high
+    if western > len(runs) or not runs:
         return "cp1252"
     texts = {name: runs.decode(name, "replace") for name in _RUSSIAN}
     return max(_RUSSIAN, key=lambda name: sum(letter in _SMALL_RUSSIAN for letter in texts[name]))

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange import reading_process
+from app.runs.exchange import csv_layout, reading_process
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.formats import matlab
 from app.runs.exchange.importing import ImportPlan, read_record
@@ -36,11 +36,9 @@ def test_more_numbers_than_can_be_loaded_are_refused(tmp_path, chunk):
         for name in ("t", "u1"):
             shape = (12_500_000_000 if chunk == 1 << 20 else 60,)
             file.create_dataset(name, shape, "f8", chunks=(chunk,), maxshape=(None,), compression="gzip")
-    start_s = time.monotonic()
     said = fault_of(path)
     assert said.startswith("huge.h5: the columns hold ")
     assert said.endswith("numbers, too many to be loaded: 33554432 at most. Export a part")
-    assert time.monotonic() - start_s < 5.0
 
 
 def test_cells_and_large_structs_of_matlab_are_not_loaded(tmp_path, monkeypatch):
@@ -96,15 +94,16 @@ def test_a_line_of_more_than_a_megabyte_is_no_row(tmp_path, above):
     )
 
 
-def test_a_table_of_too_many_columns_is_refused_at_once(tmp_path):
+def test_a_table_of_too_many_columns_is_refused_without_a_look_at_each_cell(tmp_path, monkeypatch):
     """Each cell of each line was looked at once for each delimiter, which took minutes."""
+    cells, kind = [], csv_layout._kind
+    monkeypatch.setattr(csv_layout, "_kind", lambda *cell: cells.append(cell) or kind(*cell))
     path = tmp_path / "wide.csv"
     path.write_text(("x," * 150_000 + "\n") * 20, encoding="utf-8")
-    start_s = time.process_time()
     assert fault_of(path).endswith("Check --skip, --delimiter and --decimal")
     path.write_text(("1," * 150_000 + "\n") * 20, encoding="utf-8")
     assert fault_of(path) == "wide.csv has 150000 columns, more than 16384. Export those of the record"
-    assert time.process_time() - start_s < 5.0
+    assert len(cells) < 100_000
 
 
 def test_a_message_names_no_more_columns_than_can_be_read(tmp_path):

@@ -136,7 +136,7 @@ def test_a_file_of_another_program_is_read_to_the_last_bit(tmp_path, name):
         assert facts.rate_hz == pytest.approx(RATE_HZ)
         assert facts.start == start
         assert facts.source.name == name
-    found = shared_reading_process().preview(path, ParseOptions())
+    found = shared_reading_process().survey(path, ParseOptions()).preview
     assert (found.time == "") == (layout.time == "")
     assert {layout.table, layout.second} <= set(found.columns)
 
@@ -247,7 +247,7 @@ def test_date_times_of_a_table_are_its_times_whatever_their_name(tmp_path, monke
     pandas.DataFrame({"u1 [mm]": np.arange(60.0)}, index=index).to_parquet(path)
     record = read_record(path, ImportPlan(FileLayout("", "u1 [mm]")))
     assert record.facts.start == datetime.datetime(2025, 11, 23, 14, 3, 7, tzinfo=datetime.UTC)
-    assert shared_reading_process().preview(path, ParseOptions()).rows[1][0] == "1.0"
+    assert shared_reading_process().survey(path, ParseOptions()).preview.rows[1][0] == "1.0"
 
 
 @pytest.mark.skipif(not hasattr(time, "tzset"), reason="the zone of the computer is changed")

@@ -10,6 +10,7 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.import_run import find_release, import_foreign_file
 from app.runs.exchange.importing import ImportPlan, read_record
+from app.runs.exchange.recognition import ParseOptions, survey_file
 from app.runs.exchange.text_files import TextFile
 from app.runs.reader import open_run
 from config.files import load_stand
@@ -100,7 +101,7 @@ def test_seconds_since_1904_are_those_of_labview(tmp_path):
 
 def test_a_file_without_times_is_told_what_it_needs(tmp_path):
     text = "u1,u2\n" + "".join(f"{row},{row}\n" for row in range(ROWS))
-    with pytest.raises(ImportFileError, match=r"no column of times is found. Add --time COL, or --rate HZ"):
+    with pytest.raises(ImportFileError, match=r"no column of times is found. Choose it by --time, or give"):
         record_of(tmp_path, text)
 
 
@@ -109,6 +110,40 @@ def test_a_text_is_read_in_the_encoding_that_is_given(tmp_path, encoding):
     text = "Время;u1\n" + "".join(f"{row};{row}\n" for row in range(ROWS))
     plan = ImportPlan(FileLayout("Время", "u1", encoding=encoding))
     assert list(record_of(tmp_path, text, plan, encoding).cells[0]) == list(range(ROWS))
+
+
+PREAMBLE = "".join(f"Испытание стола, строка {row}, сухое трение\n" for row in range(80))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "found", "header", "above"),
+    [
+        ("utf-16", "utf-16-le", "Время, с;Стол, мм", ""),
+        ("utf-16-le", "utf-16-le", "Время, с;Стол, мм", ""),
+        ("utf-16-be", "utf-16-be", "Время, с;Стол, мм", PREAMBLE),
+        ("utf-16-le", "utf-16-le", "Time [s];Table [mm]", PREAMBLE),
+        ("cp1251", "cp1251", "Время, с;Стол, мм", ""),
+        ("cp1251", "cp1251", "t (с);u1 (мм)", ""),
+        ("cp1251", "cp1251", "Time (с);Weg (м)", ""),
+        ("cp866", "cp866", "Время, с;Стол, мм", ""),
+        ("cp1252", "cp1252", "Größe;Weg [mm]", ""),
+        ("cp1252", "cp1252", "Zeit (s);Hub des Schüttlers [µm]", "Gerät: Größe 3, 20 °C\n"),
+        ("cp1252", "cp1252", "Temps écoulé [s];Déplacement à la table [mm]", ""),
+        ("cp1252", "cp1252", "t [s];u1 [µm]", "T = 21 °C\n"),
+        ("utf-8", "utf-8", "Zeit (s);Größe [µm]", ""),
+        ("utf-8-sig", "utf-8", "Время, с;Стол, мм", ""),
+    ],
+)
+def test_an_encoding_is_found_out_and_told(tmp_path, encoding, found, header, above):
+    path = tmp_path / "logger.csv"
+    text = above + f"{header}\n" + "".join(f"{row / 8};{row}\n" for row in range(ROWS))
+    path.write_bytes(text.encode(encoding))
+    survey = survey_file(path, ParseOptions())
+    assert survey.encoding == found
+    assert survey.lines[0] == (above or header).split("\n")[0]
+    assert survey.preview.columns == tuple(header.split(";"))
+    record = read_record(path, ImportPlan(FileLayout("0", "1")))
+    assert list(record.cells[0]) == list(range(ROWS))
 
 
 @pytest.mark.parametrize("encoding", ["utf-32", "cp037", "hex", "none"])
