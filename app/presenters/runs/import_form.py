@@ -84,6 +84,14 @@ _DELIMITERS = _DETECT | {
     ",": N_("comma"), ";": N_("semicolon"), "\t": N_("tab"), " ": N_("blanks"), "|": "|"
 }  # fmt: skip
 _DECIMALS = _DETECT | {".": N_("point"), ",": N_("comma")}
+ENCODINGS = _DETECT | {
+    "utf-8": "UTF-8", "utf-16-le": "UTF-16 LE", "utf-16-be": "UTF-16 BE",
+    "cp1251": N_("Windows-1251 (Cyrillic)"), "cp1252": N_("Windows-1252 (Western)"),
+    "cp1250": N_("Windows-1250 (Central European)"), "cp1254": N_("Windows-1254 (Turkish)"),
+    "cp866": N_("CP866 (Cyrillic, DOS)"), "koi8-r": N_("KOI8-R (Cyrillic)"),
+}  # fmt: skip
+"""Titles by the name in Python."""
+_SIZES = {"": N_("ask where unlikely"), "yes": N_("take as they are")}
 _DATE_ORDERS = _DETECT | {
     "dmy": N_("day, month, year"), "mdy": N_("month, day, year"), "ymd": N_("year, month, day")
 }  # fmt: skip
@@ -120,13 +128,14 @@ _CALIBRATION = (
         "gain_uncertainty", N_("Uncertainty of the gain"), N_("not stated; 0.003 is 0.3 %"),
         "--gain-uncertainty", rule=_SHARE,
     ),
+    Field("any_size", N_("Displacements"), option="--any-size", choices=_SIZES),
 )  # fmt: skip
 _LINES = (
     Field("delimiter", N_("Between cells"), option="--delimiter", choices=_DELIMITERS),
     Field("decimal", N_("Decimal sign"), option="--decimal", choices=_DECIMALS),
     Field("header", N_("Names above"), option="--no-header", choices=_HEADERS),
     Field("skip", N_("Lines skipped"), "0", "--skip", rule=_WHOLE),
-    Field("encoding", N_("Encoding"), N_("find out; utf-8, cp1251, ..."), "--encoding"),
+    Field("encoding", N_("Encoding"), option="--encoding", choices=ENCODINGS),
     Field("missing", N_("Absent readings"), N_("marks besides NaN, N/A, -: x; -9999"), "--missing"),
 )
 _DATES = (
@@ -168,7 +177,9 @@ COLUMN_FIELDS = ("time", "table", "second", "date")
 GAIN_FIELDS = ("gain", "offset", "unit_name")  # fields that hold only where `unit` is `GAIN`
 LINE_FIELDS = tuple(field.name for field in _LINES)
 PER_FILE_FIELDS = ("note", "run_in_number", "name", "begun", "delimiter", "decimal", "header")
-"""Fields that are cleared for the next file."""
+"""Fields that are cleared for the next file, also for one of the same layout."""
+CARRIED_LINE_FIELDS = ("skip", "encoding")
+"""Fields without which the columns of a file like the last one may not be found."""
 _METADATA_FIELDS = {field.name for field in (*_TEST, _NAME, *_CONDITIONS)}
 
 

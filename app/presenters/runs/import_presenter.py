@@ -10,6 +10,8 @@ from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.import_form import (
+    CARRIED_LINE_FIELDS,
+    ENCODINGS,
     LINE_FIELDS,
     OPTION_FIELDS,
     OPTION_LABELS,
@@ -19,14 +21,14 @@ from app.presenters.runs.import_form import (
     reads_alike,
     validate,
 )
-from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
+from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay, SizeQuestion
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import N_, gettext, ngettext
 from messages.message import Message, options_in, replace_options
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
-    from app.runs.exchange.recognition import FilePreview
+    from app.runs.exchange.recognition import FilePreview, FileSurvey
 else:
     tasks = LazyModule("app.presenters.runs.tasks")
 
@@ -43,14 +45,21 @@ class ImportState:
     pending: int = 0
     columns: tuple[str, ...] = ()
     column_labels: tuple[str, ...] = ()
-    first_rows: str = ""
+    first_lines: str = ""
+    """Of a text as they are, whether columns are found in it or not; of another file its first rows."""
+    encoding: str = ""
+    """In which a text is read; empty of another file."""
     is_text: bool = True
-    """Whether delimiter and decimal sign apply."""
+    """Whether delimiter, decimal sign and encoding apply."""
+    taken_over: str = ""
+    """Says that the settings are those of the file before."""
     form: Form = field(default_factory=make_form)
     faults: dict[str, str] = field(default_factory=dict)
     overlay: Overlay | None = None
     """The record as it would be imported; `summary` has its length and rate."""
     summary: str = ""
+    question: SizeQuestion | None = None
+    """What is to be answered before the import, by `answer`."""
     busy: str = ""
     """Work in progress."""
     message: Chip = EMPTY_CHIP
@@ -69,8 +78,20 @@ class _Reading:
     is_survey: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Settings:
+    """How a file was to be read, and its columns: a file with the same columns is read alike."""
+
+    name: str
+    form: Form
+    columns: "FilePreview"
+
+
 class ImportPresenter(Presenter[ImportState]):
-    """Imports one file after another by `worker`, which the Runs screen polls and closes."""
+    """Imports one file after another by `worker`, which the Runs screen polls and closes.
+
+    A file begins with the settings of the one before if its columns and units are the same, else with none.
+    """
 
     def __init__(self, worker: Worker, on_imported: Callable[[str], object]) -> None:
         super().__init__(ImportState())
@@ -80,6 +101,12 @@ class ImportPresenter(Presenter[ImportState]):
         self._files: list[str] = []
         self._reading: _Reading | None = None
         self._is_stale = False
+        self._operator = ""
+        self._before: _Settings | None = None
+        self._columns: FilePreview | None = None
+        """Of the current file; None until it has been looked into, and where none are found."""
+        self._is_new = False
+        """Whether the current file has not been looked into."""
         self._surveyed: Form | None = None
         self._previewed: Form | None = None
 
@@ -87,7 +114,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._folder = folder
         self._files += paths
         if not self.state.path:
-            self._update(form={**self.state.form, "operator": operator}, message=EMPTY_CHIP)
+            self._operator = operator
             self.skip_file()
         self._update(pending=len(self._files))
 
@@ -99,10 +126,17 @@ class ImportPresenter(Presenter[ImportState]):
         if self.state.faults:
             self._update(can_import=False, message=_correction_chip())
         elif had_faults and self._reading is None and reads_alike(form, self._previewed):
-            self._update(can_import=not self.state.busy, message=EMPTY_CHIP)
+            self._update(can_import=not (self.state.busy or self.state.question), message=EMPTY_CHIP)
         elif had_faults or not reads_alike(form, before):
-            self._update(can_import=False, message=EMPTY_CHIP)
+            self._update(can_import=False, question=None, message=EMPTY_CHIP)
             self._read(is_survey=_line_texts(form) != self._surveyed)
+
+    def answer(self, *, is_right: bool) -> None:
+        """Answer the question about the size: it is right, or the unit is the one that is proposed."""
+        question = self.state.question
+        if question is not None:
+            choice = {"any_size": "yes"} if is_right else {"unit": question.unit}
+            self.set_form({**self.state.form, **choice})
 
     def import_file(self) -> None:
         state = self.state
@@ -136,13 +170,18 @@ class ImportPresenter(Presenter[ImportState]):
     def close(self) -> None:
         self._files.clear()
         self.skip_file()
+        self._before = None
 
     def skip_file(self) -> None:
+        if self._columns is not None:
+            self._before = _Settings(Path(self.state.path).name, self.state.form, self._columns)
         path = self._files.pop(0) if self._files else ""
-        form = {**self.state.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
-        self._reading = self._surveyed = self._previewed = None
-        self._is_stale = False
-        self._set_state(ImportState(path=path, pending=len(self._files), form=form, faults=validate(form)))
+        form = make_form(operator=self._operator)
+        if self._before is not None:  # of a file like it the columns may not be found without these
+            form = {**form, **{name: self._before.form[name] for name in CARRIED_LINE_FIELDS}}
+        self._reading = self._columns = self._surveyed = self._previewed = None
+        self._is_stale, self._is_new = False, True
+        self._set_state(ImportState(path=path, pending=len(self._files), form=form))
         if path:
             self._read(is_survey=True)
 
@@ -159,6 +198,7 @@ class ImportPresenter(Presenter[ImportState]):
             reading.form,
             done=lambda answer: self._on_read(reading, answer),
             failed=lambda failure: self._on_reading_failed(reading, failure),
+            progress=lambda progress: self._on_reading_progress(reading, progress),
         )
 
     def _on_done(self, run: str) -> None:
@@ -179,6 +219,10 @@ class ImportPresenter(Presenter[ImportState]):
         share = with_unit(f"{100.0 * (progress.fraction or 0.0):.0f}", "%")
         self._update(busy=f"{progress.text}, {share}")
 
+    def _on_reading_progress(self, reading: _Reading, progress: Progress) -> None:
+        if reading is self._reading:
+            self._on_progress(progress)
+
     def _on_failed(self, failure: TaskFailure) -> None:
         self._update(busy="", can_import=True)
         self._show_fault(failure.message)
@@ -186,16 +230,14 @@ class ImportPresenter(Presenter[ImportState]):
     def _on_read(self, reading: _Reading, answer: Any) -> None:
         if self._ends(reading):
             if reading.is_survey:
-                self._show_columns(answer)
+                self._on_surveyed(answer)
             else:
                 self._show_preview(answer, reading.form)
 
     def _on_reading_failed(self, reading: _Reading, failure: TaskFailure) -> None:
         if self._ends(reading):
             self._surveyed = None if reading.is_survey else self._surveyed
-            self._previewed = None
-            self._update(busy="", overlay=_NOTHING_DRAWN, summary="", can_import=False)
-            self._show_fault(failure.message)
+            self._show_unreadable(failure.message)
 
     def _ends(self, reading: _Reading) -> bool:
         """Whether the result of a reading is still wanted; if not, read again."""
@@ -210,9 +252,48 @@ class ImportPresenter(Presenter[ImportState]):
             self._read(is_survey=True)
         return False
 
+    def _show_unreadable(self, fault: Message) -> None:
+        self._previewed = None
+        self._update(busy="", overlay=_NOTHING_DRAWN, summary="", question=None, can_import=False)
+        self._show_fault(fault)
+
     def _show_fault(self, fault: Message) -> None:
         words = sentence(replace_options(fault, OPTION_LABELS))
         self._update(faults=dict.fromkeys(_named_fields(fault), words), message=Chip(words, Tone.BAD))
+
+    def _on_surveyed(self, survey: "FileSurvey") -> None:
+        """Show what the file holds; take over the settings of the file before if its columns are the same."""
+        is_new, self._is_new = self._is_new, False
+        before, found = self._before, survey.preview
+        is_alike = before is not None and found is not None and found.has_layout_of(before.columns)
+        if (
+            is_new
+            and before is not None
+            and not is_alike
+            and _lines_are_carried(self.state.form, before.form)
+        ):
+            self._update(form={**self.state.form, **dict.fromkeys(CARRIED_LINE_FIELDS, "")})
+            self._is_new = True
+            self._read(is_survey=True)
+            return
+        if is_new and is_alike and before is not None:
+            form = {**before.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
+            text = gettext(
+                "Columns and units are those of {name}: its settings are taken over", name=before.name
+            )
+            self._update(form=form, faults=validate(form), taken_over=text)
+        self._columns = found
+        lines = survey.lines if found is None or survey.lines else _format_rows(found)
+        self._update(
+            busy="", first_lines="\n".join(lines), is_text=bool(survey.encoding) or found is None,
+            encoding=gettext(ENCODINGS.get(survey.encoding, survey.encoding)) if survey.encoding else "",
+        )  # fmt: skip
+        if found is None:
+            self._surveyed = _line_texts(self.state.form)
+            self._update(columns=(), column_labels=())
+            self._show_unreadable(survey.fault)
+        else:
+            self._show_columns(found)
 
     def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; keep those that were chosen if the file has them."""
@@ -225,10 +306,7 @@ class ImportPresenter(Presenter[ImportState]):
         form["delimiter"], form["decimal"] = options.delimiter or "", options.decimal or ""
         form["header"] = "yes" if options.header else "no"
         self._surveyed = _line_texts(form)
-        self._update(
-            busy="", columns=found.columns, column_labels=found.titles, first_rows=_format_rows(found),
-            is_text=options.delimiter is not None, form=form,
-        )  # fmt: skip
+        self._update(columns=found.columns, column_labels=found.titles, form=form)
         if not self.state.faults:
             self._read(is_survey=False)
 
@@ -236,22 +314,28 @@ class ImportPresenter(Presenter[ImportState]):
         self._previewed = form
         is_valid = not self.state.faults
         self._update(
-            busy="", overlay=preview.overlay, summary=preview.summary, can_import=is_valid,
+            busy="", overlay=preview.overlay, summary=preview.summary, question=preview.question,
+            can_import=is_valid and preview.question is None,
             message=EMPTY_CHIP if is_valid else _correction_chip(),
         )  # fmt: skip
 
 
-def _format_rows(found: "FilePreview") -> str:
+def _format_rows(found: "FilePreview") -> list[str]:
     """First rows as a table; long cells are cut."""
     lines = [found.titles, *found.rows] if found.options.header else list(found.rows)
     cut = [[cell if len(cell) <= _CELL else cell[: _CELL - 1] + "…" for cell in cells] for cells in lines]
     widths = [max(map(len, column)) for column in zip_longest(*cut, fillvalue="")]
     rows = (zip(cells, widths, strict=False) for cells in cut)
-    return "\n".join("  ".join(f"{cell:<{width}}" for cell, width in row).rstrip() for row in rows)
+    return ["  ".join(f"{cell:<{width}}" for cell, width in row).rstrip() for row in rows]
 
 
 def _correction_chip() -> Chip:
     return Chip(gettext("Correct what is marked"), Tone.BAD)
+
+
+def _lines_are_carried(form: Form, before: Form) -> bool:
+    """Whether a file is looked into with what was said of the lines of the one before."""
+    return any(form[name] and form[name] == before[name] for name in CARRIED_LINE_FIELDS)
 
 
 def _line_texts(form: Form) -> Form:

@@ -105,12 +105,24 @@ class Overlay:
     message: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class SizeQuestion:
+    """Whether displacements of an unlikely size are right."""
+
+    text: str
+    unit: str = ""
+    """In which the size would be likely, as the form has it; empty where it would be in none."""
+    symbol: str = ""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ImportPreview:
     """The record of a file as it would be imported, and its length and rate as text."""
 
     overlay: Overlay
     summary: str
+    question: SizeQuestion | None = None
+    """What is to be answered before the import."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,29 +32,31 @@ from app.presenters.runs.state import (
     ImportPreview,
     Overlay,
     RunAnalysed,
+    SizeQuestion,
     Trace,
 )
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.decimation import DecimatedRun, decimate, open_decimated
 from app.runs.edits import edit_run, series_fields
-from app.runs.errors import RunError
-from app.runs.exchange import import_run, importing, recognition, storing
+from app.runs.errors import ImportFileError, RunError
+from app.runs.exchange import import_run, importing, recognition, sizes, storing
 from app.runs.exchange.exporting import ExportRequest, export_runs
 from app.runs.exchange.reading_process import shared_reading_process
 from app.runs.listing import list_runs
 from app.runs.reader import open_run
 from app.runs.summary import RunSummary
 from app.runs.validator import shared_validator
-from config.files import load_stand
+from config.files import load_gauges, load_stand
 from config.schema import ConfigError, SeriesError
 from messages.i18n import N_, gettext, ngettext, translate
-from messages.message import Message, MessageError, replace_options
+from messages.message import Message, MessageError, message, replace_options
 
 MAX_OVERLAID_RUNS = 8  # more curves over one another cannot be told apart by eye
 _DRAWN_SPANS = 1500  # extremes are kept for so many intervals of time: at least one a pixel of the preview
 _BEFORE_RELEASE_S = 1.0  # drawn part of the hold before the release
 _TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
+_SYMBOLS = {"um": "µm"}
 _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 """What fits into the preview of the export dialog."""
 
@@ -166,17 +168,34 @@ def _run_trace(overview: DecimatedRun) -> Trace:
     return Trace(overview.path.stem, time_s, table, others[0] if others else None)
 
 
-def preview_import(path: str, form: Form) -> ImportPreview:
+def preview_import(path: str, form: Form, report: ReportProgress) -> ImportPreview:
     """Read a file as it would be imported; `form` is valid, also below."""
     plan = import_plan(form)
     unit, scale = form["unit_name"].strip() or "m", 1.0
     if unit == "m" and form["quantity"] == "displacement":
         unit, scale = "mm", 1e3
-    with shared_reading_process().read(Path(path), plan) as record:
+    with shared_reading_process().read(Path(path), plan, _reading(path, report)) as record:
         storing.check_length(Path(path), record)
         trace = _imported_trace(Path(path).stem, record, plan.measures, scale)
         told = [_record_summary(record), *map(_in_window, record.facts.notes)]
-    return ImportPreview(Overlay((trace,), gettext("time, s"), unit), ". ".join(told))
+        unlikely = None if plan.any_size else sizes.unlikely_size(record, plan, load_gauges())
+    question = None if unlikely is None else _size_question(unlikely)
+    return ImportPreview(Overlay((trace,), gettext("time, s"), unit), ". ".join(told), question)
+
+
+def _size_question(unlikely: sizes.UnlikelySize) -> SizeQuestion:
+    if unlikely.unit is None:
+        template, unit = N_("{fault}. Is that right?"), ""
+    else:
+        template, unit = N_("{fault}. Is the file in {unit}?"), _SYMBOLS.get(unlikely.unit, unlikely.unit)
+    asked = message(template, fault=unlikely.fault, unit=unit)
+    return SizeQuestion(sentence(asked), unlikely.unit or "", unit)
+
+
+def _reading(path: str, report: ReportProgress) -> Callable[[float], object]:
+    """What reports the share of a file that is read."""
+    text = gettext("Reading {name}", name=Path(path).name)
+    return lambda share: report(Progress(text, share))
 
 
 def _record_summary(record: importing.ForeignRecord) -> str:
@@ -218,7 +237,7 @@ def _import(path: str, form: Form, folder: str, report: ReportProgress) -> impor
     }
     try:
         return import_run.import_foreign_file(
-            Path(path), import_plan(form), target, load_stand(),
+            Path(path), import_plan(form), target, load_stand(), gauges=load_gauges(),
             report=lambda share: report(Progress(text, share)), **metadata,
         )  # fmt: skip
     except SeriesError as error:
@@ -227,6 +246,7 @@ def _import(path: str, form: Form, folder: str, report: ReportProgress) -> impor
 
 def import_files(paths: tuple[str, ...], form: Form, folder: str, report: ReportProgress) -> ImportOutcome:
     """Import files alike; what is stated of one test holds for the first. A fault stops no other file."""
+    layout = _survey(paths[0], form, lambda _: None).preview
     runs: list[import_run.ImportedRun] = []
     faults: list[str] = []
     for number, path in enumerate(paths):
@@ -235,11 +255,22 @@ def import_files(paths: tuple[str, ...], form: Form, folder: str, report: Report
             report(Progress(progress.text, (done + (progress.fraction or 0.0)) / len(paths)))
 
         try:
+            if number:
+                _check_layout(path, form, layout, paths[0])
             runs.append(_import(path, form, folder, on_progress))
         except (RunError, ConfigError) as error:
             faults.append(f"{Path(path).name}: {_in_window(error.message)}")
         form = {**form, **dict.fromkeys(PER_FILE_FIELDS, ""), "header": form["header"]}
     return ImportOutcome(tuple(run.run for run in runs), tuple(map(_result_row, runs)), tuple(faults))
+
+
+def _check_layout(path: str, form: Form, layout: recognition.FilePreview | None, first: str) -> None:
+    """Refuse a file with other columns or units than the first. Raises ImportFileError."""
+    found = _survey(path, form, lambda _: None).preview
+    if layout is not None and found is not None and not found.has_layout_of(layout):
+        raise ImportFileError(
+            "its columns or units are not those of {name}. Import it by itself", name=Path(first).name
+        )
 
 
 def _in_window(text: Message) -> str:
@@ -259,12 +290,15 @@ def _result_row(run: import_run.ImportedRun) -> str:
     return "   ".join((Path(run.run).stem, length, rate, *ranges, release))
 
 
-def survey_file(path: str, form: Form) -> recognition.FilePreview:
+def survey_file(path: str, form: Form, report: ReportProgress) -> recognition.FileSurvey:
     """Read the columns and first lines of a file."""
-    options = {name: form[name] or None for name in ("delimiter", "decimal")}
-    options["encoding"] = form["encoding"].strip() or None
+    return _survey(path, form, _reading(path, report))
+
+
+def _survey(path: str, form: Form, report: Callable[[float], object]) -> recognition.FileSurvey:
+    options = {name: form[name] or None for name in ("delimiter", "decimal", "encoding")}
     request = convert(options | _lines(form), recognition.ParseOptions)
-    return shared_reading_process().preview(Path(path), request)
+    return shared_reading_process().survey(Path(path), request, report)
 
 
 def import_plan(form: Form) -> importing.ImportPlan:
@@ -289,7 +323,7 @@ def import_plan(form: Form) -> importing.ImportPlan:
         "rate_hz": number["rate"],
         "date": (form["time"] and form["date"]) or None,
         "date_order": form["date_order"] or None,
-        "encoding": form["encoding"].strip() or None,
+        "encoding": form["encoding"] or None,
         "missing": tuple(filter(None, map(str.strip, form["missing"].split(";")))),
     }
     request = {
@@ -298,6 +332,7 @@ def import_plan(form: Form) -> importing.ImportPlan:
         **{name: form[name] for name in ("measures", "quantity")},
         "time_unit": form["time_unit"] or None,
         "begun": parse_time(form["begun"]),
+        "any_size": bool(form["any_size"]),
         **{name: number[name] for name in ("gain_uncertainty", "from_s", "until_s", "segment")},
     }
     return convert(request, importing.ImportPlan)

@@ -5,15 +5,16 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QPushButton, QWidget
 
-from app.presenters.base import Chip
+from app.presenters.base import Chip, Tone
 from app.presenters.runs.import_presenter import ImportPresenter, ImportState
+from app.presenters.runs.state import SizeQuestion
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import make_button, make_primary_button, make_text_view
 from app.qt.widgets.layouts import make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import gettext, ngettext
 
 _COLUMN_WIDTH = 384
@@ -29,11 +30,13 @@ class ImportDialog(QDialog):
         self._shown = ImportState()
         self._title = label(role=TextRole.HEADING)
         self._waiting = label(muted=True)
+        self._taken_over = label(muted=True, wrap=True)
+        self._question = _SizeQuestionBar(presenter)
         self._fields = ImportFields()
         self._fields.changed.connect(presenter.set_form)
         self._preview = RunsPreview(theme)
         self._words = label(wrap=True)
-        self._caption = label(gettext("First lines of the file"), TextRole.LABEL, muted=True)
+        self._caption = label(role=TextRole.LABEL, muted=True)
         self._lines = make_text_view(gettext("First lines of the file"))
         self._lines.setFixedHeight(_LINES_HEIGHT)
         self._message = label(wrap=True)
@@ -65,11 +68,11 @@ class ImportDialog(QDialog):
         if state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
         self._words.setText(state.summary)
-        if (state.first_rows, state.results) != (old.first_rows, old.results):
-            self._lines.setPlainText(state.results or state.first_rows)
-            self._caption.setText(
-                gettext("Imported") if state.results else gettext("First lines of the file")
-            )
+        set_text_or_hide(self._taken_over, state.taken_over)
+        self._question.show_question(state.question)
+        if (state.first_lines, state.results) != (old.first_lines, old.results):
+            self._lines.setPlainText(state.results or state.first_lines)
+        self._caption.setText(_caption(state))
         show_chip(self._message, Chip(state.busy) if state.busy else state.message)
         self._message.show()  # an empty one still keeps the buttons at the right
         self._import.setEnabled(state.can_import)
@@ -93,11 +96,43 @@ class ImportDialog(QDialog):
         self.resize(1000, 660)
         left = make_scroll_area(self._fields, is_column=False)
         left.setFixedWidth(_COLUMN_WIDTH)
-        right = make_column((self._preview, 1), self._words, self._caption, self._lines, spacing=8)
+        right = make_column(
+            self._question, (self._preview, 1), self._words, self._caption, self._lines, spacing=8
+        )
         buttons = make_row((self._message, 1), spacing=8)
         for button in (self._import, self._import_all, self._skip, close):
             button.setAutoDefault(False)  # Enter in a field takes the field
             buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignBottom)
         top = make_row((self._title, 1), self._waiting)
         middle = make_row(left, (right, 1), spacing=16)
-        make_column(top, (middle, 1), buttons, spacing=12, margins=(16, 16), of=self)
+        make_column(top, self._taken_over, (middle, 1), buttons, spacing=12, margins=(16, 16), of=self)
+
+
+class _SizeQuestionBar(QWidget):
+    """Asks whether displacements of an unlikely size are right; the likely answer stands first."""
+
+    def __init__(self, presenter: ImportPresenter) -> None:
+        super().__init__()
+        self._text = label(wrap=True)
+        self._unit = make_button("", lambda: presenter.answer(is_right=False), primary=True)
+        right = make_button(gettext("It is right"), lambda: presenter.answer(is_right=True))
+        for button in (self._unit, right):
+            button.setAutoDefault(False)
+        row = make_row((self._text, 1), self._unit, right, spacing=8, of=self)
+        row.setContentsMargins(0, 0, 0, 0)
+        self.setAccessibleName(gettext("Question"))
+
+    def show_question(self, question: SizeQuestion | None) -> None:
+        self.setVisible(question is not None)
+        if question is not None:
+            show_chip(self._text, Chip(question.text, Tone.WARN))
+            self._unit.setText(gettext("Read as {unit}", unit=question.symbol))
+            self._unit.setVisible(bool(question.unit))
+
+
+def _caption(state: ImportState) -> str:
+    if state.results:
+        return gettext("Imported")
+    if state.encoding:
+        return gettext("First lines of the file, read as {encoding}", encoding=state.encoding)
+    return gettext("First lines of the file")

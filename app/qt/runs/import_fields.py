@@ -51,7 +51,7 @@ class ImportFields(QWidget):
             is_typed = field.hasFocus() and field.isModified() and state.path == old.path
             if field.text() != state.form[name] and not is_typed:
                 field.setText(state.form[name])
-        for name in ("delimiter", "decimal"):
+        for name in ("delimiter", "decimal", "encoding"):
             self._boxes[name].setEnabled(state.is_text)
         for name in import_form.GAIN_FIELDS:
             self._texts[name].setEnabled(state.form["unit"] == GAIN)

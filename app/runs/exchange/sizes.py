@@ -1,21 +1,22 @@
 """Displacements that are likely in another unit than they were taken for."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange.importing import LENGTH_UNITS_M, ForeignRecord, ImportPlan, LengthUnit
+from app.runs.exchange.importing import LENGTH_UNITS_M, Floats, ForeignRecord, ImportPlan, LengthUnit
 from config.schema import Gauges
 from messages.i18n import N_
 from messages.message import Message, message, option
 
 _TYPICAL_M = 0.01
 _SMALLEST_M = 1e-4
-"""A pullback test moves the table by millimetres, a thousand times less by micrometres."""
+"""A pullback test moves the table by millimetres."""
+_ROWS_OF_NOISE, _STEPS_OF_NOISE = 100_000, 20.0
+"""Noise of a million rows spans some eleven times the median of its steps."""
 _LARGEST_M = 1.0
 """Of a gauge whose range is not stated."""
 
@@ -33,25 +34,20 @@ def unlikely_size(record: ForeignRecord, plan: ImportPlan, gauges: Gauges) -> Un
     """Look for displacements beyond the range of a gauge of the stand, or far below a pullback."""
     if plan.quantity != "displacement" or plan.unit_name not in (None, "m"):
         return None
+    facts = record.facts
     stated_m = (gauges.table.range_m, gauges.relative.range_m)
-    for number, (span_m, range_m) in enumerate(zip(_spans(record), stated_m, strict=False)):
+    for number, (gauge, cells, range_m) in enumerate(zip(facts.gauges, record.cells, stated_m, strict=False)):
+        span = float(np.fmax.reduce(cells) - np.fmin.reduce(cells))
+        span_m = span * abs(gauge.gain_m_per_count)
         largest_m = 2.0 * range_m if range_m else _LARGEST_M
-        # A plate that never slips moves the second gauge by nothing.
-        smallest_m = 0.0 if number else _SMALLEST_M
-        if smallest_m <= span_m <= largest_m:
+        if span_m > largest_m:
+            template = N_("gauge {number} moves over {span}, more than its range of {range}")
+            fault = message(template, number=number + 1, span=_length(span_m), range=_length(largest_m))
+        elif number == 0 and _is_too_small(span_m, largest_m) and _moves(cells, span):
+            fault = message("gauge 1 moves over {span} only", span=_length(span_m))
+        else:
             continue
-        fault = N_("gauge {number} moves over {span}, more than its range of {range}")
-        if span_m < smallest_m:
-            fault = N_("gauge {number} moves over {span} only")
-        cells_m = span_m / record.facts.gauges[number].gain_m_per_count
-        unit = (
-            None
-            if plan.gain is not None
-            else _likely_unit(abs(cells_m), max(smallest_m, _SMALLEST_M), largest_m)
-        )
-        return UnlikelySize(
-            message(fault, number=number + 1, span=_length(span_m), range=_length(largest_m)), unit
-        )
+        return UnlikelySize(fault, _likely_unit(span, largest_m) if plan.gain is None else None)
     return None
 
 
@@ -62,7 +58,7 @@ def check_size(path: Path, record: ForeignRecord, plan: ImportPlan, gauges: Gaug
         return
     if found.unit is None:
         raise ImportFileError(
-            "{path}: {fault}. Check {unit_option} or {gain_option}; if it is right, add {option}",
+            "{path}: {fault}. Check {unit_option} and {gain_option}; if it is right, set {option}",
             path=path,
             fault=found.fault,
             unit_option=option("--unit"),
@@ -70,7 +66,7 @@ def check_size(path: Path, record: ForeignRecord, plan: ImportPlan, gauges: Gaug
             option=option("--any-size"),
         )
     raise ImportFileError(
-        "{path}: {fault}. If its cells are in {unit}, add {unit_option} {unit}; if it is right, add {option}",
+        "{path}: {fault}. If it is in {unit}, set {unit_option} {unit}; if it is right as it is, set {option}",
         path=path,
         fault=found.fault,
         unit=found.unit,
@@ -79,19 +75,25 @@ def check_size(path: Path, record: ForeignRecord, plan: ImportPlan, gauges: Gaug
     )
 
 
-def _spans(record: ForeignRecord) -> Iterator[float]:
-    """Distance between the lowest and the highest reading of each gauge (m)."""
-    for gauge, cells in zip(record.facts.gauges, record.cells, strict=True):
-        yield abs(gauge.gain_m_per_count) * float(np.fmax.reduce(cells) - np.fmin.reduce(cells))
+def _is_too_small(span_m: float, largest_m: float) -> bool:
+    """Tell whether a distance is none of a test, but a thousand or a million times it is."""
+    return span_m < _SMALLEST_M and any(_SMALLEST_M <= span_m * scale <= largest_m for scale in (1e3, 1e6))
 
 
-def _likely_unit(span: float, smallest_m: float, largest_m: float) -> LengthUnit | None:
+def _likely_unit(span: float, largest_m: float) -> LengthUnit | None:
     """Unit in which a distance is one of a test."""
     spans_m = {unit: span * scale_m for unit, scale_m in LENGTH_UNITS_M.items()}
-    likely = [unit for unit, span_m in spans_m.items() if smallest_m <= span_m <= largest_m]
+    likely = [unit for unit, span_m in spans_m.items() if _SMALLEST_M <= span_m <= largest_m]
     return min(likely, key=lambda unit: abs(math.log(spans_m[unit] / _TYPICAL_M)), default=None)
 
 
+def _moves(cells: Floats, span: float) -> bool:
+    """Tell whether a gauge does more than noise, which is seen from one row to the next."""
+    steps = np.abs(np.diff(cells[:_ROWS_OF_NOISE]))
+    steps = steps[~np.isnan(steps)]
+    return bool(len(steps)) and span > _STEPS_OF_NOISE * float(np.median(steps))
+
+
 def _length(length_m: float) -> str:
-    unit, scale = ("m", 1.0) if length_m >= 1.0 else ("mm", 1e3) if length_m >= _SMALLEST_M else ("um", 1e6)
+    unit, scale = ("m", 1.0) if length_m >= 1.0 else ("mm", 1e3) if length_m >= _SMALLEST_M else ("µm", 1e6)
     return f"{scale * length_m:.4g} {unit}"

@@ -13,15 +13,16 @@ from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportOutcome, ImportPreview, Overlay
 from app.presenters.runs.tasks import import_file, import_files, import_plan, preview_import, survey_file
 from app.runs.errors import ImportFileError, RunError
-from app.runs.exchange.recognition import FilePreview, ParseOptions
+from app.runs.exchange.recognition import FilePreview, FileSurvey, ParseOptions
 from app.runs.reader import open_run
 from messages.message import Message, message, option
 
-FOUND = FilePreview(
+COLUMNS = FilePreview(
     ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1",
     "u2",
-    "plate", "ms", "mm",
+    "plate", "ms", "mm", units=("ms", "mm", "mm"), numbers=(0, 1, 2),
 )  # fmt: skip
+FOUND = FileSurvey(("made by a logger", "t;u1;u2", "0;1;2"), "cp1251", COLUMNS)
 PREVIEW = ImportPreview(Overlay(), "3 samples")
 
 
@@ -74,7 +75,8 @@ def test_columns_are_offered_and_the_record_is_previewed() -> None:
     state = desk.presenter.state
     assert state.can_import
     assert (state.summary, state.busy) == ("3 samples", "")
-    assert [line.split() for line in state.first_rows.splitlines()] == [["t", "u1", "u2"], ["0", "1", "2"]]
+    assert state.first_lines.splitlines() == ["made by a logger", "t;u1;u2", "0;1;2"]
+    assert state.encoding == "Windows-1251 (Cyrillic)"
 
 
 def test_one_look_at_a_time_and_only_the_latest_counts() -> None:
@@ -171,15 +173,20 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
+def no_report(_progress: object) -> None:
+    pass
+
+
 def filled(path: Path, **changes: str) -> Form:
+    """Form as the dialog has it after a look into the file; its sizes are taken as they are."""
     desk = Desk(str(path))
-    desk.answer(survey_file(str(path), make_form()))
-    return {**desk.form, **changes}
+    desk.answer(survey_file(str(path), make_form(), no_report))
+    return {**desk.form, "any_size": "yes", **changes}
 
 
 def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     form = filled(path, series="1FFM0", plate_mass_kg="23,5", note="from the logger")
-    preview = preview_import(str(path), form)
+    preview = preview_import(str(path), form, no_report)
     assert preview.summary == "60 samples, 0.059\u202fs, 1000\u202fHz, date not known"
     (trace,) = preview.overlay.traces
     assert trace.table == pytest.approx(60.5 - np.arange(60))
@@ -223,13 +230,13 @@ def test_files_without_names_above_are_imported_alike(tmp_path: Path) -> None:
     assert (
         "Add “Names above”" in import_files((str(paths[0]),), named, str(tmp_path), lambda _: None).faults[0]
     )
-    assert "“Unit” states another" in preview_import(str(paths[0]), filled(paths[0])).summary
+    assert "“Unit” states another" in preview_import(str(paths[0]), filled(paths[0]), no_report).summary
     assert [len(open_run(run, trusted=True)) for run in outcome.runs] == [60, 60]
 
 
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:
     form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.055")
-    preview = preview_import(str(path), form)
+    preview = preview_import(str(path), form, no_report)
     assert preview.overlay.unit == "V"
     assert preview.overlay.traces[0].table == pytest.approx(2.0 * (60.5 - np.arange(2, 56)) + 0.5)
 
@@ -369,6 +376,7 @@ def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
     desk.set_form(name="x", run_in_number="3", note="wet", plate_id="P1")
     desk.presenter.import_file()
     desk.answer("/runs/x.h5")
+    desk.answer(FOUND)
     form = desk.form
     assert [form[name] for name in ("name", "run_in_number", "note", "plate_id")] == ["", "", "", "P1"]
 

@@ -14,12 +14,13 @@ from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.state import ImportPreview, Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
-from app.runs.exchange.recognition import FilePreview, ParseOptions
+from app.runs.exchange.recognition import FilePreview, FileSurvey, ParseOptions
 
-FOUND = FilePreview(
+COLUMNS = FilePreview(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",
-    "relative", "s", "mm",
+    "relative", "s", "mm", units=("s", "mm", ""), numbers=(0, 1, 2),
 )  # fmt: skip
+FOUND = FileSurvey(("a logger", "t;u1;u1", "0;1;2"), "utf-16-le", COLUMNS)
 TIME_S = np.linspace(0.0, 1.0, 50)
 PREVIEW = ImportPreview(Overlay((Trace("a", TIME_S, TIME_S, None),), "time, s"), "50 samples, 1 s")
 
@@ -71,7 +72,8 @@ def test_the_file_is_shown_with_its_columns_and_first_lines(stage: Stage) -> Non
         assert expected in words
     head = stage.find(QPlainTextEdit, "First lines of the file")
     assert isinstance(head, QPlainTextEdit)
-    assert [line.split() for line in head.toPlainText().splitlines()] == [["t", "u1", "u1"], ["0", "1", "2"]]
+    assert head.toPlainText().splitlines() == ["a logger", "t;u1;u1", "0;1;2"]
+    assert "First lines of the file, read as UTF-16 LE" in words
     assert not stage.dialog.isModal()
     stage.dialog.resize(900, 600)
     stage.qtbot.wait(1)
