@@ -66,7 +66,7 @@ def check_size(path: Path, record: ForeignRecord, plan: ImportPlan, gauges: Gaug
             option=option("--any-size"),
         )
     raise ImportFileError(
-        "{path}: {fault}. If it is in {unit}, set {unit_option} {unit}; if it is right as it is, set {option}",
+        "{path}: {fault}. If it is in {unit}, set {unit_option} {unit}; if it is right so, set {option}",
         path=path,
         fault=found.fault,
         unit=found.unit,
