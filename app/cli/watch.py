@@ -30,7 +30,7 @@ from app.runs.exchange.importing import ImportPlan
 from app.runs.metadata_io import read_metadata
 from app.runs.reader import validate_and_read
 from app.runs.validator import shared_validator
-from config.files import load_stand
+from config.files import load_gauges, load_stand
 from config.schema import ConfigError
 
 _TABLE_FORMATS = {
@@ -77,7 +77,7 @@ class FolderWatch:
         with out.progress_bar(f"reading {path.name}", total=1.0) as update:
             run = import_foreign_file(
                 path, self.plan, free_path(self.runs, path.name.partition(".")[0]), load_stand(),
-                report=update, **self.metadata,
+                gauges=load_gauges(), report=update, **self.metadata,
             )  # fmt: skip
         out.print_status(f"{path.name}: {', '.join(filter(None, import_summary(run)))}")
         return self._identify(Path(run.run), import_document(run))
