@@ -34,6 +34,7 @@ else:
 
 _CELL = 28
 """Largest width of a column of the first rows, in characters: a date with its time of day."""
+_TAB = "→\t"  # where cells are long, a tab alone is not seen
 _NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
 
 
@@ -262,38 +263,43 @@ class ImportPresenter(Presenter[ImportState]):
         self._update(faults=dict.fromkeys(_named_fields(fault), words), message=Chip(words, Tone.BAD))
 
     def _on_surveyed(self, survey: "FileSurvey") -> None:
-        """Show what the file holds; take over the settings of the file before if its columns are the same."""
-        is_new, self._is_new = self._is_new, False
-        before, found = self._before, survey.preview
-        is_alike = before is not None and found is not None and found.has_layout_of(before.columns)
-        if (
-            is_new
-            and before is not None
-            and not is_alike
-            and _lines_are_carried(self.state.form, before.form)
-        ):
-            self._update(form={**self.state.form, **dict.fromkeys(CARRIED_LINE_FIELDS, "")})
-            self._is_new = True
-            self._read(is_survey=True)
+        found = survey.preview
+        if self._is_new and not self._begin_like_before(found):
             return
-        if is_new and is_alike and before is not None:
-            form = {**before.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
-            text = gettext(
-                "Columns and units are those of {name}: its settings are taken over", name=before.name
-            )
-            self._update(form=form, faults=validate(form), taken_over=text)
-        self._columns = found
+        self._is_new, self._columns = False, found
         lines = survey.lines if found is None or survey.lines else _format_rows(found)
         self._update(
-            busy="", first_lines="\n".join(lines), is_text=bool(survey.encoding) or found is None,
+            busy="",
+            first_lines="\n".join(line.replace("\t", _TAB) for line in lines),
+            is_text=bool(survey.encoding) or found is None,
             encoding=gettext(ENCODINGS.get(survey.encoding, survey.encoding)) if survey.encoding else "",
-        )  # fmt: skip
-        if found is None:
-            self._surveyed = _line_texts(self.state.form)
+        )
+        if found is not None:
+            self._show_columns(found)
+        else:
+            self._surveyed = None
             self._update(columns=(), column_labels=())
             self._show_unreadable(survey.fault)
-        else:
-            self._show_columns(found)
+
+    def _begin_like_before(self, found: "FilePreview | None") -> bool:
+        """Take over the settings of the file before if the columns are the same.
+
+        False where the file is looked into anew, since what was said of the lines of that file does not hold.
+        """
+        before, form = self._before, self.state.form
+        if before is None:
+            return True
+        if found is not None and found.has_layout_of(before.columns):
+            form = {**before.form, **dict.fromkeys(PER_FILE_FIELDS, "")}
+            template = N_("Columns and units are those of {name}: its settings are taken over")
+            self._update(form=form, faults=validate(form), taken_over=gettext(template, name=before.name))
+            return True
+        self._before = None
+        if not any(form[name] for name in CARRIED_LINE_FIELDS):
+            return True
+        self._update(form={**form, **dict.fromkeys(CARRIED_LINE_FIELDS, "")})
+        self._read(is_survey=True)
+        return False
 
     def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; keep those that were chosen if the file has them."""
@@ -331,11 +337,6 @@ def _format_rows(found: "FilePreview") -> list[str]:
 
 def _correction_chip() -> Chip:
     return Chip(gettext("Correct what is marked"), Tone.BAD)
-
-
-def _lines_are_carried(form: Form, before: Form) -> bool:
-    """Whether a file is looked into with what was said of the lines of the one before."""
-    return any(form[name] and form[name] == before[name] for name in CARRIED_LINE_FIELDS)
 
 
 def _line_texts(form: Form) -> Form:

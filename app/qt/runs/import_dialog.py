@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QDialog, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
@@ -19,6 +19,8 @@ from messages.i18n import gettext, ngettext
 
 _COLUMN_WIDTH = 384
 _LINES_HEIGHT = 132
+_SIZE = QSize(1000, 660)
+_FRAME = QSize(16, 48)  # that the window system draws around it
 
 
 class ImportDialog(QDialog):
@@ -93,7 +95,7 @@ class ImportDialog(QDialog):
 
     def _lay_out(self, close: QPushButton) -> None:
         self.setWindowTitle(gettext("Import"))
-        self.resize(1000, 660)
+        self.resize(_SIZE.boundedTo(self.screen().availableSize() - _FRAME))
         left = make_scroll_area(self._fields, is_column=False)
         left.setFixedWidth(_COLUMN_WIDTH)
         right = make_column(
@@ -116,6 +118,8 @@ class _SizeQuestionBar(QWidget):
         self._text = label(wrap=True)
         self._unit = make_button("", lambda: presenter.answer(is_right=False), primary=True)
         right = make_button(gettext("It is right"), lambda: presenter.answer(is_right=True))
+        bind_button(self._unit, "Alt+U", gettext("Read the displacements in the unit that is likely"), self)
+        bind_button(right, "Alt+Y", gettext("Take the displacements as they are"), self)
         for button in (self._unit, right):
             button.setAutoDefault(False)
         row = make_row((self._text, 1), self._unit, right, spacing=8, of=self)
@@ -128,6 +132,7 @@ class _SizeQuestionBar(QWidget):
             show_chip(self._text, Chip(question.text, Tone.WARN))
             self._unit.setText(gettext("Read as {unit}", unit=question.symbol))
             self._unit.setVisible(bool(question.unit))
+            self._unit.setEnabled(bool(question.unit))
 
 
 def _caption(state: ImportState) -> str:

@@ -101,6 +101,7 @@ class ImportFields(QWidget):
         for box in self._boxes.values():  # names of columns may be long
             box.setSizeAdjustPolicy(ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(_BOX_LETTERS)
+        self._show_faults({})
         for name, field in self._texts.items():
             field.setPlaceholderText(gettext(FIELDS[name].hint))
 

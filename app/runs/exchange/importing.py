@@ -203,8 +203,7 @@ def _with_time(path: Path, plan: ImportPlan, report: ReportShare) -> ImportPlan:
     numbers = dict(zip(found.columns, found.numbers, strict=True))
     if not found.time or {found.time, str(numbers[found.time])} & {layout.table, layout.second}:
         raise ImportFileError(
-            "{path}: no column of times is found. Choose it by {time_option}, or give rows a second by"
-            " {rate_option}",
+            "{path}: no column of times is found. Choose it by {time_option}, or set {rate_option}",
             path=path,
             time_option=option("--time"),
             rate_option=option("--rate"),

@@ -19,9 +19,11 @@ from app.runs.exchange.units import parse_unit
 from messages.message import EMPTY, Message, option
 
 _TIME = re.compile(r"^(t|time|times|zeit|temps|время|sekunden|seconds?)\b|^time|^t_", re.IGNORECASE)
-_PLATE = re.compile(r"\bu_?2\b|plate|gauge.?2|ch(annel)?.?2", re.IGNORECASE)
-_RELATIVE = re.compile(r"rel|u_?2\s*[-−–]\s*u_?1", re.IGNORECASE)
-_TABLE = re.compile(r"\bu_?1\b|table|gauge.?1|ch(annel)?.?1|displacement|weg|перемещ", re.IGNORECASE)
+_PLATE = re.compile(r"\bu_?2\b|plat|пл[иа]т|gauge.?2|ch(annel)?.?2", re.IGNORECASE)
+_RELATIVE = re.compile(r"rel|отн|u_?2\s*[-−–]\s*u_?1", re.IGNORECASE)
+_TABLE = re.compile(
+    r"\bu_?1\b|table|tisch|стол|gauge.?1|ch(annel)?.?1|displacement|weg|перемещ", re.IGNORECASE
+)
 _DATE = re.compile(r"^(date|datum|дата)\b", re.IGNORECASE)
 _GROUPS = re.compile(r"^(?:[^\s/]+/)+(?=\S)|^\w+\.(?=\w)")
 """Groups of HDF5 and TDMS, and structs of MATLAB, before a name."""

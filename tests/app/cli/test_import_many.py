@@ -69,3 +69,35 @@ def test_several_files_need_a_folder(slipstand: Any, folder: Path) -> None:
     outcome = slipstand("import", folder / "a.csv", folder / "b.csv", "--table", 1, "-o", folder / "x.h5")
     assert outcome.code == 1
     assert "several files become several runs. Give a folder" in outcome.err
+
+
+def test_a_size_that_is_unlikely_is_refused_unless_it_is_insisted_on(slipstand: Any, tmp_path: Path) -> None:
+    write_record(tmp_path / "a.csv", swings=True)
+    lines = (tmp_path / "a.csv").read_text().replace("u1 [mm]", "u1")
+    (tmp_path / "a.csv").write_text(lines)
+    arguments = ("import", tmp_path / "a.csv", "--table", "u1", "-o", tmp_path / "a.h5")
+    refused = slipstand(*arguments)
+    assert refused.code == 1
+    assert refused.err == (
+        f"error: {tmp_path / 'a.csv'}: gauge 1 moves over 23.17 m, more than its range of 33 mm. If it is in mm,"
+        " set --unit mm; if it is right so, set --any-size\n"
+    )
+    assert not (tmp_path / "a.h5").exists()
+    by_gain = slipstand(*arguments, "--gain", "1e-6")
+    assert "gauge 1 moves over 23.17 µm only. Check --unit and --gain; if it is right, set" in by_gain.err
+    assert slipstand(*arguments, "--unit", "mm").code == 0
+    assert slipstand(*arguments, "--any-size", "--force").code == 0
+    assert np.ptp(open_run(tmp_path / "a.h5", trusted=True).table_reading) == pytest.approx(23.17, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "options", [("--quantity", "velocity"), ("--gain", "2", "--unit-name", "V"), ("--unit", "mm")]
+)
+def test_no_size_is_unlikely_of_what_is_no_displacement(
+    slipstand: Any, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    write_record(tmp_path / "a.csv", swings=True)
+    (tmp_path / "a.csv").write_text((tmp_path / "a.csv").read_text().replace("u1 [mm]", "u1"))
+    assert (
+        slipstand("import", tmp_path / "a.csv", "--table", "u1", *options, "-o", tmp_path / "a.h5").code == 0
+    )

@@ -291,7 +291,9 @@ def test_a_file_without_times_needs_a_rate(tmp_path: Path, header: str) -> None:
     desk = Desk(path)
     names = header.split(";") if header else ["0", "1"]
     assert [desk.form[name] for name in ("time", "table", "second")] == ["", *names]
-    assert "no column of times is found. Choose it by “Time”, or give" in desk.state.message.text
+    assert (
+        "no column of times is found. Choose it by “Time”, or set “Rows a second”" in desk.state.message.text
+    )
     desk.set_form(rate="100", unit="mm")
     assert desk.state.summary.startswith("300 samples, 2.990\u202fs, 100\u202fHz")
     assert desk.state.can_import

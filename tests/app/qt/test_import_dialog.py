@@ -11,10 +11,11 @@ from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.state import ImportPreview, Overlay, Trace
+from app.presenters.runs.state import ImportPreview, Overlay, SizeQuestion, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.exchange.recognition import FilePreview, FileSurvey, ParseOptions
+from messages.message import message
 
 COLUMNS = FilePreview(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",
@@ -26,7 +27,7 @@ PREVIEW = ImportPreview(Overlay((Trace("a", TIME_S, TIME_S, None),), "time, s"),
 
 
 class Stage:
-    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+    def __init__(self, theme: Theme, qtbot: QtBot, survey: FileSurvey = FOUND) -> None:
         self.qtbot = qtbot
         self.worker = FakeWorker()
         self.asked = self.worker.calls
@@ -37,8 +38,9 @@ class Stage:
         self.presenter.attach(self.dialog)
         self.presenter.open(("/far/a.csv", "/far/b.csv"), "/runs", "Anna")
         self.dialog.show()
-        self.answer(FOUND)
-        self.answer(PREVIEW)
+        self.answer(survey)
+        if survey.preview:
+            self.answer(PREVIEW)
 
     def answer(self, answer: object) -> None:
         self.asked[-1].done(answer)
@@ -107,6 +109,73 @@ def test_a_file_is_imported_and_the_next_comes(stage: Stage) -> None:
     assert "Import b.csv" in visible_words(stage.dialog)
     stage.qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
     assert "No file is left to import" in visible_words(stage.dialog)
+
+
+QUESTION = SizeQuestion(
+    "Gauge 1 moves over 24 m, more than its range of 33 mm. Is the file in mm?", "mm", "mm"
+)
+
+
+def test_an_unlikely_size_is_asked_about_and_the_likely_unit_stands_first(stage: Stage) -> None:
+    stage.set_form(unit="m")
+    stage.answer(ImportPreview(PREVIEW.overlay, "50 samples", QUESTION))
+    assert "▲ Gauge 1 moves over 24 m, more than its range of 33 mm. Is the file in mm?" in visible_words(
+        stage.dialog
+    )
+    assert not stage.button("Import").isEnabled()
+    likely, right = stage.button("Read as mm"), stage.button("It is right")
+    assert likely.x() < right.x()
+    for width in (900, 1000):
+        stage.dialog.resize(width, 592)
+        stage.qtbot.wait(1)
+        assert clipped_words(stage.dialog) == []
+    stage.qtbot.mouseClick(likely, Qt.MouseButton.LeftButton)
+    assert stage.presenter.state.form["unit"] == "mm"
+    assert not likely.isVisible()
+    stage.answer(PREVIEW)
+    assert stage.button("Import").isEnabled()
+
+
+@pytest.mark.parametrize(("key", "changes"), [("U", {"unit": "mm"}), ("Y", {"any_size": "yes"})])
+def test_the_question_is_answered_by_keys(stage: Stage, key: str, changes: dict[str, str]) -> None:
+    stage.set_form(unit="m")
+    stage.answer(ImportPreview(PREVIEW.overlay, "50 samples", QUESTION))
+    stage.dialog.activateWindow()
+    stage.qtbot.waitUntil(stage.dialog.isActiveWindow)
+    stage.qtbot.keyClick(stage.dialog, getattr(Qt.Key, f"Key_{key}"), Qt.KeyboardModifier.AltModifier)
+    assert stage.asked[-1].arguments[1] == stage.presenter.state.form | changes
+    assert stage.presenter.state.form["unit"] == changes.get("unit", "m")
+
+
+def test_without_a_likely_unit_only_the_size_can_be_confirmed(stage: Stage) -> None:
+    stage.set_form(unit="m")
+    stage.answer(ImportPreview(PREVIEW.overlay, "50 samples", SizeQuestion("Is that right?")))
+    assert stage.button("It is right").isVisible()
+    assert not stage.button("Read as ").isVisible()
+
+
+def test_lines_are_shown_where_no_columns_are_found(theme: Theme, qtbot: QtBot) -> None:
+    stage = Stage(theme, qtbot, FileSurvey(("no table", "at all"), "cp1251", fault=message("no columns")))
+    lines = stage.find(QPlainTextEdit, "First lines of the file")
+    assert isinstance(lines, QPlainTextEdit)
+    assert lines.toPlainText() == "no table\nat all"
+    assert "First lines of the file, read as Windows-1251 (Cyrillic)" in visible_words(stage.dialog)
+    assert stage.find(QComboBox, "Encoding").isEnabled()
+
+
+def test_settings_that_are_taken_over_are_told(stage: Stage) -> None:
+    stage.qtbot.mouseClick(stage.button("Import"), Qt.MouseButton.LeftButton)
+    stage.answer("/runs/a.h5")
+    stage.answer(FOUND)
+    assert "Columns and units are those of a.csv: its settings are taken over" in visible_words(stage.dialog)
+
+
+def test_the_dialog_is_within_the_screen(stage: Stage) -> None:
+    screen = stage.dialog.screen().availableSize()
+    assert stage.dialog.width() < screen.width()
+    assert stage.dialog.height() < screen.height()
+    fields = [stage.find(QComboBox, name) for name in ("Gauge 1, table", "Gauge 2")]
+    assert fields[1].y() - fields[0].y() == 40, "room for faults that there are none of"
 
 
 def test_closing_leaves_the_rest_out(stage: Stage) -> None:

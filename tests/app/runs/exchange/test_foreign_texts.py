@@ -101,7 +101,9 @@ def test_seconds_since_1904_are_those_of_labview(tmp_path):
 
 def test_a_file_without_times_is_told_what_it_needs(tmp_path):
     text = "u1,u2\n" + "".join(f"{row},{row}\n" for row in range(ROWS))
-    with pytest.raises(ImportFileError, match=r"no column of times is found. Choose it by --time, or give"):
+    with pytest.raises(
+        ImportFileError, match=r"no column of times is found. Choose it by --time, or set --rate"
+    ):
         record_of(tmp_path, text)
 
 

@@ -29,6 +29,10 @@ def roles(found: FilePreview) -> tuple[str, ...]:
         ),
         ("Zeit (ms);u1 (mm);u2 (mm);Note", ("Zeit (ms)", "u1 (mm)", "u2 (mm)", "plate", "ms", "mm")),
         ("t,u2-u1,u1", ("t", "u1", "u2-u1", "relative", "", "")),
+        (
+            "Время, с\tПлита, мм\tСтол, мм",
+            ("Время, с", "Стол, мм", "Плита, мм", "plate", "s", "mm"),
+        ),
         ("Время, с\tСтол, мм\tx", ("Время, с", "Стол, мм", "", "relative", "s", "mm")),
         (
             "Time [s];Gauge 1 [µm];Gauge 2 [µm]",
