@@ -41,10 +41,10 @@ def unlikely_size(record: ForeignRecord, plan: ImportPlan, gauges: Gauges) -> Un
         span_m = span * abs(gauge.gain_m_per_count)
         largest_m = 2.0 * range_m if range_m else _LARGEST_M
         if span_m > largest_m:
-            template = N_("gauge {number} moves over {span}, more than its range of {range}")
+            template = N_("gauge {number} moves by {span}, more than its range of {range}")
             fault = message(template, number=number + 1, span=_length(span_m), range=_length(largest_m))
         elif number == 0 and _is_too_small(span_m, largest_m) and _moves(cells, span):
-            fault = message("gauge 1 moves over {span} only", span=_length(span_m))
+            fault = message("gauge 1 moves by {span} only", span=_length(span_m))
         else:
             continue
         return UnlikelySize(fault, _likely_unit(span, largest_m) if plan.gain is None else None)
@@ -66,7 +66,7 @@ def check_size(path: Path, record: ForeignRecord, plan: ImportPlan, gauges: Gaug
             option=option("--any-size"),
         )
     raise ImportFileError(
-        "{path}: {fault}. If it is in {unit}, set {unit_option} {unit}; if it is right so, set {option}",
+        "{path}: {fault}. If it is in {unit}, set {unit_option} {unit}; if it is right, set {option}",
         path=path,
         fault=found.fault,
         unit=found.unit,

@@ -79,15 +79,15 @@ def test_a_size_that_is_unlikely_is_refused_unless_it_is_insisted_on(slipstand: 
     refused = slipstand(*arguments)
     assert refused.code == 1
     assert refused.err == (
-        f"error: {tmp_path / 'a.csv'}: gauge 1 moves over 23.17 m, more than its range of 33 mm. If it is in mm,"
-        " set --unit mm; if it is right so, set --any-size\n"
+        f"error: {tmp_path / 'a.csv'}: gauge 1 moves by 23.24 m, more than its range of 33 mm."
+        " If it is in mm, set --unit mm; if it is right, set --any-size\n"
     )
     assert not (tmp_path / "a.h5").exists()
     by_gain = slipstand(*arguments, "--gain", "1e-6")
-    assert "gauge 1 moves over 23.17 µm only. Check --unit and --gain; if it is right, set" in by_gain.err
+    assert "gauge 1 moves by 23.24 µm only. Check --unit and --gain; if it is right, set" in by_gain.err
     assert slipstand(*arguments, "--unit", "mm").code == 0
     assert slipstand(*arguments, "--any-size", "--force").code == 0
-    assert np.ptp(open_run(tmp_path / "a.h5", trusted=True).table_reading) == pytest.approx(23.17, abs=0.01)
+    assert np.ptp(open_run(tmp_path / "a.h5", trusted=True).table_reading) == pytest.approx(23.24, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -180,7 +180,7 @@ def test_displacements_in_another_unit_are_asked_about(tmp_path: Path) -> None:
     desk = Desk(written(tmp_path / "a.csv", "t;u1"))
     question = desk.state.question
     assert question is not None
-    assert question.text == "Gauge 1 moves over 23.02 m, more than its range of 33 mm. Is the file in mm?"
+    assert question.text == "Gauge 1 moves by 23.02 m, more than its range of 33 mm. Is the file in mm?"
     assert (question.unit, desk.state.can_import) == ("mm", False)
     desk.presenter.import_file()
     assert not desk.worker.calls
@@ -193,15 +193,15 @@ def test_displacements_in_another_unit_are_asked_about(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "scale", "unit", "said"),
     [
-        ("t;u1 [µm]", 1.0, "mm", "Gauge 1 moves over 23.02 µm only. Is the file in mm?"),
-        ("t;u1 [mm]", 1e-3, "m", "Gauge 1 moves over 23.02 µm only. Is the file in m?"),
+        ("t;u1 [µm]", 1.0, "mm", "Gauge 1 moves by 23.02 µm only. Is the file in mm?"),
+        ("t;u1 [mm]", 1e-3, "m", "Gauge 1 moves by 23.02 µm only. Is the file in m?"),
         (
             "t;u1 [mm]",
             1e3,
             "um",
-            "Gauge 1 moves over 23.02 m, more than its range of 33 mm. Is the file in µm?",
+            "Gauge 1 moves by 23.02 m, more than its range of 33 mm. Is the file in µm?",
         ),
-        ("t;u1 [mm]", 3.0, "", "Gauge 1 moves over 69.06 mm, more than its range of 33 mm. Is that right?"),
+        ("t;u1 [mm]", 3.0, "", "Gauge 1 moves by 69.06 mm, more than its range of 33 mm. Is that right?"),
     ],
 )
 def test_sizes_that_are_unlikely_and_the_unit_that_is_likely(

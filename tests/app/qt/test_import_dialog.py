@@ -111,15 +111,13 @@ def test_a_file_is_imported_and_the_next_comes(stage: Stage) -> None:
     assert "No file is left to import" in visible_words(stage.dialog)
 
 
-QUESTION = SizeQuestion(
-    "Gauge 1 moves over 24 m, more than its range of 33 mm. Is the file in mm?", "mm", "mm"
-)
+QUESTION = SizeQuestion("Gauge 1 moves by 24 m, more than its range of 33 mm. Is the file in mm?", "mm", "mm")
 
 
 def test_an_unlikely_size_is_asked_about_and_the_likely_unit_stands_first(stage: Stage) -> None:
     stage.set_form(unit="m")
     stage.answer(ImportPreview(PREVIEW.overlay, "50 samples", QUESTION))
-    assert "▲ Gauge 1 moves over 24 m, more than its range of 33 mm. Is the file in mm?" in visible_words(
+    assert "▲ Gauge 1 moves by 24 m, more than its range of 33 mm. Is the file in mm?" in visible_words(
         stage.dialog
     )
     assert not stage.button("Import").isEnabled()
