@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import msgspec
 
@@ -40,6 +40,8 @@ _POLL_S = 0.1
 _LINE_BYTES = 1 << 24  # more than that without a newline is no message
 _SESSION_SIGNALS = ("SIGINT", "SIGHUP", "SIGBREAK")
 """They reach all processes of a terminal; the parent decides what they mean."""
+_END_SIGNALS = ("SIGINT", "SIGTERM", "SIGBREAK")
+_STD_INPUT_HANDLE, _SYNCHRONIZE = -10, 0x10_0000  # of Windows
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
@@ -273,6 +275,16 @@ class CommandReader(Generic[Command]):
         self._is_closed = False
         threading.Thread(target=self._read, name="commands", daemon=True).start()
 
+    @classmethod
+    def of_stdin(
+        cls,
+        decode: Callable[[bytes], Iterable[Command]],
+        on_closed: Callable[[], None] = lambda: None,
+        queue_size: int = 1024,
+    ) -> Self:
+        """Read the commands of this process's owner."""
+        return cls(reserve_stdin(), decode, on_closed, queue_size)
+
     @property
     def is_closed(self) -> bool:
         """Tell whether `take` has come to the end of the pipe: the parent has gone or closed it."""
@@ -329,12 +341,47 @@ class EventSender(Generic[Event]):
                     line = line[os.write(self._descriptor, line) :]
 
 
+def reserve_stdin() -> int:
+    """Return a descriptor of stdin for commands alone; whatever else reads stdin finds its end.
+
+    On Windows a library that asks what stdin is waits as long as a thread reads that pipe, as BLAS does while
+    it is loaded (numpy issue 24290). So this is called before the thread starts.
+    """
+    descriptor = os.dup(0)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    if sys.platform == "win32":  # the C runtime of a program without a console does not do it
+        import ctypes
+        import msvcrt
+
+        ctypes.windll.kernel32.SetStdHandle(_STD_INPUT_HANDLE, ctypes.c_void_p(msvcrt.get_osfhandle(0)))
+    return descriptor
+
+
 def reserve_stdout() -> int:
     """Return a descriptor of stdout for events alone; whatever else is printed goes to stderr."""
     descriptor = os.dup(1)
     with contextlib.suppress(OSError):  # a program without a console may have no stderr
         os.dup2(2, 1)
     return descriptor
+
+
+def end_signals() -> list[signal.Signals]:
+    """Signals that ask a program to end: Ctrl-C, `kill`, and Ctrl-Break of Windows."""
+    return [getattr(signal, name) for name in _END_SIGNALS if hasattr(signal, name)]
+
+
+def watch_parent() -> Callable[[], bool]:
+    """Return a function that tells whether the process has ended that started this one."""
+    parent = os.getppid()
+    if sys.platform == "win32":  # the number of the parent stays the same there
+        import ctypes
+
+        kernel = ctypes.windll.kernel32
+        handle = kernel.OpenProcess(_SYNCHRONIZE, False, parent)
+        return lambda: bool(handle) and kernel.WaitForSingleObject(handle, 0) == 0
+    return lambda: os.getppid() != parent
 
 
 def ignore_session_signals(*more: str) -> None:

@@ -371,7 +371,7 @@ def main() -> int:
     )
     try:
         with live_folder() as folder:
-            serve(CommandReader(0, LineDecoder(messages.decode_command).feed), events, folder)
+            serve(CommandReader.of_stdin(LineDecoder(messages.decode_command).feed), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
         _log.error("engine failed: %s", error)
         events.send(messages.Failed(message_of(error)))

@@ -129,8 +129,8 @@ def main() -> None:
     if hasattr(os, "nice"):
         os.nice(_NICE)
     events: EventSender[LiveAnswer] = EventSender(reserve_stdout(), is_transient=lambda _: True)
-    commands: CommandReader[LiveCommand] = CommandReader(
-        0, LineDecoder(decode_live_command).feed, on_closed=lambda: os._exit(0)
+    commands: CommandReader[LiveCommand] = CommandReader.of_stdin(
+        LineDecoder(decode_live_command).feed, on_closed=lambda: os._exit(0)
     )
     follower = importlib.import_module("app.acquisition.live_follower")
     follower.warm_up()

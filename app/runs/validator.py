@@ -140,7 +140,7 @@ def main() -> None:
     _limit_memory()
     events: EventSender[ValidatorEvent] = EventSender(child_process.reserve_stdout())
     decoder = child_process.LineDecoder(child_process.json_decoder(str))
-    paths: CommandReader[str] = CommandReader(0, decoder.feed)
+    paths: CommandReader[str] = CommandReader.of_stdin(decoder.feed)
     events.send(ValidatorReady())
     while not paths.is_closed:
         if (path := paths.take(_IDLE_S)) is not None:

@@ -310,7 +310,9 @@ def main() -> None:
     """Serve until stdin ends. Signals that end a session are left to the engine, whose end is seen here."""
     start_log("writer")
     ignore_session_signals("SIGTERM")
-    commands: CommandReader[WriterCommand] = CommandReader(0, FrameDecoder().feed, queue_size=_QUEUE_COMMANDS)
+    commands: CommandReader[WriterCommand] = CommandReader.of_stdin(
+        FrameDecoder().feed, queue_size=_QUEUE_COMMANDS
+    )
     WriterServer(commands, EventSender(reserve_stdout())).serve()
 
 

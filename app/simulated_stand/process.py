@@ -1,6 +1,5 @@
 """The simulated stand as a process of its own: what runs in it."""
 
-import os
 import signal
 import sys
 import threading
@@ -11,7 +10,15 @@ from pathlib import Path
 import msgspec
 
 from analysis.record import AnalysisError
-from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
+from app.child_process import (
+    CommandReader,
+    EventSender,
+    LineDecoder,
+    end_signals,
+    ignore_session_signals,
+    reserve_stdout,
+    watch_parent,
+)
 from app.log import start_log
 from app.simulated_stand.client import Ready, Refused, StandEvent, Started, TruthChanged
 from app.simulated_stand.options import Gesture, SimulatedStandOptions
@@ -93,7 +100,7 @@ def read_disturbances(
     on_invalid: Callable[[Exception], None] = lambda _: None,
 ) -> CommandReader[Disturbance | Gesture]:
     """Read disturbances and gestures as lines on standard input; `on_invalid` receives faulty lines."""
-    return CommandReader(0, LineDecoder(_decode_disturbance, on_invalid).feed)
+    return CommandReader.of_stdin(LineDecoder(_decode_disturbance, on_invalid).feed)
 
 
 def _decode_disturbance(line: bytes) -> Disturbance | Gesture:
@@ -105,9 +112,9 @@ def _decode_disturbance(line: bytes) -> Disturbance | Gesture:
 
 
 def stop_on_signal_or_orphaned() -> Callable[[], bool]:
-    """Become true with SIGINT or SIGTERM, or when the parent process has gone. For a command line."""
+    """Become true with a signal that asks to end, or when the parent process has gone. For a command line."""
     ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in end_signals():
         signal.signal(number, lambda *_: ended.set())
-    parent = os.getppid()
-    return lambda: ended.is_set() or os.getppid() != parent
+    is_orphaned = watch_parent()
+    return lambda: ended.is_set() or is_orphaned()

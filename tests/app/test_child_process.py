@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -27,6 +28,8 @@ from app.child_process import (
     LineDecoder,
     encode_line,
     json_decoder,
+    spawn,
+    watch_parent,
 )
 from messages.message import message
 from tests.drills.processes import gone
@@ -67,8 +70,8 @@ def event_sender(pipe: Pipe) -> EventSender:
     return EventSender(pipe.write, lambda event: isinstance(event, Health))
 
 
-def wait_until(condition) -> None:
-    for _ in range(500):
+def wait_until(condition, patience_s: float = 5.0) -> None:
+    for _ in range(round(100 * patience_s)):
         if condition():
             return
         time.sleep(0.01)
@@ -138,13 +141,14 @@ def test_an_owner_that_is_gone_is_no_fault(pipe):
 
 ECHO = """
 from app.child_process import CommandReader, EventSender, LineDecoder, json_decoder, reserve_stdout
-events, commands = EventSender(reserve_stdout()), CommandReader(0, LineDecoder(json_decoder(str)).feed)
+events, commands = EventSender(reserve_stdout()), CommandReader.of_stdin(LineDecoder(json_decoder(str)).feed)
 print("this is no event")
 while not commands.is_closed:
     if (command := commands.take(1.0)) is not None:
         events.send(command.upper())
 events.close()
 """
+LIBRARY_ASKS = ECHO.replace("print(", "import sys; events.send(sys.stdin.read() or 'its end'); print(")
 DEAF = "import time; time.sleep(600)"
 
 
@@ -173,6 +177,35 @@ def test_commands_and_events_arrive_in_order_and_stop_ends_the_child():
     assert echo.child.has_ended
     assert echo.child.send("nobody takes this")
     echo.child.stop(60.0)
+
+
+def test_what_else_reads_stdin_finds_its_end_and_takes_no_command():
+    child = Child(LIBRARY_ASKS)
+    assert child.child.send("one")
+    wait_until(lambda: len(child.events) == 2)
+    child.child.stop(60.0)
+    assert child.events == ["its end", "ONE"]
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self/fd").exists(), reason="shows descriptors of other processes on Linux only"
+)
+@pytest.mark.parametrize(
+    "module",
+    [
+        "app.acquisition.engine",
+        "app.acquisition.live_client",
+        "app.runs.exchange.reading_process",
+        "app.runs.validator",
+        "app.runs.writer",
+        "app.simulated_stand",
+    ],
+)
+def test_no_child_reads_the_stdin_that_libraries_see(module):
+    with spawn(module, "{}", discard_stderr=True) as child:
+        stdin = Path(f"/proc/{child.pid}/fd/0")
+        wait_until(lambda: stdin.readlink() == Path(os.devnull), patience_s=60.0)
+        child.kill()
 
 
 def test_queued_commands_are_executed_before_the_child_stops():
@@ -227,3 +260,58 @@ def test_a_child_ends_when_its_parent_is_killed():
         child_pid = int(parent.stdout.readline())
         parent.kill()
     assert gone(child_pid)
+
+
+# --- how a child is started ---
+
+
+def test_a_frozen_build_starts_its_children_by_its_own_name(monkeypatch):
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    monkeypatch.setattr(sys, "executable", "/opt/slipstand/slipstand")
+    assert child_command("app.runs.writer", "x") == [
+        "/opt/slipstand/slipstand",
+        "--run-child",
+        "app.runs.writer",
+        "x",
+    ]
+
+
+def test_what_a_frozen_build_is_asked_for_runs_as_its_child(monkeypatch):
+    """The executable of a frozen build does nothing but call `main` with its arguments."""
+    program = "import sys; sys.frozen = True; from app.__main__ import main; main()"
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    _, *arguments = child_command("app.runs.validator")
+    command = [sys.executable, "-c", program, *arguments]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert b"ValidatorReady" in child.stdout.readline()
+        child.stdin.close()
+        assert child.wait(30.0) == 0
+
+
+@pytest.mark.parametrize(("is_background", "flags"), [(False, 0x0800_0000), (True, 0x0800_4000)])
+def test_windows_opens_no_console_for_a_child(monkeypatch, is_background, flags):
+    given = {}
+    monkeypatch.setattr(subprocess, "CREATE_NO_WINDOW", 0x0800_0000, raising=False)
+    monkeypatch.setattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0x4000, raising=False)
+    monkeypatch.setattr(subprocess, "Popen", lambda _, **options: given.update(options))
+    spawn("app.runs.writer", is_background=is_background)
+    assert given["creationflags"] == flags
+
+
+def test_a_process_sees_that_its_parent_has_ended():
+    watcher = (
+        "import time\nfrom app.child_process import watch_parent\nhas_ended = watch_parent()\n"
+        "print(has_ended(), flush=True)\nwhile not has_ended(): time.sleep(0.01)"
+    )
+    code = (
+        "import subprocess, sys\n"
+        f"child = subprocess.Popen([sys.executable, '-c', {watcher!r}], stdout=subprocess.PIPE)\n"
+        "print(child.pid, child.stdout.readline().decode(), flush=True); sys.stdin.read()"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe, text=True) as parent:
+        child_pid, has_ended = parent.stdout.readline().split()
+        assert has_ended == "False"
+        parent.kill()
+    assert gone(int(child_pid))
+    assert not watch_parent()()

@@ -200,7 +200,7 @@ def main() -> None:
         child_process.reserve_stdout(), lambda event: isinstance(event, ReadingProgress)
     )
     decoder = child_process.LineDecoder(child_process.json_decoder(Request))
-    requests: CommandReader[Request] = CommandReader(0, decoder.feed)
+    requests: CommandReader[Request] = CommandReader.of_stdin(decoder.feed)
     events.send(ReaderReady())
     while not requests.is_closed:
         if (request := requests.take(_IDLE_S)) is not None:
