@@ -13,7 +13,7 @@ from typing import Self
 from app.acquisition import messages
 from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
 from app.acquisition.ring import RingReader, RingRows, open_ring
-from app.child_process import ChildProcess, encode_line, spawn
+from app.child_process import ChildProcess, encode_line, end_signals, spawn
 from messages.message import Message, message
 
 _WAIT_S = 0.1
@@ -135,10 +135,11 @@ def record_runs(
 ) -> Generator[messages.RunEnded]:
     """Record up to `count` runs one after another over one connection, yielding each at its end.
 
-    Ctrl-C (or SIGTERM) ends the run that is being recorded and keeps it; no further run follows. A run
-    without a path was interrupted before the table was pulled back. `on_event` receives each event of the
-    engine, `on_rows` the latest samples, about ten times a second. Raises EngineFailedError without a
-    connection or with impossible settings. Raises KeyboardInterrupt if interrupted before a run was armed.
+    Ctrl-C (or another of `end_signals`) ends the run that is being recorded and keeps it; no further run
+    follows. A run without a path was interrupted before the table was pulled back. `on_event` receives each
+    event of the engine, `on_rows` the latest samples, about ten times a second. Raises EngineFailedError
+    without a connection or with impossible settings. Raises KeyboardInterrupt if interrupted before a run was
+    armed.
     """
     with _interrupts() as interrupted, EngineClient.start(port, stand_file, gauges_file) as engine:
         is_armed = is_stopped = False
@@ -173,7 +174,7 @@ def _interrupts() -> Iterator[threading.Event]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupted
         return
-    numbers = (signal.SIGINT, signal.SIGTERM)
+    numbers = end_signals()
     before = [signal.signal(number, lambda *_: interrupted.set()) for number in numbers]
     try:
         yield interrupted

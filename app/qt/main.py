@@ -8,6 +8,7 @@ import sys
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from app.child_process import end_signals
 from app.log import start_log
 from app.presenters.composition import make_window_presenter, read_personal
 from app.presenters.error_reports import ErrorReporter, error_report
@@ -109,13 +110,13 @@ def _refuse(reason: str) -> int:
 
 
 def _close_on_interrupt(presenter: WindowPresenter) -> list[int]:
-    """Let Ctrl-C and SIGTERM close the window; the returned list takes the received signals."""
+    """Let signals that ask to end, as Ctrl-C, close the window; the returned list takes those received."""
     received: list[int] = []
 
     def close(number: int, _frame: object) -> None:
         received.append(number)
         presenter.close_window()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in end_signals():
         signal.signal(number, close)
     return received
