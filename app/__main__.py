@@ -11,6 +11,8 @@ def main() -> None:
     arguments = sys.argv[1:]
     for name in _THREADS:  # small matrices: more threads only wait for each other
         os.environ.setdefault(name, "1")
+    if getattr(sys, "frozen", False):
+        arguments = _run_if_child(arguments)
     if arguments == ["--version"]:
         from app.version import __version__
 
@@ -23,6 +25,19 @@ def main() -> None:
         from app.cli import run
 
         run()
+
+
+def _run_if_child(arguments: list[str]) -> list[str]:
+    """Run what a parent of the same frozen build asks for, and exit; else return the arguments."""
+    import multiprocessing
+
+    from app.child_process import CHILD_OPTION, run_child
+
+    multiprocessing.freeze_support()
+    if arguments[:1] == [CHILD_OPTION]:
+        run_child(*arguments[1:])
+        sys.exit()
+    return arguments
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import json
 import logging
 import os
 import queue
+import runpy
 import signal
 import subprocess
 import sys
@@ -29,6 +30,8 @@ Command = TypeVar("Command")
 Event = TypeVar("Event")
 Decoded = TypeVar("Decoded")
 
+CHILD_OPTION = "--run-child"
+"""First argument of a frozen build that runs a module instead of the command line."""
 READ_BYTES = 1 << 16  # of one read: what a pipe holds on Linux
 
 START_S = 60.0
@@ -76,6 +79,19 @@ def encode_line(message: object) -> bytes:
         return json.dumps(msgspec.to_builtins(message)).encode() + b"\n"
 
 
+def child_command(module: str, *arguments: str) -> list[str]:
+    """Command that runs a module of the program in a process of its own."""
+    if getattr(sys, "frozen", False):  # its executable is not Python
+        return [sys.executable, CHILD_OPTION, module, *arguments]
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def run_child(module: str, *arguments: str) -> None:
+    """Run a module in this process as `child_command` asks a frozen build to."""
+    sys.argv = [module, *arguments]
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+
+
 def spawn(
     module: str, *arguments: str, is_background: bool = False, discard_stderr: bool = False
 ) -> "subprocess.Popen[bytes]":
@@ -84,7 +100,7 @@ def spawn(
     if is_background:
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", module, *arguments],
+        child_command(module, *arguments),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL if discard_stderr else None,

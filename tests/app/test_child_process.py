@@ -26,6 +26,7 @@ from app.child_process import (
     CommandReader,
     EventSender,
     LineDecoder,
+    child_command,
     encode_line,
     json_decoder,
     spawn,
