@@ -135,7 +135,7 @@ class ChildProcess(Generic[Command, Event]):
         self._on_event = on_event
         self._on_exit = on_exit
         self._commands: queue.Queue[bytes | None] = queue.Queue(queue_size)
-        self._last_event_s = time.monotonic()
+        self._last_event_s = time.perf_counter()
         self._is_killed = False
         self._has_ended = threading.Event()
         self._threads = [
@@ -160,14 +160,14 @@ class ChildProcess(Generic[Command, Event]):
 
     def stop(self, timeout_s: float, *, wait_while_active: bool = False) -> None:
         """Close stdin and wait; kill the child `timeout_s` later, or so long after its last event."""
-        start_s = time.monotonic()
+        start_s = time.perf_counter()
         is_closing = self._put(None, timeout_s)
         while is_closing:
             since_s = max(start_s, self._last_event_s) if wait_while_active else start_s
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(max(0.0, min(_POLL_S, since_s + timeout_s - time.monotonic())))
+                self._process.wait(max(0.0, min(_POLL_S, since_s + timeout_s - time.perf_counter())))
                 break
-            is_closing = time.monotonic() - since_s < timeout_s
+            is_closing = time.perf_counter() - since_s < timeout_s
         self.kill()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_KILLED_S)
@@ -197,7 +197,7 @@ class ChildProcess(Generic[Command, Event]):
     def _read(self) -> None:
         with contextlib.suppress(OSError, ValueError), self._stdout:
             while data := self._stdout.read1(READ_BYTES):  # type: ignore[attr-defined]
-                self._last_event_s = time.monotonic()
+                self._last_event_s = time.perf_counter()
                 for event in self._decoder.feed(data):
                     self._on_event(event)
         code = self._process.wait()

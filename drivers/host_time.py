@@ -20,7 +20,7 @@ elif sys.platform == "darwin":
 else:
 
     def _clocks() -> tuple[int, int]:
-        return time.clock_gettime_ns(time.CLOCK_BOOTTIME), time.monotonic_ns()
+        return time.clock_gettime_ns(time.CLOCK_BOOTTIME), time.clock_gettime_ns(time.CLOCK_MONOTONIC)
 
 
 def host_ns() -> int:

@@ -111,9 +111,9 @@ def transact(link: Link, request: PollRequest, timeout_s: float, *, has_echo: bo
     echo = sent if has_echo or not request.is_repeated else b""
     received = b""
     sent_ns = host_ns()
-    deadline_s = time.monotonic() + timeout_s
+    deadline_s = time.perf_counter() + timeout_s
     link.write(sent)
-    while not request.is_complete(received.removeprefix(echo)) and time.monotonic() < deadline_s:
+    while not request.is_complete(received.removeprefix(echo)) and time.perf_counter() < deadline_s:
         data = link.read()
         if received not in (b"", echo) and not data:
             break

@@ -128,7 +128,7 @@ def _probe_link(
 def listen(
     link: Port | StreamPort,
     on_progress: Callable[[Message], None],
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> ListenResult:
     """Listen at `COMMON_LINE_SETTINGS` until what comes is recognised; nothing is sent.
 
@@ -156,7 +156,7 @@ def listen(
 def query_identity(
     link: Port | StreamPort,
     on_progress: Callable[[Message], None],
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] = time.perf_counter,
     *,
     is_network: bool = False,
 ) -> ListenResult | None:

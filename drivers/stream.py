@@ -169,14 +169,14 @@ class SampleSource(ABC):
         self, link: Link, timeout_s: float, is_good: Callable[[bytes], object]
     ) -> tuple[bytes, bool]:
         """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good."""
-        received, now_s = b"", time.monotonic()
+        received, now_s = b"", time.perf_counter()
         deadline_s = now_s + max(timeout_s, _MIN_WAIT_S)
         while now_s < deadline_s:
             data = link.read()
             received += data
             if data and is_good(received):
                 return received, True
-            before_s, now_s = now_s, time.monotonic()
+            before_s, now_s = now_s, time.perf_counter()
             if now_s - before_s > _STALL_S:
                 deadline_s += now_s - before_s
         return received, False
@@ -227,8 +227,8 @@ class SampleSource(ABC):
         """Send the stop command; returns what was still sent."""
         link.write(self.stop_command)
         received = b""
-        end_s = time.monotonic() + _DRAIN_S
-        while (data := link.read()) and time.monotonic() < end_s:
+        end_s = time.perf_counter() + _DRAIN_S
+        while (data := link.read()) and time.perf_counter() < end_s:
             received += data
         return received
 
@@ -310,7 +310,7 @@ class BatchedReader:
 
     def __init__(self) -> None:
         self._bytes_per_s = _INITIAL_BYTES_PER_S
-        self._ended_s = self._waited_s = time.monotonic()
+        self._ended_s = self._waited_s = time.perf_counter()
         self._busy_until_s = 0.0
 
     def read(self, link: Link, batch_delay_s: float) -> bytes:
@@ -325,15 +325,15 @@ class BatchedReader:
         except DeviceLostError:
             if not parts:
                 raise
-        began_s, self._ended_s = self._ended_s, time.monotonic()
+        began_s, self._ended_s = self._ended_s, time.perf_counter()
         data = b"".join(parts)
         self._bytes_per_s = max(len(data), 1) / max(self._ended_s - began_s, _WAITED_S)
         return data
 
     def _fetch(self, link: Link, batch_delay_s: float, parts: list[bytes]) -> None:
-        due_s = time.monotonic() + batch_delay_s
+        due_s = time.perf_counter() + batch_delay_s
         size, is_full = 0, False
-        while (left_s := due_s - time.monotonic()) > 0.0 and size < _MAX_BATCH_BYTES:
+        while (left_s := due_s - time.perf_counter()) > 0.0 and size < _MAX_BATCH_BYTES:
             longest_s = self._longest_delay_s()
             if not is_full:
                 self._sleep(min(left_s, longest_s))
@@ -342,39 +342,39 @@ class BatchedReader:
                 size += len(parts[-1])
                 is_full = len(parts[-1]) >= _FULL_READ_BYTES
         has_waited = self._read_once(link, parts)
-        is_due = time.monotonic() - self._waited_s > _PUNCTUAL_INTERVAL_S
+        is_due = time.perf_counter() - self._waited_s > _PUNCTUAL_INTERVAL_S
         if not has_waited and batch_delay_s and is_due:
             self._read_once(link, parts)
-            self._waited_s = time.monotonic()
+            self._waited_s = time.perf_counter()
 
     def _longest_delay_s(self) -> float:
-        if time.monotonic() < self._busy_until_s:
+        if time.perf_counter() < self._busy_until_s:
             return max(_BUSY_BYTES / self._bytes_per_s, _BUSY_DELAY_S)
         return _SAFE_BYTES / self._bytes_per_s
 
     def _sleep(self, duration_s: float) -> None:
-        due_s = time.monotonic() + duration_s
+        due_s = time.perf_counter() + duration_s
         time.sleep(duration_s)
-        now_s = time.monotonic()
+        now_s = time.perf_counter()
         if now_s - due_s > _LATE_S:
             self._busy_until_s = now_s + _BUSY_S
 
     def _read_once(self, link: Link, parts: list[bytes]) -> bool:
         """Read once; returns whether the read waited for its bytes."""
-        began_s = time.monotonic()
+        began_s = time.perf_counter()
         parts.append(link.read())
-        has_waited = time.monotonic() - began_s > _WAITED_S
+        has_waited = time.perf_counter() - began_s > _WAITED_S
         if has_waited:
-            self._waited_s = time.monotonic()
+            self._waited_s = time.perf_counter()
         return has_waited
 
 
 def read_for(read: Callable[[], bytes], duration_s: float) -> bytes:
     """What repeated reads bring in `duration_s`, until one brings nothing (a polled device answers each)."""
-    due_s = time.monotonic() + duration_s
+    due_s = time.perf_counter() + duration_s
     parts = [read()]
     try:
-        while parts[-1] and time.monotonic() < due_s:
+        while parts[-1] and time.perf_counter() < due_s:
             parts.append(read())
     except DeviceLostError:  # the next call raises it again
         pass

@@ -263,12 +263,12 @@ class _Patience:
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Keep the window alive until `condition` holds. Raises ScreenshotError."""
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = time.perf_counter() + _PATIENCE_S
         while not condition():
             notice = self._presenter.state.notice
             if notice is not None and notice.tone is Tone.BAD:  # a busy computer is warned of, no more
                 raise ScreenshotError(notice.text)
-            if time.monotonic() > deadline:
+            if time.perf_counter() > deadline:
                 raise ScreenshotError(f"waited {_PATIENCE_S:g} s in vain until {what}. Try again")
             QApplication.processEvents()
             time.sleep(0.005)

@@ -187,12 +187,12 @@ class CountAverager:
                 on_unsteady(average)
 
     def _next_window(self, averager: ReadingAverager, window_s: float) -> AveragedCounts:
-        until_s = time.monotonic() + window_s + TIMEOUT_S
+        until_s = time.perf_counter() + window_s + TIMEOUT_S
         while self._fault is None:
             average = averager.poll(self._channel) if averager.is_active or averager.start() else None
             if average is not None:
                 return average
-            if not self._changed.wait(max(0.0, until_s - time.monotonic())):
+            if not self._changed.wait(max(0.0, until_s - time.perf_counter())):
                 template = N_(
                     "only {samples} samples came in {window_s:g} s. Check cable, power and rate of the device"
                 )

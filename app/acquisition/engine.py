@@ -68,8 +68,8 @@ class PollSchedule:
     def wait(self, latency: Latency) -> None:
         if latency is not Latency.BATCHED or self._is_watched:
             return
-        time.sleep(max(0.0, self._due_s - time.monotonic()))
-        self._due_s = time.monotonic() + _STEP_PERIOD_S
+        time.sleep(max(0.0, self._due_s - time.perf_counter()))
+        self._due_s = time.perf_counter() + _STEP_PERIOD_S
 
 
 class Engine:
@@ -303,7 +303,7 @@ class Engine:
         self._events.send(messages.StateChanged(state, self._history.next_index / self._rate_hz, note))
 
     def _send_health(self) -> None:
-        now_s = time.monotonic()
+        now_s = time.perf_counter()
         if now_s < self._health_due_s:
             return
         self._health_due_s = now_s + _HEALTH_PERIOD_S

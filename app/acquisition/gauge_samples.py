@@ -20,9 +20,9 @@ class NoSamplesError(AcquisitionError):
 def collect_samples(stream: LiveStream, seconds: float, gauges: Gauges) -> tuple[GaugeSamples, GaugeSamples]:
     """Collect samples of both gauges from now on. Raises NoSamplesError, AcquisitionError, DriverError."""
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
-    ends_s = time.monotonic() + seconds + TIMEOUT_S
+    ends_s = time.perf_counter() + seconds + TIMEOUT_S
     while sum(map(len, taken)) < wanted:
-        if time.monotonic() > ends_s:
+        if time.perf_counter() > ends_s:
             raise NoSamplesError(
                 "only {samples} of {wanted} samples came in {seconds:g} s. Check cable, power and rate"
                 " of the device",

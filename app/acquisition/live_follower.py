@@ -45,12 +45,12 @@ def _follow(
             if not isinstance(command, ClockUpdate):
                 return command
             run.update_clock(command.time_base)
-        began, computed = time.monotonic(), time.process_time()
+        began, computed = time.perf_counter(), time.process_time()
         answer = run.answer()
         if answer is not None:
             events.send(answer)
         # Other processes get as much processor time as the answer took.
-        time.sleep(max(began + PERIOD_S - time.monotonic(), time.process_time() - computed))
+        time.sleep(max(began + PERIOD_S - time.perf_counter(), time.process_time() - computed))
     return None
 
 

@@ -106,7 +106,7 @@ def with_device_filters(gauges: Gauges, filters: tuple[ChannelFilter | None, Cha
 def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
     """Create the journal of a run beside the file that the run will have. Raises JournalError."""
     began = metadata.format_start("%Y%m%dT%H%M%S")
-    parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
+    parts = (began, metadata.series or "run", str(os.getpid()), str(time.perf_counter_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
     header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")
     return create_journal(path, header, journal_fallback_folders())

@@ -157,8 +157,8 @@ class StatusLine:
     def _show(self, text: str) -> None:
         if self._live is not None:
             self._live.update(text)
-        elif time.monotonic() - self._told_s > _EVERY_S:
-            self._told_s = time.monotonic()
+        elif time.perf_counter() - self._told_s > _EVERY_S:
+            self._told_s = time.perf_counter()
             out.print_status(text)
 
 

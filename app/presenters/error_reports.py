@@ -31,7 +31,7 @@ class ErrorReport:
 class ErrorReporter:
     """Takes reports from any thread, logs them, and hands them to the window; `clock` is monotonic (s)."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         self._clock = clock
         self._waiting: deque[ErrorReport] = deque()
         self._last = (EMPTY, float("-inf"))

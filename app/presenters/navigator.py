@@ -23,7 +23,7 @@ class StandContext:
     directory: Path
     today: Callable[[], datetime.date] = datetime.date.today
     """Current date, for the validity of calibrations."""
-    clock: Callable[[], float] = time.monotonic
+    clock: Callable[[], float] = time.perf_counter
 
     def pullback_m(self, series: str) -> float:
         return self.stand.series(series).pullback_m

@@ -270,11 +270,11 @@ class _TaskProcess:
 
     def detach(self) -> None:
         self._pipe.close()
-        self._end_s = time.monotonic() + _END_S
+        self._end_s = time.perf_counter() + _END_S
 
     def has_ended(self) -> bool:
         """Tell whether the process has ended; one that hangs is killed after `_END_S`."""
-        if self._process.is_alive() and time.monotonic() > self._end_s:
+        if self._process.is_alive() and time.perf_counter() > self._end_s:
             _log.warning("killed process %s, which did not end", self._process.pid)
             self._process.kill()
             self._process.join()
@@ -284,7 +284,7 @@ class _TaskProcess:
         return True
 
     def join(self) -> None:
-        self._process.join(max(0.0, self._end_s - time.monotonic()))
+        self._process.join(max(0.0, self._end_s - time.perf_counter()))
         self._drop_lifeline()
         while not self.has_ended():
             time.sleep(0.001)

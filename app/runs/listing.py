@@ -171,7 +171,7 @@ def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
         else:
             changed.append(file)
     found = [summary for _, summary in index.values()]
-    saved_at = time.monotonic()
+    saved_at = time.perf_counter()
     with Validator() as validator:
         for done, file in enumerate(changed):
             progress(done, len(changed))
@@ -179,9 +179,9 @@ def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
             found.append(summary)
             if lasts:
                 index[file.path] = (file.stamp, summary)
-            if time.monotonic() - saved_at > _SAVE_S:
+            if time.perf_counter() - saved_at > _SAVE_S:
                 _save_index(folder, index)
-                saved_at = time.monotonic()
+                saved_at = time.perf_counter()
     if changed or len(index) != len(known):
         _save_index(folder, index)
     return found

@@ -31,14 +31,14 @@ class FileLock:
 
     def acquire(self) -> Self:
         """Take the lock. Raises LockHeldError, or OSError where the folder cannot be written to."""
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = time.perf_counter() + _PATIENCE_S
         while True:  # a reader may hold it for the blink of its own test
             file = self.path.open("a+b")
             if _try_lock(file) and _is_still_at(file, self.path):
                 self._file = file
                 return self
             file.close()
-            if time.monotonic() > deadline:
+            if time.perf_counter() > deadline:
                 raise LockHeldError(str(self.path))
             time.sleep(0.01)
 

@@ -144,7 +144,7 @@ class RunWriter:
         self._raw_bytes_checksum = 0
         self._pending: list[Columns] = []
         self._pending_bytes = 0
-        self._flushed_at = time.monotonic()
+        self._flushed_at = time.perf_counter()
 
     def append(self, block: RunBlock) -> None:
         """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
@@ -160,7 +160,7 @@ class RunWriter:
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
-        if self._pending and time.monotonic() - self._flushed_at >= _FLUSH_S:
+        if self._pending and time.perf_counter() - self._flushed_at >= _FLUSH_S:
             self.flush()
 
     def flush(self) -> None:
@@ -174,7 +174,7 @@ class RunWriter:
         except (OSError, RuntimeError) as error:
             self.usable = False
             raise disk.storage_error(self.path, error) from None
-        self._flushed_at = time.monotonic()
+        self._flushed_at = time.perf_counter()
 
     def close(self, end: EndMetadata) -> StoredRun:
         """Complete the file, read it back, bring it to disk. Raises WriteError: keep the journal then."""

@@ -64,8 +64,8 @@ def serve(
         publish(stand.truth())
         while not has_ended():
             while (disturbance := next_disturbance()) is not None:
-                stand.disturb(disturbance, time.monotonic_ns())
-            transport.wait(stand.step(time.monotonic_ns()))
+                stand.disturb(disturbance, time.perf_counter_ns())
+            transport.wait(stand.step(time.perf_counter_ns()))
         publish(stand.truth())
     finally:
         transport.close()

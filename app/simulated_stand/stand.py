@@ -119,5 +119,5 @@ def _setup(options: SimulatedStandOptions) -> DeviceSetup:
         faults=FaultRates(options.drop, options.flip, options.truncate),
         disturbances=tuple(parse_disturbance(text) for text in options.disturbances),
         seed=options.seed,
-        began_ns=None if unix_s is None else time.monotonic_ns() - round((time.time() - unix_s) * 1e9),
+        began_ns=None if unix_s is None else time.perf_counter_ns() - round((time.time() - unix_s) * 1e9),
     )

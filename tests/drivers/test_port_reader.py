@@ -113,3 +113,52 @@ def test_answers_of_an_asked_device_are_handed_on_together():
     assert read_for(Wire(b"a", DeviceLostError("gone")).read, 0.02) == b"a"
     with pytest.raises(DeviceLostError):
         read_for(Wire(DeviceLostError("gone")).read, 0.02)
+
+
+# --- the clock of Windows ----------------------------------------------------------------------
+
+COARSE_S = 1 / 64
+"""Step of `time.monotonic` on Windows before Python 3.13."""
+
+
+class WindowsClock:
+    """Stands for the module `time`; it goes on by what is slept and by what a device lets wait."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+
+    def perf_counter(self) -> float:
+        return self.now_s
+
+    def monotonic(self) -> float:
+        return self.now_s // COARSE_S * COARSE_S
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += max(0.0, duration_s)
+
+
+class Stream:
+    """A link whose device sends one byte in each `PERIOD_S`; a read without any waits for the next."""
+
+    PERIOD_S = 0.0005
+    READ_S = 5e-5
+
+    def __init__(self, clock: WindowsClock) -> None:
+        self._clock, self._due_s = clock, clock.now_s + self.PERIOD_S
+
+    def read(self) -> bytes:
+        self._clock.now_s = max(self._clock.now_s + self.READ_S, self._due_s)
+        count = int((self._clock.now_s - self._due_s) / self.PERIOD_S) + 1
+        self._due_s += count * self.PERIOD_S
+        return b"x" * count
+
+
+def test_reads_are_as_frequent_as_asked_beside_a_coarse_clock(monkeypatch):
+    clock = WindowsClock()
+    monkeypatch.setattr("drivers.stream.time", clock)
+    gathering, link, reads = BatchedReader(), Stream(clock), 0
+    while clock.now_s < 1001.0:
+        gathering.read(link, 0.003)
+        reads += 1
+    assert reads > 250
+    assert gathering._busy_until_s == 0.0, "no computer is taken for a busy one"

@@ -28,6 +28,7 @@ from app.runs.disk import is_disk_full
 from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
 from drivers.clock import TimeBase
+from drivers.host_time import host_ns
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
@@ -89,7 +90,7 @@ class Journal:
     def append_metadata(self, note: MetadataRecord) -> None:
         """Append what became known; a failure is reported at the next read."""
         with contextlib.suppress(JournalError):
-            self.append(msgspec.json.encode(note), time.monotonic_ns(), RecordKind.NOTE)
+            self.append(msgspec.json.encode(note), host_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
         """Bring everything to disk and close the file. Raises like `append`."""
@@ -136,12 +137,12 @@ class Journal:
 
     def _write_for(self, duration_s: float) -> bool:
         record = self._next()
-        deadline = time.monotonic() + duration_s
+        deadline = time.perf_counter() + duration_s
         while record is not None:
             self._file.append(record)
             self.written += len(record)
             try:
-                record = self._next(max(0.0, deadline - time.monotonic()))
+                record = self._next(max(0.0, deadline - time.perf_counter()))
             except queue.Empty:
                 break
         if record is None:
@@ -153,7 +154,7 @@ class Journal:
 
 def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:
     """Create a journal, which moves to a fallback folder when its own fails. Raises JournalError."""
-    record = encode_record(msgspec.json.encode(header), time.monotonic_ns(), RecordKind.NOTE)
+    record = encode_record(msgspec.json.encode(header), host_ns(), RecordKind.NOTE)
     try:
         file = create_journal_file(path, record, fallback_folders)
     except LockHeldError:

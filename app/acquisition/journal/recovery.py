@@ -195,9 +195,9 @@ def _identifier(path: Path) -> str:
 
 def _await_writer(summary: JournalSummary, folder: Path) -> None:
     """Wait for the writer, which outlives its engine until its file is closed. Raises RecoveryError."""
-    deadline = time.monotonic() + _WRITER_S
+    deadline = time.perf_counter() + _WRITER_S
     while summary.opened is not None and _is_being_written(summary, folder):
-        if time.monotonic() > deadline:
+        if time.perf_counter() > deadline:
             raise RecoveryError(
                 "{path}: its run file is still being written. Try again in a minute", path=summary.path
             )

@@ -122,8 +122,8 @@ class RecordPresenter(Presenter[state.RecordState]):
 
     def close(self) -> None:
         """Wait until decisions are stored, then end the worker."""
-        until_s = time.monotonic() + self.CLOSE_S
-        while self._unfinished and self._files.is_busy and time.monotonic() < until_s:
+        until_s = time.perf_counter() + self.CLOSE_S
+        while self._unfinished and self._files.is_busy and time.perf_counter() < until_s:
             self._files.poll()
             time.sleep(0.005)
         self._files.close()

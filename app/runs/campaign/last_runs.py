@@ -30,9 +30,9 @@ def read_last_runs(folder: Path, stand_name: str) -> LastRuns:
     simulated ones beside recorded ones. A folder that does not exist has none.
     """
     files = sorted(find_run_files(folder), key=_changed_s, reverse=True)[:RUNS_MOST]
-    ends_s, found, looked_at = time.monotonic() + _LONGEST_S, list[CollectedRun](), 0
+    ends_s, found, looked_at = time.perf_counter() + _LONGEST_S, list[CollectedRun](), 0
     for path in files:
-        if time.monotonic() > ends_s:
+        if time.perf_counter() > ends_s:
             break
         looked_at += 1
         found.append(collect_kept(path))

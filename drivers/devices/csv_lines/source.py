@@ -346,10 +346,10 @@ class PolledLinesSource(CsvLinesSource):
         def read() -> bytes:
             return self._with_time(transact(link, self._request, self._answer_s))
 
-        deadline_s = time.monotonic() + self.timeout_s
+        deadline_s = time.perf_counter() + self.timeout_s
         while not self._has_good_line(received):
             received += read()
-            if time.monotonic() > deadline_s:
+            if time.perf_counter() > deadline_s:
                 raise self.no_data_error(received)
 
     def _ask_identity(self, link: Link) -> None:

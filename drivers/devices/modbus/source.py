@@ -134,13 +134,13 @@ class ModbusSource(SampleSource):
             self._zero(link)
             self._await_responses(link)
         self._measure_timing(link)
-        self._last_answer_s = time.monotonic()
+        self._last_answer_s = time.perf_counter()
         return b""
 
     def resume(self, link: Link) -> bytes:
         self._await_responses(link)
         self._response_overdue = self._was_invalid = False
-        self._last_answer_s = time.monotonic()
+        self._last_answer_s = time.perf_counter()
         return b""
 
     def set_poll_rate(self, rate_hz: float) -> None:
@@ -195,7 +195,7 @@ class ModbusSource(SampleSource):
         return Exchange(transaction, earlier, data, request.parse_response(data))
 
     def _check_silence(self, has_answered: bool) -> None:
-        now_s = time.monotonic()
+        now_s = time.perf_counter()
         if has_answered:
             self._last_answer_s = now_s
         elif self._map.framing is Framing.TCP and now_s - self._last_answer_s > _SILENCE_S:
@@ -203,7 +203,7 @@ class ModbusSource(SampleSource):
             raise DeviceLostError(template, seconds=_SILENCE_S)
 
     def _await_responses(self, link: Link) -> None:
-        deadline_s = time.monotonic() + self.timeout_s
+        deadline_s = time.perf_counter() + self.timeout_s
         received = drain(link)
         for request in self._poll.requests:
             last: Response | None = None
@@ -213,7 +213,7 @@ class ModbusSource(SampleSource):
                     break
                 received += found.earlier + found.data + drain(link)
                 last = found.response if last is None or found.data else last
-                if time.monotonic() > deadline_s:
+                if time.perf_counter() > deadline_s:
                     raise self._no_response_error(request, last, received)
 
     def _no_response_error(self, request: Request, response: Response, received: bytes) -> Exception:

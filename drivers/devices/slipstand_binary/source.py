@@ -47,7 +47,7 @@ class SlipstandBinarySource(SampleSource):
     def start(self, link: Link) -> bytes:
         """Accept a device that does not answer `IDENTIFY` if its frames come; its rate is then measured."""
         self.prepare()
-        deadline_s = time.monotonic() + self.timeout_s
+        deadline_s = time.perf_counter() + self.timeout_s
         self.silence(link)
         device = self.request(link, codec.IDENTIFY, codec.find_identity, _TRIES)
         if device is not None:
@@ -55,7 +55,7 @@ class SlipstandBinarySource(SampleSource):
             self._rate_hz = device.rate_hz
             self._identity = DeviceIdentity(DRIVER.name, "slipstand-fw", firmware=device.version)
         link.write(codec.START)
-        return self._await_frames(link, deadline_s - time.monotonic(), measure=device is None)
+        return self._await_frames(link, deadline_s - time.perf_counter(), measure=device is None)
 
     def resume(self, link: Link) -> bytes:
         received, sends = self.await_data(link, _LISTEN_S, codec.has_frame)

@@ -58,13 +58,13 @@ class Clock:
         self.devices: list[SimulatedStandDevice] = []
         self.shortest_step_s = STEP_S
 
-    def monotonic_ns(self) -> int:
+    def perf_counter_ns(self) -> int:
         return self.now_ns
 
-    def monotonic(self) -> float:
+    def perf_counter(self) -> float:
         return self.now_ns * 1e-9
 
-    time = monotonic
+    time = perf_counter
 
     def step(self, longest_s: float = READ_S) -> None:
         """Go on until a device has something to do, or for the shortest step."""
@@ -124,8 +124,8 @@ class SteppedLink:
         self._taken = 0
 
     def read(self) -> bytes:
-        end_s = self._clock.monotonic() + READ_S
-        while self._transport.sent == self._taken and self._clock.monotonic() < end_s:
+        end_s = self._clock.perf_counter() + READ_S
+        while self._transport.sent == self._taken and self._clock.perf_counter() < end_s:
             self._clock.step()
         data = b""
         while self._taken + len(data) < self._transport.sent:
@@ -145,7 +145,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
         monkeypatch.setattr(f"{module}.time", clock)
     monkeypatch.setattr("app.simulated_stand.stand.time", clock)
     for module in ("drivers.host_time", "drivers.stream", "drivers.polling"):
-        monkeypatch.setattr(f"{module}.host_ns", clock.monotonic_ns)
+        monkeypatch.setattr(f"{module}.host_ns", clock.perf_counter_ns)
     return clock
 
 
@@ -165,8 +165,8 @@ def opened(
 
 def rows_of_one(source: SampleSource, link: SteppedLink, clock: Clock) -> Iterator[SampleBlock]:
     yield from decoded(source, source.start(link), clock)
-    end_s = clock.monotonic() + RECORDED_S
-    while clock.monotonic() < end_s:
+    end_s = clock.perf_counter() + RECORDED_S
+    while clock.perf_counter() < end_s:
         yield from decoded(source, source.read(link), clock)
 
 
@@ -183,7 +183,7 @@ def rows_of_two(
         data = source.start(link)
         first += wrap(gauge, clock.now_ns, data)
     yield from decoded(pair, first, clock)
-    while clock.monotonic() < end_s:
+    while clock.perf_counter() < end_s:
         for gauge, source, link in halves:
             data = source.read(link)
             yield from decoded(pair, wrap(gauge, clock.now_ns, data) if data else b"", clock)

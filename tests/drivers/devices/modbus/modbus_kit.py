@@ -44,7 +44,7 @@ class Clock:
     def host_ns(self) -> int:
         return self.now_ns
 
-    def monotonic(self) -> float:
+    def perf_counter(self) -> float:
         return self.now_ns * 1e-9
 
     def sleep(self, seconds: float) -> None:
