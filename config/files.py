@@ -15,6 +15,7 @@ import msgspec
 import platformdirs
 
 from config import schema
+from config.durable_files import FileInUseError, file_in_use, replace_file, sync_descriptor
 from config.schema import ConfigError, Gauge, GaugeCheck, GaugeChecks, Gauges, PublishedRow, Settings, Stand
 from messages.i18n import N_
 
@@ -182,7 +183,7 @@ def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
                 document = tomlkit.parse(path.read_text(encoding="utf-8"))
             except ConfigError:
                 aside = _free_name(f"{path.stem}-unreadable-{day.isoformat()}")
-                path.replace(aside)
+                replace_file(path, aside)
         document.update(values)
         path.parent.mkdir(parents=True, exist_ok=True)
         _replace(path, tomlkit.dumps(document))
@@ -208,20 +209,22 @@ def _free_name(stem: str) -> Path:
 def _replace(path: Path, text: str) -> None:
     beside = path.with_suffix(".toml.new")
     _write(beside, text, "w")
-    beside.replace(path)
+    replace_file(beside, path)
 
 
 def _write(path: Path, text: str, mode: str) -> None:
     with path.open(mode, encoding="utf-8", newline="") as file:
         file.write(text)
         file.flush()
-        os.fsync(file.fileno())
+        sync_descriptor(file.fileno())
 
 
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[None]:
     try:
         yield
+    except FileInUseError:
+        raise ConfigError(file_in_use(path).message) from None
     except OSError as error:
         template = N_("{path}: cannot be written ({fault}). Check the folder, its rights and its disk")
         raise ConfigError(template, path=path, fault=error.strerror or error) from None

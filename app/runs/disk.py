@@ -4,12 +4,14 @@ import errno
 import os
 import shutil
 import sys
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
+from config.durable_files import file_in_use, is_in_use, remove_file, replace_file, sync_descriptor
 from messages.i18n import N_
 
 MARGIN_BYTES = 1 << 20
@@ -17,6 +19,8 @@ MARGIN_BYTES = 1 << 20
 
 _NO_SPACE = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 """No space on the disk, in the quota, or within the largest size of a file."""
+LONGEST_PATH = 239 if sys.platform == "win32" else None
+"""Windows takes 259 characters unless it is set up otherwise; names of unfinished files are 20 longer."""
 _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 
 
@@ -78,14 +82,28 @@ def storage_error(path: Path, error: Exception) -> RunError:
     """Convert an error of a write to `path`. HDF5 states its `errno` only in its text."""
     number = getattr(error, "errno", None)
     words = str(error).replace("\n", " ")
+    if is_in_use(error, path):
+        return WriteError(file_in_use(path).message)
     if isinstance(error, FileExistsError):
         return RunExistsError("{path} exists already and is not overwritten. Choose another name", path=path)
     if number in _NO_SPACE or any(f"errno = {code}," in words for code in _NO_SPACE):
         return DiskFullError(
             "{path}: the disk or its quota is full. Free some space or take another disk", path=path
         )
+    if LONGEST_PATH is not None and len(str(path)) > LONGEST_PATH and isinstance(error, FileNotFoundError):
+        template = N_("{path}: Windows takes no path of {length} characters. Choose a folder near its drive")
+        return WriteError(template, path=path, length=len(str(path)))
     template = N_("{path}: cannot be written ({reason}). Check the folder, its rights and its disk")
     return WriteError(template, path=path, reason=getattr(error, "strerror", None) or words)
+
+
+def is_writable(folder: Path) -> bool:
+    """Tell whether files can be made in a folder. Only the attempt shows it on Windows."""
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
 
 
 def make_folder(folder: Path) -> None:
@@ -103,7 +121,7 @@ def make_folder(folder: Path) -> None:
 def sync_file(path: Path) -> None:
     """Bring the contents of a file to disk, so that they last through a power cut."""
     with path.open("r+b") as file:
-        os.fsync(file.fileno())
+        sync_descriptor(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
@@ -113,7 +131,7 @@ def sync_folder(folder: Path) -> None:
     try:
         handle = os.open(folder, os.O_RDONLY)
         try:
-            os.fsync(handle)
+            sync_descriptor(handle)
         finally:
             os.close(handle)
     except OSError as error:
@@ -132,12 +150,12 @@ def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
             claimed = True
         yield temporary
         sync_file(temporary)
-        temporary.replace(path)
+        replace_file(temporary, path)
         claimed = False
         sync_folder(path.parent)
     except OSError as error:
         raise storage_error(path, error) from None
     finally:
-        temporary.unlink(missing_ok=True)
+        remove_file(temporary)
         if claimed:
-            path.unlink(missing_ok=True)
+            remove_file(path)

@@ -5,6 +5,7 @@ import traceback
 from pathlib import Path
 from typing import cast
 
+from config.durable_files import file_in_use, is_in_use
 from messages.i18n import N_
 from messages.message import Message, MessageError, message
 
@@ -25,6 +26,10 @@ class NotARunError(RunError):
 
 class BeingRecordedError(RunError):
     """The run is still being written. Live samples come from the engine, not from the file."""
+
+
+class RunInUseError(RunError):
+    """Another program has the file open and lets nobody else read it. The file may be sound."""
 
 
 class DamagedRunError(RunError):
@@ -89,11 +94,18 @@ def no_such_run(path: Path) -> RunNotFoundError:
     return RunNotFoundError("{path}: there is no such file. Give the path of a run", path=path)
 
 
-def unreadable(path: Path, error: OSError) -> RunNotFoundError:
+def unreadable(path: Path, error: OSError) -> RunError:
     """Error for a file that the operating system refuses to open."""
+    if is_in_use(error, path):
+        return in_use(path)
     return RunNotFoundError(
         "{path}: cannot be read ({reason}). Check its rights", path=path, reason=error.strerror
     )
+
+
+def in_use(path: Path | str) -> RunInUseError:
+    """Error for a file that another program has open for itself."""
+    return RunInUseError(file_in_use(path).message)
 
 
 def being_recorded(path: Path | str) -> BeingRecordedError:

@@ -17,8 +17,9 @@ from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
 from app.runs.metadata_io import read_end_metadata, read_identifier
 from app.runs.reader import check_openable, read_file
-from app.runs.rewrite import editing_lock, replace_run
+from app.runs.rewrite import editing_lock
 from app.runs.validator import Validator
+from config.durable_files import remove_file, replace_file
 from messages.i18n import N_
 
 TRASH = ".trash"
@@ -43,7 +44,7 @@ def copy_run_into(path: Path, folder: Path) -> Path:
         with atomic_write(target, replace=True) as temporary:
             shutil.copyfile(path, temporary)
     except BaseException:
-        target.unlink()
+        remove_file(target)
         raise
     return target
 
@@ -144,7 +145,7 @@ def move_to_free_name(rebuilt: Path, target: Path) -> Path:
         try:
             with recording_lock(path):  # as a recording holds it that looks for a name
                 if not path.exists():
-                    rebuilt.rename(path)
+                    replace_file(rebuilt, path)
                     sync_folder(path.parent)
                     return path
         except LockHeldError:
@@ -160,9 +161,10 @@ def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | N
     try:
         with recording_lock(target), editing_lock(target):  # also removes the lock file of a dead writer
             if aside is not None:
-                target.rename(aside)
+                replace_file(target, aside)
                 sync_folder(target.parent)
-            replace_run(rebuilt, target)
+            replace_file(rebuilt, target)
+            sync_folder(target.parent)
     except LockHeldError:
         raise errors.WriteError(
             "{path} is being changed by another program. Try again", path=target
@@ -189,9 +191,9 @@ def _move(path: Path, folder: Path) -> Path:
     """Claim a free name, then move: nothing is overwritten, whoever else moves at the same time."""
     target = _claim_name(folder / path.name)
     try:
-        path.replace(target)
+        replace_file(path, target)
     except OSError as error:
-        target.unlink(missing_ok=True)
+        remove_file(target)
         raise storage_error(path, error) from None
     for changed in (folder, path.parent):
         with contextlib.suppress(OSError):  # the run is moved; only a power cut could still undo that

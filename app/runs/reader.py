@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from app.runs import metadata_io, schema
 from app.runs.blocks import count_flags
 from app.runs.columns import count_paths, read_column, signal_paths, stored_rows
-from app.runs.errors import NotARunError, RunError, being_recorded, damaged, no_such_run, unreadable
+from app.runs.errors import NotARunError, RunError, being_recorded, damaged, in_use, no_such_run, unreadable
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.metadata_io import Change
 from app.runs.saved_analyses import SavedAnalysis, read_analyses
 from app.runs.validator import Validator
+from config.durable_files import is_in_use
 from config.schema import Gauges
 from drivers.samples import ABSENT_BY_GAUGE, Losses
 
@@ -148,6 +149,8 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
     except RunError:
         raise
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError) as error:
+        if is_in_use(error, path):
+            raise in_use(path) from None
         raise damaged(path, error) from None
 
 

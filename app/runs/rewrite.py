@@ -3,7 +3,6 @@
 import datetime
 import os
 import shutil
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,9 +14,9 @@ from app.runs.disk import check_free_space, storage_error, sync_file, sync_folde
 from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 from app.runs.validation import validate_file
+from config.durable_files import remove_file, replace_file
 
 _ROOM_BYTES = 1 << 22  # beyond the size of the file: a long analysis with its tables needs less than 1 MB
-_REPLACE_S = 5.0  # Windows refuses to replace a file while it is read; a whole run is read in less
 
 
 def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
@@ -33,7 +32,8 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     try:
         with editing_lock(path):
             _make_copy(path, copy, change)
-            replace_run(copy, path)
+            replace_file(copy, path)
+            sync_folder(path.parent)
     except LockHeldError:
         raise UnsuitableRunError("{path} is being changed by another program. Try again", path=path) from None
     except FileNotFoundError:
@@ -41,7 +41,7 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     except (OSError, RuntimeError) as error:
         raise storage_error(path, error) from None
     finally:
-        copy.unlink(missing_ok=True)
+        remove_file(copy)
 
 
 def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> None:
@@ -75,17 +75,3 @@ def _measured(file: h5py.File) -> dict[str, int]:
 def editing_lock(path: Path) -> FileLock:
     """Lock that the process holds which replaces a closed run."""
     return FileLock(path.with_name(f".{path.name}.editing"))
-
-
-def replace_run(copy: Path, path: Path) -> None:
-    """Put the copy in place, with retries on Windows while somebody reads the run."""
-    deadline = time.monotonic() + _REPLACE_S
-    while True:
-        try:
-            copy.replace(path)
-            break
-        except PermissionError:
-            if os.name != "nt" or time.monotonic() > deadline:
-                raise
-            time.sleep(0.05)
-    sync_folder(path.parent)

@@ -22,6 +22,7 @@ from app.log import start_log
 from app.runs import errors
 from app.runs.summary import RunSummary, summarize_file
 from app.runs.validation import validate_file
+from config.durable_files import is_in_use
 from messages.i18n import N_
 from messages.message import Message
 
@@ -31,10 +32,11 @@ _MEMORY_BYTES = 2 << 30
 _CPU_S = 2.0
 _IDLE_S = 60.0
 
-Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
+Fault = Literal["", "not-a-run", "being-recorded", "in-use", "damaged"]
 _ERRORS: dict[Fault, type[errors.RunError]] = {
     "not-a-run": errors.NotARunError,
     "being-recorded": errors.BeingRecordedError,
+    "in-use": errors.RunInUseError,
     "damaged": errors.DamagedRunError,
 }
 
@@ -189,6 +191,8 @@ def _validate(path: str) -> ValidationReply:
     except BlockingIOError:
         return ValidationReply(fault="being-recorded", message=errors.being_recorded(path).message)
     except Exception as error:
+        if is_in_use(error, Path(path)):
+            return ValidationReply(fault="in-use", message=errors.in_use(path).message)
         return ValidationReply(fault="damaged", message=errors.damaged(path, error).message)
 
 

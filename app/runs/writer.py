@@ -29,6 +29,7 @@ from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJ
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
+from config.durable_files import remove_file, replace_file
 from drivers.samples import Losses
 from messages.i18n import N_
 
@@ -109,9 +110,9 @@ def write_run(
             writer.append(block)
         stored = writer.close(end)
         if replace:
-            target.replace(path)
+            replace_file(target, path)
     except BaseException as error:
-        target.unlink(missing_ok=True)
+        remove_file(target)
         if isinstance(error, OSError):
             raise disk.storage_error(path, error) from None
         raise

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
+from config.durable_files import replace_file
 from drivers.simulated.faults import Disturbance
 from drivers.simulated.stream_sender import TransmissionLog
 
@@ -57,7 +58,7 @@ def write_truth(path: Path, truth: Truth) -> None:
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         partial.write_bytes(msgspec.json.format(msgspec.json.encode(truth)))
-        partial.replace(path)
+        replace_file(partial, path)
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from typing import IO
 from app.runs.disk import has_free_space, sync_folder
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
+from config.durable_files import sync_descriptor
 
 _log = logging.getLogger(__name__)
 
@@ -30,7 +31,7 @@ class FileSync(threading.Thread):
 
     def run(self) -> None:
         try:
-            os.fsync(self._descriptor)
+            sync_descriptor(self._descriptor)
         except OSError as error:
             self.failure = error
         finally:
@@ -79,7 +80,7 @@ class JournalFile:
         """Wait until all is on disk. Raises OSError where no folder takes it."""
         self._finish_sync()
         try:
-            os.fsync(self._file.fileno())
+            sync_descriptor(self._file.fileno())
         except OSError as error:
             self._move(error)
 
@@ -139,7 +140,7 @@ class JournalFile:
             file.truncate()
             _write_all(file, self._first)
             self.size = len(self._first)
-        os.fsync(file.fileno())
+        sync_descriptor(file.fileno())
         with contextlib.suppress(OSError):
             sync_folder(self.path.parent)
         return is_readable

@@ -32,6 +32,7 @@ from app.runs.file_operations import (
 from app.runs.journal import find_journals
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.schema import SUFFIX
+from config.durable_files import remove_file
 from messages.i18n import N_
 from messages.message import EMPTY, Message, as_message, message, message_of
 
@@ -106,7 +107,7 @@ def recover_journal(
         with recording_lock(journal):
             summary = read_summary(journal)
             recovered = _recover(summary, _place(summary, original_folder), progress)
-            journal.unlink()
+            remove_file(journal)
             sync_folder(journal.parent)
     except LockHeldError:
         return _being_recorded(journal)

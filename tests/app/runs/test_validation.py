@@ -3,6 +3,7 @@ import random
 import signal
 import sys
 import tracemalloc
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -16,10 +17,11 @@ from app.runs.errors import (
     DamagedRunError,
     NotARunError,
     RunError,
+    RunInUseError,
     RunNotFoundError,
     ValidationTimeoutError,
 )
-from app.runs.reader import open_run
+from app.runs.reader import check_openable, open_run
 from app.runs.validator import Validator
 from app.runs.writer import create_run
 
@@ -83,6 +85,34 @@ def test_a_file_open_for_writing_elsewhere_is_being_recorded(run_path, validator
     """Even without our own lock file: HDF5 locks the file too."""
     with h5py.File(run_path, "r+"), pytest.raises(BeingRecordedError):
         open_run(run_path, validator=validator)
+
+
+@pytest.mark.parametrize("number", [32, 33])
+def test_a_file_that_another_program_locks_is_not_called_damaged(run_path, monkeypatch, number):
+    """Errors of Windows; the validator answers in its own process, so its function is called."""
+
+    def refuse(*_, **__):
+        text = f"Unable to synchronously open file (errno = 13, Win32 GetLastError() = {number})"
+        raise OSError(text)
+
+    monkeypatch.setattr(h5py, "File", refuse)
+    reply = validator_module._validate(str(run_path))
+    assert (reply.fault, reply.summary) == ("in-use", None)
+    assert str(reply.message) == f"{run_path} is open in another program. Close it there and try again"
+    with pytest.raises(RunInUseError, match="open in another program"):
+        open_run(run_path, trusted=True)
+
+
+def test_a_file_that_windows_opens_for_nobody_else_is_not_said_to_lack_rights(run_path, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(RunNotFoundError, match="Check its rights"):
+        check_openable(run_path)
+    monkeypatch.setattr("config.durable_files.is_held_elsewhere", lambda _: True)
+    with pytest.raises(RunInUseError, match="open in another program"):
+        check_openable(run_path)
 
 
 def _external_link(file):
