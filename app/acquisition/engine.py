@@ -22,6 +22,7 @@ from app.acquisition.pullback.plan import ObservedSlip
 from app.acquisition.recording import Latency, Recording, RecordingContext
 from app.acquisition.ring import RingWriter, create_ring, live_folder, ring_capacity
 from app.acquisition.run_file import end_reason
+from app.acquisition.sleep_prevention import SleepPrevention
 from app.acquisition.stream import live_stream
 from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
@@ -106,6 +107,7 @@ class Engine:
         self._sequence = run_setup.RunSequence()
         self._last_slip: ObservedSlip | None = None
         self._disk = DiskSpaceMonitor(Path(tempfile.gettempdir()))
+        self._sleep_prevention = SleepPrevention()
         self._health_due_s = 0.0
         self._is_asked_to_quit = False
         self._is_quitting = False
@@ -122,6 +124,7 @@ class Engine:
             self._finish(messages.EndReason.WRITE_ERROR, message_of(error))
             raise
         finally:
+            self._sleep_prevention.end()
             self._disk.stop()
             self._live.stop()
             self._writer.stop()
@@ -238,6 +241,7 @@ class Engine:
         )
         self._recording = Recording(run, metadata, self._rate_hz, journal, context, self._last_slip)
         _log.info("armed: series %s, trigger %s, journal %s", run.series, run.trigger, journal.path)
+        self._sleep_prevention.begin()
         self._live.prepare()
         if self._stream.note:
             self._recording.add_note(as_message(self._stream.note))
@@ -275,10 +279,10 @@ class Engine:
         self._recording = None
         ended, following = self._sequence.next_after(ended)
         self._events.send(ended)
+        if following is None or not self._try_to_arm(following):
+            self._sleep_prevention.end()
         if following is None:
             self._send_idle()
-        else:
-            self._try_to_arm(following)
 
     def _follow_live(self, recording: Recording) -> None:
         now_s = self._history.next_index / self._rate_hz
