@@ -18,10 +18,8 @@ def run() -> None:
     0 done; 1 could not do it, as for a value that cannot be, one line on stderr; 2 wrong usage, as for an
     option that is none; 130 interrupted.
     """
-    for stream in (sys.stdout, sys.stderr):  # names of files may be no text: `\\udcff` is, and is JSON too
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-
+    for stream in (sys.stdout, sys.stderr):
+        _use_utf8(stream)
     start_log("command")
     try:
         app()
@@ -31,3 +29,14 @@ def run() -> None:
             raise
         sys.stderr.write(f"error: {error_text(error)}\n")
         sys.exit(1)
+
+
+def _use_utf8(stream: object) -> None:
+    """Write files and pipes in UTF-8: Windows would use its code page, which has no Greek letters.
+
+    A terminal keeps its encoding, and PYTHONIOENCODING is followed.
+    """
+    if isinstance(stream, io.TextIOWrapper):
+        is_chosen = stream.isatty() or bool(os.environ.get("PYTHONIOENCODING"))
+        # Names of files may be no text: `\\udcff` is, and is JSON too.
+        stream.reconfigure(encoding=None if is_chosen else "utf-8", errors="backslashreplace")
