@@ -79,7 +79,7 @@ def is_held(path: Path) -> bool:
     except (FileNotFoundError, IsADirectoryError, ValueError):  # the last: a name that no file can have
         return False
     except PermissionError:  # of another user: its state is unknown, so it counts as alive
-        return True
+        return not path.is_dir()  # what Windows says of a folder
 
 
 def _is_still_at(file: IO[bytes], path: Path) -> bool:

@@ -1,5 +1,7 @@
+import errno
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -47,6 +49,19 @@ def test_abandoned_locks_are_removed_and_held_ones_stay(tmp_path):
     with FileLock(tmp_path / "alive.h5.recording"):
         remove_abandoned(tmp_path)
         assert [path.name for path in tmp_path.iterdir()] == ["alive.h5.recording"]
+
+
+def test_a_folder_that_is_named_like_a_lock_is_not_held(tmp_path, monkeypatch):
+    path = tmp_path / "run.h5.recording"
+    path.mkdir()
+    assert not is_held(path)
+
+    def refuse(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)  # as Windows does
+    assert not is_held(path)
+    assert is_held(tmp_path / "of another user")
 
 
 def test_a_name_that_no_file_can_have_is_not_held(tmp_path):
