@@ -43,6 +43,7 @@ else:
     # pyserial lets these through beside its own exception, which is an OSError.
     PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
 
+_WINDOWS_PORT = re.compile(r"(?:[\\/]{2}\.[\\/])?(COM\d+)", re.IGNORECASE)
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
 _DENIED = (errno.EACCES, errno.EPERM)
@@ -116,8 +117,13 @@ def list_ports() -> list[PortInfo]:
         return []
     return [
         PortInfo(p.device, p.description or "", p.vid, p.pid, p.serial_number or "", p.location or "")
-        for p in sorted(ports, key=lambda port: port.device)
+        for p in sorted(ports, key=lambda port: _natural_order(port.device))
     ]
+
+
+def _natural_order(name: str) -> list[tuple[str, int]]:
+    """Sort key that puts COM2 before COM10."""
+    return [(text, int(number or 0)) for text, number in re.findall(r"(\D*)(\d*)", name)]
 
 
 def list_streams() -> list[PortInfo]:
@@ -129,8 +135,17 @@ def port_info(url: str) -> PortInfo:
     """What is known of the port that `url` opens, or leads to as a symbolic link."""
     if "://" in url:
         return PortInfo(url)
-    names = (url, os.path.realpath(url))
+    names = (url, device_path(url))
     return next((port for port in list_ports() if port.device in names), PortInfo(url))
+
+
+def device_path(device: str) -> str:
+    """Path of a device where links end; of a port of Windows its name as the system lists it, `COM12`.
+
+    Python would open the port to learn where its name leads, which resets many a device.
+    """
+    name = _WINDOWS_PORT.fullmatch(device)
+    return name[1].upper() if name else os.path.realpath(device)
 
 
 def find_replugged(lost: PortInfo) -> str | None:
@@ -233,7 +248,7 @@ class Port:
     @property
     def has_baud(self) -> bool:
         """Whether the baud rate has an effect; it has none on a network or a pseudo-terminal."""
-        return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")
+        return "://" not in self.url and not device_path(self.url).startswith("/dev/pts/")
 
     def configure(self, line_settings: LineSettings) -> None:
         """Change the settings and discard unread bytes. Raises SettingsError, DeviceLostError."""
@@ -323,7 +338,7 @@ def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
     """Programs that have `device` open, as far as Linux shows it to the same user; none elsewhere."""
     if "://" in device:
         return []
-    target = os.path.realpath(device)
+    target = device_path(device)
     return [
         PortUser(int(process.name), program_name(process))
         for process in _entries(processes)
@@ -333,7 +348,8 @@ def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
 
 def other_port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
     """Programs beside this one that have a serial port open; a pseudo-terminal is open in its maker."""
-    if not os.path.realpath(device).startswith("/dev/") or os.path.realpath(device).startswith("/dev/pts/"):
+    target = device_path(device)
+    if not target.startswith("/dev/") or target.startswith("/dev/pts/"):
         return []
     return [user for user in port_users(device, processes) if user.process != os.getpid()]
 

@@ -15,6 +15,7 @@ from drivers.port import (
     PortInfo,
     PortUser,
     device_lost_error,
+    device_path,
     find_replugged,
     list_ports,
     open_port,
@@ -441,3 +442,31 @@ def test_a_loss_is_told_in_words_with_a_remedy(url, error, said):
 def test_a_port_tells_what_it_is():
     with open_port("loop://", 9600) as port:
         assert port.info == PortInfo("loop://")
+
+
+# --- names of Windows ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["COM3", "com12", r"\\.\COM12", "//./COM256"])
+def test_a_port_of_windows_is_known_by_the_name_that_the_system_lists(name, monkeypatch):
+    def refuse(path):
+        raise AssertionError(f"{path} was opened")
+
+    monkeypatch.setattr(os.path, "realpath", refuse)
+    listed = PortInfo(device_path(name), "FT232R", 0x0403, 0x6001, "A1")
+    assert listed.device in ("COM3", "COM12", "COM256")
+    monkeypatch.setattr("drivers.port.list_ports", lambda: [listed])
+    assert port_info(name) is listed
+
+
+def test_ports_are_listed_by_number(monkeypatch):
+    class Listed:
+        def __init__(self, device: str) -> None:
+            self.device, self.description, self.vid, self.pid = device, "", None, None
+            self.serial_number = self.location = ""
+
+    names = ["COM10", "COM9", "COM1", "/dev/ttyUSB11", "/dev/ttyUSB2", "/dev/ttyACM0"]
+    monkeypatch.setattr("drivers.port.serial_list_ports.comports", lambda: map(Listed, names))
+    assert [port.device for port in list_ports()] == [
+        "/dev/ttyACM0", "/dev/ttyUSB2", "/dev/ttyUSB11", "COM1", "COM9", "COM10",
+    ]  # fmt: skip
