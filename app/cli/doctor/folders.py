@@ -15,6 +15,11 @@ from app.runs.paths import journal_fallback_folders, recordings_directory
 from config import files
 from config.schema import ConfigError, Gauge, GaugeCheck, Settings
 
+_ONEDRIVE_VARIABLES = ("OneDrive", "OneDriveCommercial", "OneDriveConsumer")
+_SYNCHRONISED = (
+    "OneDrive", "Dropbox", "Google Drive", "Nextcloud", "iCloud", "com~apple~CloudDocs",
+)  # fmt: skip
+"""Beginnings of the names of folders that programs copy to other computers."""
 _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
 
 
@@ -64,7 +69,21 @@ def _recordings(folder: Path, chosen_in: str) -> Iterator[Finding]:
         yield fail("recordings", str(error), "Give yourself the right to write, or set SLIPSTAND_RECORDINGS")
     else:
         yield ok("recordings", f"{said}; run files can be written there")
+    yield from check_synchronised(there)
     yield check_disk_space(free_bytes(there))
+
+
+def check_synchronised(folder: Path) -> Iterator[Finding]:
+    """Warn of a folder that a program copies to elsewhere, as OneDrive copies Documents."""
+    roots = {os.environ.get(name, "").casefold() for name in _ONEDRIVE_VARIABLES} - {""}
+    names = [(place.name, str(place).casefold()) for place in (folder, *folder.parents)]
+    found = next((name for name, path in names if path in roots or name.startswith(_SYNCHRONISED)), None)
+    if found is not None:
+        yield warn(
+            "synchronised folder",
+            f"{folder} lies in {found}, which opens files while they are recorded",
+            "Record to a folder outside it: set it in the settings, or SLIPSTAND_RECORDINGS",
+        )
 
 
 def check_disk_space(free: int | None) -> Finding:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.cli.doctor import FindingState, folders, installation, ports
-from app.cli.doctor.folders import check_calibration
+from app.cli.doctor.folders import check_calibration, check_synchronised
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
 from config.files import append_check, checks_path, load_gauges, save_calibration, settings_file
@@ -80,6 +80,37 @@ def test_a_folder_that_takes_no_files_fails(slipstand: Any, monkeypatch: pytest.
     outcome = slipstand("doctor", "--json")
     assert outcome.code == 1
     assert found(outcome)["recordings"]["state"] == "fail"
+
+
+@pytest.mark.parametrize(
+    ("place", "name"),
+    [
+        ("OneDrive/Documents/Slipstand", "OneDrive"),
+        ("OneDrive - University of Somewhere/Slipstand", "OneDrive - University of Somewhere"),
+        ("Cloud/Slipstand", "Cloud"),
+        ("Documents/Slipstand", None),
+    ],
+)
+def test_a_folder_that_is_copied_elsewhere_while_runs_are_written_is_a_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, name: str | None
+) -> None:
+    monkeypatch.setenv("OneDriveCommercial", str(tmp_path / "CLOUD"))
+    told = list(check_synchronised(tmp_path / place))
+    assert [finding.state for finding in told] == ([FindingState.WARN] if name else [])
+    assert all(f"lies in {name}," in finding.message and finding.remedy for finding in told)
+
+
+def test_a_folder_is_tried_rather_than_asked_for_its_rights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    assert "beside the code" in installation.check_compiled_code(tmp_path).message
+    monkeypatch.setattr(
+        "tempfile.TemporaryFile", refuse
+    )  # as in Program Files, which os.access takes for open
+    assert "is read-only" in installation.check_compiled_code(tmp_path).message
 
 
 def test_runs_that_were_cut_short_are_a_warning_only(slipstand: Any, own_folders: Path) -> None:
