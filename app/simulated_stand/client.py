@@ -52,7 +52,7 @@ decode_stand_event: Callable[[bytes], StandEvent] = json_decoder(StandEvent)
 class SimulatedStand:
     """A simulated stand in its own process, which ends with this one; a context manager, made by `start`."""
 
-    _READY_S = 120.0  # a first start compiles the solver
+    _READY_S = 600.0  # a first start compiles the solver, each file of it watched by a virus scanner
 
     _STOP_S = 5.0
 

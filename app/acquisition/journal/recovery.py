@@ -6,7 +6,6 @@ is not touched; one that cannot be read stays.
 
 import contextlib
 import logging
-import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +18,7 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.rebuild import RebuiltRun, rebuild
 from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
-from app.runs.disk import has_free_space, storage_error, sync_folder
+from app.runs.disk import has_free_space, is_writable, storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.file_operations import (
     ExistingRun,
@@ -126,7 +125,7 @@ def _place(summary: JournalSummary, original_folder: Path | None) -> Path:
     wanted = Path(summary.header.run.directory).absolute()
     if original_folder is not None and original_folder.is_dir() and wanted == original_folder.absolute():
         size = summary.path.stat().st_size
-        if os.access(original_folder, os.W_OK) and has_free_space(original_folder, _ROOM_RATIO * size):
+        if is_writable(original_folder) and has_free_space(original_folder, _ROOM_RATIO * size):
             return original_folder
     return summary.path.parent
 

@@ -3,7 +3,6 @@
 import datetime
 import os
 import platform
-import sys
 from collections.abc import Callable, Iterator
 from importlib import metadata, util
 from itertools import pairwise
@@ -12,6 +11,7 @@ from pathlib import Path
 import analysis
 import app
 from app.cli.doctor import Finding, fail, ok, warn
+from app.runs.disk import is_writable
 from app.runs.errors import RunError
 from app.version import __version__
 from drivers.host_time import host_ns
@@ -73,7 +73,7 @@ def check_compiled_code(package: Path) -> Finding:
 
 def _is_writable(folder: Path) -> bool:
     there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
-    return there.is_dir() and os.access(there, os.W_OK | (0 if sys.platform == "win32" else os.X_OK))
+    return is_writable(there)
 
 
 _READS = 2000

@@ -17,7 +17,7 @@ from app.reports.figures.plate_figures import ALL_FIGURES, PLATE_FIGURES
 from app.reports.figures.run_figures import CAPTION, RunFigureData, contact_names, friction_figure
 from app.reports.figures.style import print_style, save_figure
 from app.runs.analyze import Progress, repeat_saved_analysis
-from app.runs.disk import atomic_write, storage_error
+from app.runs.disk import atomic_write, is_writable, storage_error
 from app.runs.errors import RunExistsError, RunNotFoundError
 from app.runs.exchange.exporting import unique_names
 from app.runs.validator import Validator
@@ -46,7 +46,7 @@ class FigureFolder(msgspec.Struct, frozen=True):
         there = next(place for place in (path, *path.parents) if place.exists())
         if not there.is_dir():
             raise storage_error(path, NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR)))
-        if not os.access(there, os.W_OK):
+        if not is_writable(there):
             raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
     def check_not_existing(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
