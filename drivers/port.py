@@ -44,6 +44,7 @@ else:
     PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
 
 _WINDOWS_PORT = re.compile(r"(?:[\\/]{2}\.[\\/])?(COM\d+)", re.IGNORECASE)
+_PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")  # of Linux and of macOS; ports of Linux are ttyS0
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
 _DENIED = (errno.EACCES, errno.EPERM)
@@ -140,12 +141,13 @@ def port_info(url: str) -> PortInfo:
 
 
 def device_path(device: str) -> str:
-    """Path of a device where links end; of a port of Windows its name as the system lists it, `COM12`.
+    """Path of a device where links end, or the name by which the system lists it: `COM12`, `/dev/cu.X`.
 
-    Python would open the port to learn where its name leads, which resets many a device.
+    On Windows Python would open the port to learn where its name leads, which resets many a device. macOS has
+    two names for a port, of which `/dev/tty.X` is that for incoming calls.
     """
     name = _WINDOWS_PORT.fullmatch(device)
-    return name[1].upper() if name else os.path.realpath(device)
+    return name[1].upper() if name else os.path.realpath(device).replace("/dev/tty.", "/dev/cu.")
 
 
 def find_replugged(lost: PortInfo) -> str | None:
@@ -248,7 +250,7 @@ class Port:
     @property
     def has_baud(self) -> bool:
         """Whether the baud rate has an effect; it has none on a network or a pseudo-terminal."""
-        return "://" not in self.url and not device_path(self.url).startswith("/dev/pts/")
+        return "://" not in self.url and not device_path(self.url).startswith(_PSEUDO_TERMINALS)
 
     def configure(self, line_settings: LineSettings) -> None:
         """Change the settings and discard unread bytes. Raises SettingsError, DeviceLostError."""
@@ -349,7 +351,7 @@ def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
 def other_port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
     """Programs beside this one that have a serial port open; a pseudo-terminal is open in its maker."""
     target = device_path(device)
-    if not target.startswith("/dev/") or target.startswith("/dev/pts/"):
+    if not target.startswith("/dev/") or target.startswith(_PSEUDO_TERMINALS):
         return []
     return [user for user in port_users(device, processes) if user.process != os.getpid()]
 

@@ -444,7 +444,7 @@ def test_a_port_tells_what_it_is():
         assert port.info == PortInfo("loop://")
 
 
-# --- names of Windows ------------------------------------------------------------------------
+# --- names of other systems ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["COM3", "com12", r"\\.\COM12", "//./COM256"])
@@ -457,6 +457,12 @@ def test_a_port_of_windows_is_known_by_the_name_that_the_system_lists(name, monk
     assert listed.device in ("COM3", "COM12", "COM256")
     monkeypatch.setattr("drivers.port.list_ports", lambda: [listed])
     assert port_info(name) is listed
+
+
+def test_a_port_of_macos_is_known_by_either_of_its_names(monkeypatch):
+    listed = PortInfo("/dev/cu.usbserial-A1", "FT232R", 0x0403, 0x6001, "A1")
+    monkeypatch.setattr("drivers.port.list_ports", lambda: [listed])
+    assert port_info("/dev/tty.usbserial-A1") is port_info("/dev/cu.usbserial-A1") is listed
 
 
 def test_ports_are_listed_by_number(monkeypatch):
