@@ -112,6 +112,7 @@ def test_events_come_out_as_lines_and_failures_in_one(pipe):
     assert events == [Health(1000.0, 5, 0, 0, 0, 0, 10), Failed(message("a fault\nin two lines"))]
 
 
+@pytest.mark.skipif(not hasattr(os, "set_blocking"), reason="Windows has it from Python 3.12 on")
 def test_an_owner_that_does_not_read_holds_nobody_up(pipe):
     sender = event_sender(pipe)
     for number in range(20_000):
@@ -188,9 +189,7 @@ def test_what_else_reads_stdin_finds_its_end_and_takes_no_command():
     assert child.events == ["its end", "ONE"]
 
 
-@pytest.mark.skipif(
-    not Path("/proc/self/fd").exists(), reason="shows descriptors of other processes on Linux only"
-)
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at descriptors of another process")
 @pytest.mark.parametrize(
     "module",
     [

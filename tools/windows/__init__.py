@@ -1,0 +1,1 @@
+"""Slipstand on Windows' own Python under Wine: `python -m tools.windows`, called by `make windows`."""
