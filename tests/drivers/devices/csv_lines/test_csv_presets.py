@@ -167,7 +167,7 @@ class Asked:
     def __init__(self, monkeypatch, answer=lambda k: b"%d\r\n" % k) -> None:
         self.now_ns, self.answer, self.asked, self.waiting = 10**12, answer, 0, b""
         self.read_s = 0.02
-        for name in ("drivers.polling.host_ns", "drivers.polling.time.monotonic"):
+        for name in ("drivers.polling.host_ns", "drivers.polling.time.perf_counter"):
             scale = 1 if name.endswith("host_ns") else 1e-9
             monkeypatch.setattr(name, lambda scale=scale: self.now_ns * scale)
         monkeypatch.setattr("drivers.polling.time.sleep", self.sleep)

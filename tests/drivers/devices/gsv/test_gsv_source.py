@@ -129,7 +129,7 @@ class Stream(ScriptedLink):
         firmware = Firmware()
         super().__init__(lambda sent: b"" if sent[2] == Code.START else firmware(sent))
         self._sent_hz, self._now_ns, self._started_ns, self._given = sent_hz, 10**12, None, 0
-        for name in ("drivers.stream.time.monotonic", "drivers.host_time.host_ns"):
+        for name in ("drivers.stream.time.perf_counter", "drivers.host_time.host_ns"):
             scale = 1 if name.endswith("host_ns") else 1e-9
             monkeypatch.setattr(name, lambda scale=scale: self._now_ns * scale)
 

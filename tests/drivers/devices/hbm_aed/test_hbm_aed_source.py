@@ -32,7 +32,7 @@ class Device(ScriptedLink):
             kind,
         )
         self._now_ns, self._started_ns, self._given = 10**12, None, 0
-        for name in ("drivers.stream.time.monotonic", "drivers.host_time.host_ns"):
+        for name in ("drivers.stream.time.perf_counter", "drivers.host_time.host_ns"):
             scale = 1 if name.endswith("host_ns") else 1e-9
             monkeypatch.setattr(name, lambda scale=scale: self._now_ns * scale)
 

@@ -150,10 +150,10 @@ def test_a_connection_on_which_nothing_is_answered_is_given_up(clock):
     link = Transmitter(clock, **FROM)
     source = started(link)
     link.on_wire = lambda _: b""
-    begin_s = clock.monotonic()
+    begin_s = clock.perf_counter()
     with pytest.raises(DeviceLostError, match="the device has not answered for 2 s: check its power and the"):
         read(source, link, 1000)
-    assert clock.monotonic() - begin_s == pytest.approx(2.1, abs=0.15)
+    assert clock.perf_counter() - begin_s == pytest.approx(2.1, abs=0.15)
     link.on_wire = lambda answer: answer
     clock.sleep(60.0)
     source.resume(link)
