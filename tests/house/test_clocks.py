@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("analysis", "app", "config", "drivers", "messages", "tools")
+PACKAGES = ("analysis", "app", "config", "drivers", "messages", "slipstand", "tools")
 COARSE = {"monotonic", "monotonic_ns"}
 
 
