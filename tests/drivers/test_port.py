@@ -459,6 +459,7 @@ def test_a_port_of_windows_is_known_by_the_name_that_the_system_lists(name, monk
     assert port_info(name) is listed
 
 
+@posix
 def test_a_port_of_macos_is_known_by_either_of_its_names(monkeypatch):
     listed = PortInfo("/dev/cu.usbserial-A1", "FT232R", 0x0403, 0x6001, "A1")
     monkeypatch.setattr("drivers.port.list_ports", lambda: [listed])

@@ -50,9 +50,9 @@ def test_without_a_pause_it_reads_once():
 
 def test_after_a_pause_it_fetches_what_there_is():
     wire, gathering = Wire(*[b"ab"] * 100), BatchedReader()
-    began = time.monotonic()
+    began = time.perf_counter()
     data = gathering.read(wire, 0.02)
-    assert time.monotonic() - began >= 0.02
+    assert time.perf_counter() - began >= 0.02
     assert data == b"ab" * wire.count
 
 
@@ -91,7 +91,7 @@ def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
     gathering.read(Wire(*[b"ab"] * 10), 0.001)
     gathering._bytes_per_s = 100_000.0
     assert gathering._longest_delay_s() == pytest.approx(0.005, rel=0.1)
-    gathering._busy_until_s = time.monotonic() - 0.1
+    gathering._busy_until_s = time.perf_counter() - 0.1
     assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
 
 

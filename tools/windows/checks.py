@@ -23,8 +23,10 @@ TEST_PARTS = (
 _RECORDINGS = "/opt/windows/recordings"
 _RECORD_S = 600.0
 _DEMO_S = 900.0  # the first one compiles
-_TESTS_S = 1800.0
+_TESTS_S = 3600.0
 _TEST_S = 600.0  # Wine opens files slowly, and some tests open thousands
+_DASK = "tests/app/runs/batch/test_dask_executor.py"
+"""Its cluster does not start under Wine, and the test would wait for it."""
 _TRUE_FRICTION = 0.1
 _UNPLUGS = tuple(word for second in range(20, 600, 15) for word in ("--fault", f"unplug 2 at {second}"))
 """Of a simulated stand: whatever 25 s of it are recorded, its cable is pulled meanwhile."""
@@ -45,7 +47,7 @@ sleep 4; import -window root {recordings}/window-{theme}-live.png
 for second in $(seq 60); do
   sleep 1; [ -z "$(find {recordings}/window-{theme} -name '*.h5.recording')" ] && break
 done
-sleep 20; import -window root {recordings}/window-{theme}-result.png
+sleep 60; import -window root {recordings}/window-{theme}-result.png
 cat {recordings}/window-{theme}.log
 """
 _KILL = r"""
@@ -131,14 +133,14 @@ def tests(environment: WindowsEnvironment, logs: Path) -> Iterator[Check]:
         log = logs / f"{part.replace('/', '-').removesuffix('.py')}.log"
         try:
             ended = environment.run_python(
-                "-m", "pytest", "-m", "not peer and not realtime", "-q", "-rfE", "--tb=short", "--timeout",
-                f"{_TEST_S:g}", part, timeout_s=_TESTS_S,
+                "-m", "pytest", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
+                f"{_TEST_S:g}", "--ignore", _DASK, part, timeout_s=_TESTS_S,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             yield Check(part, False, f"not done after {_TESTS_S:g} s")
             continue
         log.write_text(ended.stdout + ended.stderr, encoding="utf-8")
-        counts = re.findall(r"(?m)^(?:=+ )?(\d+ \w+.* in .*?)(?: =+)?$", ended.stdout)
+        counts = re.findall(r"(?m)^(\d+ \w+.* in .*)$", ended.stdout)
         yield Check(part, ended.returncode == 0, f"{counts[-1] if counts else 'no result'}; {log}")
 
 
