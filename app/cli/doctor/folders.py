@@ -69,7 +69,7 @@ def _recordings(folder: Path, chosen_in: str) -> Iterator[Finding]:
         yield fail("recordings", str(error), "Give yourself the right to write, or set SLIPSTAND_RECORDINGS")
     else:
         yield ok("recordings", f"{said}; run files can be written there")
-    yield from check_synchronised(there)
+    yield from check_synchronised(folder)
     yield check_disk_space(free_bytes(there))
 
 
