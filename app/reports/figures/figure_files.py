@@ -19,7 +19,7 @@ from app.reports.figures.style import print_style, save_figure
 from app.runs.analyze import Progress, repeat_saved_analysis
 from app.runs.disk import atomic_write, is_writable, storage_error
 from app.runs.errors import RunExistsError, RunNotFoundError
-from app.runs.exchange.exporting import unique_names
+from app.runs.exchange.export_formats import unique_names
 from app.runs.validator import Validator
 from config.schema import Stand
 

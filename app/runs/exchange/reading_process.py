@@ -160,18 +160,18 @@ class ReadingProcess:
     def _last_event(self, path: Path, report: Callable[[float], object]) -> Event:
         """Wait for an answer as long as the share of the file that is read grows."""
         limit_s, share = PROGRESS_S, -1.0
-        until_s = time.monotonic() + limit_s
+        until_s = time.perf_counter() + limit_s
         while isinstance(event := self._next(path, until_s, limit_s), ReadingProgress):
             if event.is_loading or limit_s != PROGRESS_S or event.share > share:
                 limit_s = START_S if event.is_loading else PROGRESS_S
-                until_s = time.monotonic() + limit_s
+                until_s = time.perf_counter() + limit_s
             share = max(share, event.share)
             report(share)
         return event
 
     def _next(self, path: Path, until_s: float, limit_s: float) -> Event:
         try:
-            event = self._process.receive(max(until_s - time.monotonic(), 0.0))
+            event = self._process.receive(max(until_s - time.perf_counter(), 0.0))
         except TimeoutError:
             template = N_(
                 "{path}: reading it shows no progress for {seconds:g} s. The file is damaged, or its disk too"
