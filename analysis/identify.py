@@ -1,6 +1,5 @@
 """Identification of friction from a record, with its uncertainty and verdict."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,12 +11,21 @@ from analysis.fitting.search import (
     Fit,
     Search,
     build_problem,
+    fit_at_minimum,
     guess_release,
     initial_guess,
     initial_points,
     may_be_friction,
 )
-from analysis.fitting.stand_search import PROMISE_MIN, MissingEffect, StandFit, StandSearch, is_clear
+from analysis.fitting.stand_search import (
+    PROMISE_MIN,
+    MissingEffect,
+    StandFit,
+    StandSearch,
+    friction_spread,
+    is_clear,
+    stand_problem,
+)
 from analysis.formatting import format_number
 from analysis.identification import Events, Identification, MonteCarlo
 from analysis.laws.catalogue import (
@@ -28,9 +36,9 @@ from analysis.laws.catalogue import (
     law_by_name,
     law_without,
 )
+from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import Parameter
-from analysis.laws.stand_parts import StandEffect, StandModel
-from analysis.motion.stand_motion import INTEGRATION_ERROR_M
+from analysis.laws.stand_parts import StandEffect, StandModel, StandSolver, compose, extended_point
 from analysis.plate.friction import PlateFriction, estimate_plate_friction
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN, FreeDecay, prepare
 from analysis.preparation.oscillation import no_decay_error, pullback_warnings
@@ -93,8 +101,29 @@ def identify(
 
 
 def warm_up() -> None:
-    """Compile and load everything that an identification needs, before anybody waits for a result."""
-    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))
+    """Compile and load everything that an identification needs, before anybody waits for a result.
+
+    Few records need the fallback laws, so that their code is loaded by one evaluation of each.
+    """
+    record = simulate_record(Truth(rate_hz=500.0, duration_s=8.0))
+    identify(record)
+    decay = prepare(record)
+    problem = build_problem(record, decay)
+    start, _ = initial_guess(problem, decay)
+    for law in FALLBACK_LAWS:
+        _evaluate(problem, law, start)
+        model = compose(law, ())
+        _evaluate(stand_problem(problem, model), model, extended_point(start))
+
+
+def _evaluate(problem: FitProblem, law: FrictionLaw, start: Floats) -> None:
+    """Compute once what fits and results ask of a law whose motion is integrated."""
+    fit = fit_at_minimum(problem, law, problem.minimise(start, law, 1))
+    vector, duration_s = law.vector(fit.parameters), float(problem.table.time_s[-1])
+    for asked in (law.solver.peak_rates, law.solver.final_relative, law.solver.phases):
+        asked(vector, duration_s)
+    if isinstance(law.solver, IntegratedSolver | StandSolver):
+        law.solver.mean_friction(vector, duration_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -201,14 +230,15 @@ def _conclude(
     budget = UncertaintyBudget()
     joint_fit.add_constants(constants, budget)
     check_period(budget.results["period_s"])
-    labels = fitted_quantities.add_fitted_quantities(joint, budget, slip_ended=slip_ended)
+    labels = fitted_quantities.add_fitted_quantities(joint, tied, budget, slip_ended=slip_ended)
     fitted_quantities.add_static_friction_bounds(joint, tied, budget)
     if plate is not None:
         budget.add("friction_dynamic_plate", plate.friction_dynamic, plate.contributions)
     own = budget.results.get("friction_dynamic")
     fitted_friction = joint.chosen.value(Parameter.FRICTION_DYNAMIC) if own is None else own.value
     joint = replace(joint, selection=joint.selection.with_friction(fitted_friction))
-    spread, ideal = _spread_of_missing(fitted.missing, stand, joint), min(fits, key=lambda fit: fit.bic)
+    rivals = stand.rivals if stand is not None and joint.chosen is stand.fit else []
+    spread, ideal = friction_spread(fitted.missing, rivals), min(fits, key=lambda fit: fit.bic)
     joint, verdict_warnings = judge(joint, plate, budget, ideal, spread, law_is_given=fitted.law_is_given)
     warnings = [
         *verdict_warnings,
@@ -291,9 +321,7 @@ def _missing_effects(
     search: StandSearch, decay: FreeDecay, chosen: Fit, fits: list[Fit]
 ) -> list[MissingEffect]:
     """Effects of the stand that a fit does without which leaves nothing but noise."""
-    if min(decay.noise_m) <= INTEGRATION_ERROR_M or not _is_adequate(search.problem, decay, fits):
-        return []
-    return search.missing_effects(chosen)
+    return search.missing_effects(chosen) if _is_adequate(search.problem, decay, fits) else []
 
 
 def _stand_search(search: Search, decay: FreeDecay, fits: list[Fit]) -> StandSearch:
@@ -343,16 +371,6 @@ def _explains_more(stand: StandFit, decay: FreeDecay, fits: list[Fit]) -> bool:
 def _excess(fit: Fit, problem: FitProblem) -> float:
     """Chi-square beyond that of the noise."""
     return fit.chi_square - problem.sample_count
-
-
-def _spread_of_missing(missing: list[MissingEffect], stand: StandFit | None, joint: JointFit) -> float:
-    """Standard deviation of f_d between the chosen model and others that the record leaves possible."""
-    weights, shifts = [each.weight for each in missing], [each.friction_shift for each in missing]
-    if stand is not None and joint.chosen is stand.fit:
-        weights += [math.exp(-0.5 * max(rise, 0.0)) for rise, _ in stand.rivals]
-        shifts += [friction - stand.friction for _, friction in stand.rivals]
-    total = 1.0 + sum(weights)
-    return math.sqrt(sum(weight * shift**2 for weight, shift in zip(weights, shifts, strict=True)) / total)
 
 
 def _certain_effects(stand: StandFit | None, joint: JointFit, fits: list[Fit]) -> tuple[StandEffect, ...]:

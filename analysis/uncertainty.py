@@ -1,5 +1,6 @@
 """Standard uncertainties by the law of propagation (JCGM 100, 5.1.2), with contributions by source."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self, TypeVar
@@ -37,6 +38,9 @@ _SOURCES = {
 _UNITS = {row.name: row.unit for row in CATALOGUE}
 _FRICTION = ("friction_dynamic", "friction_dynamic_plate")
 _UNITS_WITH_TIME = frozenset(("s", "1/s", "rad/s", "Hz", "m/s", "m/s2", "s/m", "kg/s", "N/m"))
+NEGLIGIBLE = 0.3
+"""Share of a standard uncertainty: a part that is smaller widens it by 5 % at most, less than its two digits
+tell."""
 LEVEL_RAD = 2e-3  # tilt within which a hydraulic level sets a plane
 LEVELLING_UNCERTAINTY_RAD = LEVEL_RAD / 3.0**0.5  # rectangular (JCGM 100, 4.3.7)
 _SHARE_MIN = 1e-3  # a law less likely than this adds less than its last digit to a standard uncertainty
@@ -248,6 +252,17 @@ class UncertaintyBudget:
         del self.results[name]
         self._forms.pop(name, None)
         self.lines = [line for line in self.lines if line.contribution_to != name]
+
+    def widen(self, name: str, source: Source, deviation: float) -> None:
+        """Add a standard uncertainty from a source to those of a quantity."""
+        value, shares, form = self.results[name].value, self.shares(name), self.form(name)
+        self.remove(name)
+        widened = {**shares, source: math.hypot(shares.get(source, 0.0), deviation)}
+        self.add(name, value, widened, form=form)
+
+    def shares(self, name: str) -> dict[Source, float]:
+        """Standard uncertainty of a quantity by source."""
+        return {line.source: line.standard_uncertainty for line in self.lines if line.contribution_to == name}
 
     def add(
         self,

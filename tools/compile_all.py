@@ -3,26 +3,21 @@
 A record that no law on an ideal stand explains has all laws and effects of the stand tried.
 """
 
-import numpy as np
-
 from analysis.classical_estimates import estimate_classically
-from analysis.identify import identify
-from analysis.laws.stand_parts import StandSolver, stand_displacements
-from analysis.laws.stribeck import STRIBECK_TILT
-from analysis.motion.stand_motion import STAND_PARAMETER_COUNT
+from analysis.identify import identify, warm_up
+from analysis.laws.stand_parts import stand_displacements
 from analysis.synthetic import Truth, simulate_record
 from drivers.registry import AVAILABLE
 
 
 def main() -> None:
     """Identify a stand that is not ideal, and one by the law that is compiled apart."""
+    warm_up()
     truth = Truth(rate_hz=300.0, duration_s=6.0, tilt_rad=1e-3)
     effects = {"release_ramp_s": 0.011, "film_s_per_m": 1.0}
     motion = stand_displacements(truth.parameters(), effects, truth.duration_s + 1e-3)
     identify(simulate_record(truth, motion))
     estimate_classically(simulate_record(truth), identify(simulate_record(truth), model="stribeck+tilt"))
-    values = np.concatenate((truth.parameters().vector(), [0.01], np.zeros(STAND_PARAMETER_COUNT)))
-    StandSolver(STRIBECK_TILT).kernels.integrate(values, truth.duration_s)
     for driver in AVAILABLE:
         driver.make_source({}, 500.0).prepare()
 

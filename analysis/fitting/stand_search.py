@@ -6,7 +6,7 @@ followed in time as in `analysis.fitting.search`: a short window after the relea
 slip, then the whole record.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from analysis.laws.stand_parts import (
     StandEffect,
     StandModel,
     compose,
+    effects_by_name,
     extended_point,
     motion_count,
 )
@@ -90,6 +91,9 @@ _FOLLOWED_BIC = 100.0  # above one and a half times the best: sets farther off a
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
+_RAMP, _STEP, _FILTER = effects_by_name(("release-ramp", "release-step", "filter"))
+_TWO_STEPS = ((1.0, 0.85), (1.5, 0.6))
+"""Length of a release over that of a slow one that passes for it, and share of the force lost at once."""
 _NOTHING = QuadraticModel(0.0, np.empty(0), np.empty((0, 0)))
 _PLACES = {place: PARAMETER_COUNT + place for place in StandParameter}
 """Places in a point of a `StandModel`."""
@@ -106,10 +110,8 @@ class StandFit:
     problem: FitProblem
     evidence: dict[str, float]
     """Rise of the BIC without each of the effects that stands on its own, by name."""
-    friction: float
-    """f_d, or its mean over the slid path where it varies."""
     rivals: list[tuple[float, float]]
-    """Rise of the BIC and the same friction of other sets of effects."""
+    """Rise of the BIC with other sets of effects, and shift of f_d, or of its mean over the slid path."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -164,6 +166,7 @@ class StandSearch:
     ) -> None:
         self._law, self._period_s, self._slip_end_s = law, search.period_s, search.slip_end_s
         self._release_s = ideal.value(Parameter.RELEASE)
+        self._noise_m = search.problem.noise_m
         self.problem = extended_problem(search.problem)
         self._searched = _with_known_masses(self.problem)
         self._informed = _with_wide_priors(_with_known_masses(extended_problem(search.informed_problem)))
@@ -174,18 +177,23 @@ class StandSearch:
         self._effort = 0.0  # steps of integration so far
         self._finished: tuple[_Trial, Fit] | None = None
 
-    def missing_effects(self, fit: Fit) -> list[MissingEffect]:
+    def missing_effects(self, fit: Fit, among: tuple[StandEffect, ...] = EFFECTS) -> list[MissingEffect]:
         """Effects that would lower the chi-square of a fit that leaves nothing but noise, each by itself.
 
-        Tests of size and colour of the residual let smooth deviations through that this score test sees.
+        Tests of size and colour of the residual let smooth deviations through that this score test sees. None
+        where the noise is as small as the errors of integration.
         """
+        if min(self._noise_m) <= INTEGRATION_ERROR_M:
+            return []
         window = self._whole().decimated(_READINGS_MISSING, self._slip_end_s)
         model = fit.law if isinstance(fit.law, StandModel) else compose(fit.law, ())
         point = fit.parameters if model is fit.law else extended_point(fit.parameters)
         minimum = Minimum(point, _NOTHING, 0, converged=True)
         trial = _Trial(model, minimum, 0.0)
         candidates = [
-            effect for effect in self._candidates(trial) if not effect.needs and effect is not STATIC_FRICTION
+            effect
+            for effect in self._candidates(trial)
+            if effect in among and not effect.needs and effect is not STATIC_FRICTION
         ]
         frequencies_hz = {
             StandParameter.BASE_FREQUENCY: _BASE_HARMONIC / self._period_s,
@@ -235,15 +243,16 @@ class StandSearch:
 
     def _stand_fit(self, window: FitProblem, best: _Trial, others: list[_Trial]) -> StandFit:
         """The best trial without needless effects, fitted to all readings, and what the others say of f_d."""
-        trial, evidence = self._without_needless(window, best)
+        alike = self._in_two_steps(window, best)
+        trial, evidence = self._without_needless(window, min((best, *alike), key=_bic_of))
+        friction = self._friction(window, trial.model, trial.point)
         rivals = [
-            (other.bic - trial.bic, self._friction(window, other.model, other.point))
-            for other in others
+            (other.bic - trial.bic, self._friction(window, other.model, other.point) - friction)
+            for other in (best, *others, *alike)
             if other.names != trial.names and other.bic < trial.bic + _RIVAL_BIC
         ]
         fit = self._finish(trial)
-        friction = self._friction(window, trial.model, trial.point)
-        return StandFit(fit, _open_shared(self.problem, fit.law), evidence, friction, rivals)
+        return StandFit(fit, _open_shared(self.problem, fit.law), evidence, rivals)
 
     def _continue(self, window: FitProblem, trials: list[_Trial]) -> list[_Trial]:
         """Refit trials of a shorter window, also with an f_s, which matters only once a stick has ended."""
@@ -278,6 +287,26 @@ class StandSearch:
             if trials[0].bic > best.bic - max(_EVIDENCE_MIN, _EXPLAINED_SHARE_MIN * excess):
                 break
         return trials
+
+    def _in_two_steps(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
+        """A trial of a slow release behind a filter, with a release in two steps in place of the filter.
+
+        Both round the start of the motion alike, so that a search that met the filter first ends there.
+        """
+        if not {_RAMP.name, _FILTER.name} <= trial.names:
+            return []
+        kept = [effect for effect in trial.model.effects if _FILTER.name not in (effect.name, effect.needs)]
+        effects = (*kept, *(() if _STEP.name in trial.names else (_STEP,)))
+        start = trial.point.copy()
+        left_out = [effect for effect in trial.model.effects if effect not in kept]
+        start[[_PLACES[place] for effect in left_out for place in effect.own]] = 0.0
+        found = []
+        for ramp, step in _TWO_STEPS:
+            point = start.copy()
+            point[_PLACES[StandParameter.RELEASE_RAMP]] *= ramp
+            point[_PLACES[StandParameter.RELEASE_STEP]] = step
+            found.append(self._trial(window, effects, point))
+        return found
 
     def _trial(
         self, window: FitProblem, effects: tuple[StandEffect, ...], point: Floats, steps: int = _STEPS_WINDOW
@@ -499,6 +528,17 @@ class StandSearch:
     def _window(self, periods: float) -> FitProblem:
         end_s = self._release_s + periods * self._period_s
         return self._informed.before(end_s).decimated(_READINGS, np.inf)
+
+
+def friction_spread(missing: list[MissingEffect], rivals: Iterable[tuple[float, float]] = ()) -> float:
+    """Standard deviation of f_d between a model and others that the record leaves possible.
+
+    `rivals` are others as in `StandFit`.
+    """
+    others = [(each.weight, each.friction_shift) for each in missing]
+    others += [(float(np.exp(-0.5 * max(rise, 0.0))), shift) for rise, shift in rivals]
+    total = 1.0 + sum(weight for weight, _ in others)
+    return float(np.sqrt(sum(weight * shift**2 for weight, shift in others) / total))
 
 
 def is_clear(fit: Fit, effect: StandEffect) -> bool:

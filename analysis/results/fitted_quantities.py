@@ -24,6 +24,7 @@ from analysis.record import AnalysisError, Record
 from analysis.results.joint_fit import FRICTION_PARAMETERS, SIGNED_PARAMETERS, DecayConstants, JointFit
 from analysis.uncertainty import (
     LEVELLING_UNCERTAINTY_RAD,
+    NEGLIGIBLE,
     LinearForm,
     UncertaintyBudget,
     numerical_gradient,
@@ -32,16 +33,14 @@ from analysis.uncertainty import (
 
 
 def add_fitted_quantities(
-    joint: JointFit, budget: UncertaintyBudget, *, slip_ended: bool
+    joint: JointFit, tied: tuple[float, float] | None, budget: UncertaintyBudget, *, slip_ended: bool
 ) -> dict[str, str | bool]:
     """Add friction, tilt, pullback, u_s if slip has ended, and peak rates; return the MSK-64 degree.
 
-    Intervals of f_d and f_s follow chi-square itself, except where that takes seconds for a law that does
-    not explain the record.
+    `tied` is what `range_of_tied_static_friction` gives. Intervals of f_d and f_s follow chi-square itself,
+    except where that takes seconds for a law that does not explain the record.
     """
-    fit, fitted = joint.chosen, joint.uncertainty
-    of_stand_model = isinstance(fit.law, StandModel)
-    profiled = fit.law.solver.is_closed_form or (joint.selection.adequate and not of_stand_model)
+    fit = joint.chosen
     own = zip(fit.law.own_places.tolist(), fit.law.own, strict=True)
     of_law = [(place, parameter.name, parameter.unit) for place, parameter in own]
     if isinstance(fit.law, StandModel):
@@ -51,13 +50,11 @@ def add_fitted_quantities(
     for place, name, unit in (*friction, *of_law, *of_stand):
         if fit.determines(place):
             sign = joint.decay.sign if place in SIGNED_PARAMETERS else 1
-            form = LinearForm.of_parameter(fitted, place, sign)
-            shares, reach = form.contributions(), None
+            form = LinearForm.of_parameter(joint.uncertainty, place, sign)
+            shares, reach = parameter_contributions(joint, place)
             if name in CORNER_NAMES:
                 _add_corner(CORNER_NAMES[name], fit.value(place), shares, budget)
                 continue
-            if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
-                shares, reach = _by_profile(joint.problem, fit, place, shares)
             budget.add(name, sign * fit.value(place), shares, unit=unit, half_widths=reach, form=form)
     if isinstance(fit.law, StandModel) and any(effect.varies_friction for effect in fit.law.effects):
         _add_mean_friction(joint, fit.law, budget)
@@ -66,8 +63,25 @@ def add_fitted_quantities(
     if slip_ended:
         _add_residual_displacement(joint, budget)
     _add_peak_rates(joint, budget)
+    if tied is not None:
+        _open_breakaway(joint, tied[1], budget)
     velocity = budget.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
+
+
+def parameter_contributions(
+    joint: JointFit, place: int
+) -> tuple[dict[Source, float], tuple[float, float] | None]:
+    """Standard uncertainty of a fitted parameter by source, and the reach of its 95 % interval.
+
+    The reach below and above the value is None where it is that of a normal distribution.
+    """
+    fit, shares = joint.chosen, LinearForm.of_parameter(joint.uncertainty, place).contributions()
+    of_stand_model = isinstance(fit.law, StandModel)
+    profiled = fit.law.solver.is_closed_form or (joint.selection.adequate and not of_stand_model)
+    if profiled and fit.law.has_static_friction and place in FRICTION_PARAMETERS:
+        return _by_profile(joint.problem, fit, place, shares)
+    return shares, None
 
 
 def _add_corner(
@@ -134,6 +148,28 @@ def _add_peak_rates(joint: JointFit, budget: UncertaintyBudget) -> None:
         budget,
         zip(PEAK_RATES, rates(point), numerical_gradient(rates, point, joint.chosen.free), strict=True),
     )
+
+
+_PLATE_ACCELERATION = PEAK_RATES.index("plate_acceleration_max_m_per_s2")
+_BREAKAWAYS = 16  # values of f_s that are tried: a last slip may come with one and not with the next
+
+
+def _open_breakaway(joint: JointFit, largest: float, budget: UncertaintyBudget) -> None:
+    """Widen the plate's largest acceleration by every f_s up to the `largest` that the record allows.
+
+    A stick ends where the acceleration is g f_s, however little that exceeds f_d, to which the law ties it.
+    """
+    name, chosen = PEAK_RATES[_PLATE_ACCELERATION], joint.chosen
+    law = compared_law(static_friction=True, tilt=chosen.law.has_tilt)
+    found, reached = budget.results[name], 0.0
+    for static in np.linspace(chosen.value(Parameter.FRICTION_DYNAMIC), largest, _BREAKAWAYS):
+        point = chosen.parameters.copy()
+        point[Parameter.FRICTION_STATIC] = static
+        rates = law.solver.peak_rates(law.vector(project_to_bounds(point, law)), joint.duration_s)
+        reached = max(reached, float(rates[_PLATE_ACCELERATION]))
+    rise = (reached - found.value) / COVERAGE_FACTOR_95
+    if rise > NEGLIGIBLE * found.standard_uncertainty:
+        budget.widen(name, BudgetSource.NOISE, rise)
 
 
 def _add_finite(
@@ -462,6 +498,10 @@ class SlipEnd:
         return self.time_s + 2.0 * self.uncertainty_s
 
 
+ROUGH_END_PERIODS = 0.25 / float(np.sqrt(3.0))
+"""Standard uncertainty of the end of slip by gauge 2 alone, to a quarter period."""
+
+
 def find_slip_end(joint: JointFit, tied: tuple[float, float] | None) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
@@ -481,7 +521,7 @@ def find_slip_end(joint: JointFit, tied: tuple[float, float] | None) -> SlipEnd 
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted
     apart_s = decay.slip_end_s - fitted.time_s
-    rough_s = 0.25 * decay.period_s / float(np.sqrt(3.0))
+    rough_s = ROUGH_END_PERIODS * decay.period_s
     uncertainty_s = float(np.linalg.norm((fitted.uncertainty_s, apart_s, rough_s)))
     return SlipEnd(max(fitted.time_s, decay.slip_end_s), uncertainty_s)
 

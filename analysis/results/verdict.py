@@ -21,7 +21,7 @@ from analysis.results.plausibility import (
     remove_undetermined_period,
     tilt_warnings,
 )
-from analysis.uncertainty import UncertaintyBudget
+from analysis.uncertainty import NEGLIGIBLE, UncertaintyBudget
 from messages.i18n import N_
 
 _NAME = "friction_dynamic"
@@ -34,8 +34,7 @@ _UNTRUE = 0.15  # of the shift of f_d: so far each effect of a failed model may 
 _SPREAD_OF_MODEL_MIN = 0.003  # of f_d; benchmarks/study_real_stand.py: what is left moves f_d by as much
 _DESCRIPTION = 0.02  # of the shift of f_d by effects: so far their description is off, by the same study
 _FLOOR = 3e-4  # of f_d: what effects below detection move it by beside those found, by the same study
-_MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
-_NEGLIGIBLE = 0.3  # of the uncertainty of f_d: less widens it by 5 % at most, less than its two digits tell
+MISFIT_MAX = 1.5  # of the plate's parabolas: with more the readings in slips are bent themselves
 _CLOSE = 0.005  # of f_d: a difference that limits no use of the result, however small the uncertainties are
 
 
@@ -77,45 +76,50 @@ def _compare_estimates(
     difference = math.inf if plate is None else abs(plate.friction_dynamic - own.value)
     if selection.adequate:
         if selection.degree is Degree.IDEAL:
-            if spread > _NEGLIGIBLE * own.standard_uncertainty:
+            if spread > NEGLIGIBLE * own.standard_uncertainty:
                 for name in _NAMES.intersection(results):
-                    _add_model_spread(budget, name, spread)
+                    budget.widen(name, BudgetSource.MODEL, spread)
             return joint, []
         spread = math.hypot(spread, _DESCRIPTION * _shift(joint, ideal), _FLOOR * own.value)
         if plate is None or _agree(own, plate) or _misleads_plate(joint):
-            _add_model_spread(budget, _NAME, spread)
+            budget.widen(_NAME, BudgetSource.MODEL, spread)
             return joint, []
-        _add_model_spread(budget, _NAME, math.hypot(spread, difference))
+        budget.widen(_NAME, BudgetSource.MODEL, math.hypot(spread, difference))
         return joint, [_disagreement(own, plate)]
-    holds = plate is not None and plate.misfit < _MISFIT_MAX and difference < _SPREAD_MAX * own.value
+    holds = plate is not None and plate.misfit < MISFIT_MAX and difference < _SPREAD_MAX * own.value
     if law_is_given:
         return _with_degree(joint, Degree.FRICTION if holds else Degree.NONE), []
     if plate is not None and holds:
-        _combine(budget, own, plate)
+        value, shares = combine_estimates(
+            own, budget.results["friction_dynamic_plate"], selection.residual_share or 0.0
+        )
+        budget.remove(_NAME)
+        budget.add(_NAME, value, shares)
         return _with_degree(joint, Degree.FRICTION), []
     spread = _spread_of_model(joint, ideal)
     if spread < _SPREAD_OF_MODEL_MAX * own.value:
-        _add_model_spread(budget, _NAME, max(spread, _SPREAD_OF_MODEL_MIN * own.value))
+        budget.widen(_NAME, BudgetSource.MODEL, max(spread, _SPREAD_OF_MODEL_MIN * own.value))
         return _with_degree(joint, Degree.FRICTION), []
     if plate is not None:
-        _add_model_spread(budget, _NAME, max(difference, _SPREAD_MAX * own.value))
+        budget.widen(_NAME, BudgetSource.MODEL, max(difference, _SPREAD_MAX * own.value))
     return _with_degree(joint, Degree.NONE), []
 
 
-def _combine(budget: UncertaintyBudget, own: Quantity, plate: PlateFriction) -> None:
-    """Set f_d to the mean of both estimates, the failed joint fit uncertain by all of their difference.
+def combine_estimates(own: Quantity, plate: Quantity, left: float) -> tuple[float, dict[BudgetSource, float]]:
+    """Mean of both estimates, the failed joint fit uncertain by all of their difference; its contributions.
 
     However well they agree, half of the plate's variance stays: only the plate checks the failed fit.
+    Friction that varies along the track misleads both alike, and shows in what the fit leaves: f_d is as
+    uncertain as that, the share `left` of the swing.
     """
-    difference = abs(plate.friction_dynamic - own.value)
+    difference = abs(plate.value - own.value)
     plate_variance = plate.standard_uncertainty**2
     own_variance = own.standard_uncertainty**2 + difference**2
     share = own_variance / (own_variance + plate_variance)
-    value = own.value + share * (plate.friction_dynamic - own.value)
+    value = own.value + share * (plate.value - own.value)
     noise = math.sqrt(max(share, 0.5)) * plate.standard_uncertainty
-    budget.remove(_NAME)
-    spread = max(share, 1.0 - share) * difference
-    budget.add(_NAME, value, {BudgetSource.NOISE: noise, BudgetSource.MODEL: spread})
+    spread = max(max(share, 1.0 - share) * difference, left * value)
+    return value, {BudgetSource.NOISE: noise, BudgetSource.MODEL: spread}
 
 
 def _shift(joint: JointFit, ideal: Fit) -> float:
@@ -150,14 +154,6 @@ def _agree(own: Quantity, plate: PlateFriction) -> bool:
 
 def _with_degree(joint: JointFit, degree: Degree) -> JointFit:
     return replace(joint, selection=replace(joint.selection, degree=degree))
-
-
-def _add_model_spread(budget: UncertaintyBudget, name: str, spread: float) -> None:
-    value = budget.results[name].value
-    shares = {line.source: line.standard_uncertainty for line in budget.lines if line.contribution_to == name}
-    form = budget.form(name)
-    budget.remove(name)
-    budget.add(name, value, {**shares, BudgetSource.MODEL: spread}, form=form)
 
 
 def _disagreement(own: Quantity, plate: PlateFriction) -> ResultWarning:

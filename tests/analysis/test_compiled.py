@@ -1,4 +1,4 @@
-"""Compiled code on disk is not used once any of its sources has changed."""
+"""Compiled code: not used from disk once any of its sources has changed, and loaded before it is needed."""
 
 import os
 import shutil
@@ -40,3 +40,31 @@ def test_a_change_in_a_called_function_reaches_its_callers_in_other_files(tmp_pa
     assert in_a_fresh_interpreter(tmp_path) == ("1", "1")
     (package / "callee.py").write_text(CALLEE.format(value=2))
     assert in_a_fresh_interpreter(tmp_path) == ("2", "0")
+
+
+LOADED_BY_A_RECORD = """
+import gc
+from numba.core.dispatcher import Dispatcher
+from analysis.identify import identify, warm_up
+from analysis.laws.stribeck import STRIBECK_TILT
+from analysis.synthetic import Truth, simulate_record
+
+def loaded():
+    dispatchers = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {each.py_func.__qualname__: len(each.overloads) for each in dispatchers}
+
+warm_up()
+truth = Truth(friction_static=0.13, tilt_rad=5e-4, rate_hz=500.0, duration_s=6.0)
+motion = STRIBECK_TILT.solver.simulate(truth.parameters(), [0.01], 6.1)
+before = loaded()
+found = identify(simulate_record(truth, motion.sample_displacements))
+print(found.model.name, [name for name, count in loaded().items() if count > before.get(name, 0)])
+"""
+
+
+def test_no_record_waits_for_code_that_only_some_records_need():
+    """The first record with Stribeck friction once took 5 s, in which its code was compiled or loaded."""
+    printed = subprocess.run(
+        [sys.executable, "-c", LOADED_BY_A_RECORD], capture_output=True, text=True, check=True
+    ).stdout
+    assert printed.split(maxsplit=1) == ["stribeck+tilt", "[]\n"]

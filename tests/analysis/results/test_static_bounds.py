@@ -50,6 +50,19 @@ def test_where_the_law_ties_both_frictions_the_upper_bound_lets_f_s_be_larger(ra
     assert upper.interval_95[1] < 0.11
 
 
+@pytest.mark.parametrize("ratio", [1.001, 1.004, 1.01])
+@pytest.mark.parametrize("tilt_rad", [0.0, 1e-3])
+def test_the_plate_may_be_faster_at_a_breakaway_than_f_d_lets_it(ratio, tilt_rad):
+    """Its acceleration is g f_s there: the law that ties f_s to f_d once was up to 200 u short of it."""
+    truth = Truth(friction_static=0.1 * ratio, tilt_rad=tilt_rad, noise_m=5e-5, rate_hz=500.0)
+    found = identify(simulate_record(truth))
+    low, high = found.results["plate_acceleration_max_m_per_s2"].interval_95
+
+    assert found.model.name == ("coulomb+tilt" if tilt_rad else "coulomb")
+    assert low <= truth.parameters().simulate(truth.duration_s).plate_acceleration_max_m_per_s2 <= high
+    assert high < 9.81 * 0.11
+
+
 def test_a_breakaway_tells_f_s_from_both_sides():
     results = identify(simulate_record(Truth(friction_static=0.2))).results
 
