@@ -3,36 +3,55 @@
 Once a release and a few swings are recorded, minima are searched as for a whole record. After that each law
 is refined from its last minimum. When no law explains the readings any more, the search is repeated. As long
 as none does, friction comes from the plate alone: on a stand that is not ideal the joint fit is off by more
-than its uncertainty. Further searches take a step in each update then; effects of a stand are not looked for.
+than its uncertainty. Further searches take a step in each update then.
+
+Values and uncertainties are those that `analysis.identify` would find in the readings so far. Effects of a
+stand are not fitted, but a law that explains the readings is tested for what it may miss: that widens f_d.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain, cycle
 
 import numpy as np
 
 from analysis.arrays import Floats
 from analysis.averaging import average_record
-from analysis.fitting.problem import FitProblem, covariance, motion_phases
+from analysis.fitting.problem import FitProblem, motion_phases
 from analysis.fitting.search import Fit, Search, build_problem, fit_at_minimum, guess_release, initial_guess
+from analysis.fitting.stand_search import MissingEffect, StandSearch, friction_spread
 from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
+from analysis.laws.stand_parts import EFFECTS
 from analysis.plate.friction import estimate_plate_friction
-from analysis.preparation.channels import Channel, remove_drift
+from analysis.preparation.extension import extend_decay, refine_tail
 from analysis.preparation.free_decay import FreeDecay, prepare
-from analysis.preparation.oscillation import DampedCosine, damped_cosine, refit_damped_cosine
-from analysis.quantities import BudgetSource, Quantity
-from analysis.record import GaugeUncertainty, Record, RecordError
+from analysis.quantities import BudgetSource, OtherLaw, Quantity
+from analysis.record import Record, RecordError
+from analysis.results.fitted_quantities import (
+    ROUGH_END_PERIODS,
+    find_slip_end,
+    parameter_contributions,
+    range_of_tied_static_friction,
+)
 from analysis.results.joint_fit import (
     DecayConstants,
-    assess_model,
+    JointFit,
+    choose_law,
     constants_from_joint_fit,
     constants_from_tail,
     identifiable_fits,
     joint_fit_uncertainty,
 )
-from analysis.uncertainty import ParameterUncertainty
+from analysis.results.verdict import MISFIT_MAX, combine_estimates
+from analysis.stopping_rule import (
+    LATEST_END_S,
+    friction_variance_reduction,
+    is_worth_waiting,
+    tail_variance_reduction,
+)
+from analysis.uncertainty import NEGLIGIBLE, ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
 _READINGS = 1200  # readings a channel for refining; the chosen law then sees all
@@ -40,13 +59,19 @@ _READINGS_SEARCHED = 600  # for a search in steps: the longest step is as long a
 _LOST = 1.3  # mean square of the residual over that of the noise from which on the motion was lost
 _AGAIN = 1.1  # a search is not repeated before the record is longer by this factor ...
 _AFTER_FAILURE = 2.0  # ... where it found no law that fits: on such a stand the next finds none either
+_LIKELY = 20.0  # of the BIC with some readings: laws above the best by more stay out with all of them
 _AGREE_SIGMAS = 3.0  # of the plate alone: a law that is all but adequate is shown where both agree so well
+_SPREAD_OF_PLATE = 0.005  # of f_d: stands that no law explains mislead the plate so far, by study_real_stand
 _STEPS = 3
 _ENDED = object()  # in place of a step of a search
 _ANEW_S = 0.5  # interval of full analyses once slip has ended; between them the chosen law is refined
+_CHECK_AGAIN = 0.05  # part by which a record grows between checks, which take as long as an analysis
+_HALVES = EFFECTS[::2], EFFECTS[1::2]
+"""Effects that are tested for in one check, and in the next: all at once would take too long."""
+_ALL = (0, 1)
+_CHECKS = ((0,), (1,), ())  # halves that a check tests for; without any it finds the begin of the tail
 _SAME_START = 0.1  # tails that begin so close, in periods, are one
-_TAIL_PERIODS = 10.0
-"""A tail this long gives period and damping. Until then the joint fit determines them far better."""
+_TAIL_PERIODS = 10.0  # of a tail from which on it is computed what a longer one would narrow
 _FRICTION_WEIGHTS = np.eye(PARAMETER_COUNT)[Parameter.FRICTION_DYNAMIC]
 FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
@@ -83,6 +108,11 @@ class LiveIdentification:
         """Length of the record, after the release, when a search last found no law that fits."""
         self._search: Iterator[None] | None = None  # under way, a step in each update
         self._last: _LiveFit | None = None
+        self._is_doubted = False  # whether the chosen law leaves more than noise
+        self._checked: FrictionLaw | None = None
+        self._checked_s, self._check_s = -np.inf, -np.inf  # when the law was checked, and is to be next
+        self._checks: Iterator[tuple[int, ...]] = iter(())
+        self._missing: list[list[MissingEffect]] = [[] for _ in _HALVES]  # as last tested
         self._by_plate: _PlateFit | None = None  # the last without an adequate law
 
     def update(self, record: Record) -> LiveState:
@@ -91,7 +121,8 @@ class LiveIdentification:
         record = average_record(record)
         try:
             known = (
-                self._refine(record, now_s)
+                self._check(record, now_s)
+                or self._refine(record, now_s)
                 or self._continue_search(now_s)
                 or self._extend_by_plate(record, now_s)
                 or self._analyse_again(record, now_s)
@@ -104,27 +135,62 @@ class LiveIdentification:
         self._last, self._by_plate, self._search = known, None, None
         return known.state
 
+    def _check(self, record: Record, now_s: float) -> "_LiveFit | None":
+        """Test the law for some of the effects that it may miss, or find the begin of the tail again.
+
+        None while no check is due. What else is known stays: with a fit besides, the update would take too
+        long.
+        """
+        last = self._last
+        if last is None or not 0.0 < now_s - self._check_s < _ANEW_S:
+            return None
+        if self._is_doubted or last.state.time_s <= self._checked_s:
+            return None
+        if record.clock_scale != last.joint.record.clock_scale:
+            return None
+        halves, joint = next(self._checks), last.joint
+        self._test(joint, halves, now_s)
+        if not halves:
+            joint = replace(joint, decay=joint.decay.with_tail_from(_tail_start(joint)))
+        known = self._known(now_s, joint, last.plate)
+        return replace(
+            last, state=_as_before(known.state, last.state), joint=joint, constants=known.constants
+        )
+
+    def _test(self, joint: JointFit, halves: tuple[int, ...], now_s: float) -> None:
+        """Test the law for these halves of the effects, and set when it is checked again."""
+        search = Search(joint.problem, joint.problem, joint.decay.period_s, joint.decay.dense_until_s)
+        stand_search = StandSearch(search, joint.chosen.law, joint.chosen)
+        for half in halves:
+            self._missing[half] = stand_search.missing_effects(joint.chosen, _HALVES[half])
+        self._checked_s, self._check_s = now_s, now_s + max(_ANEW_S, _CHECK_AGAIN * joint.duration_s)
+
+    @property
+    def _missed(self) -> float:
+        """Standard uncertainty of f_d by effects that the law may miss."""
+        return friction_spread([effect for half in self._missing for effect in half])
+
     def _refine(self, record: Record, now_s: float) -> "_LiveFit | None":
         """Refine the chosen law with the new readings; None when a full analysis is due."""
         last = self._last
-        if last is None or last.decay.tail is None or now_s > last.anew_s + _ANEW_S:
+        if last is None or last.joint.decay.tail is None or now_s > last.anew_s + _ANEW_S:
             return None
-        decay = extend_decay(last.decay, record)
+        tail = last.joint.decay.tail
+        decay = extend_decay(last.joint.decay, record)
         if decay is None:
             return None
         problem = build_problem(record, decay)
-        law = last.fit.law
-        fit = fit_at_minimum(problem, law, problem.minimise(last.fit.parameters, law, _STEPS))
+        law = last.joint.chosen.law
+        fit = fit_at_minimum(problem, law, problem.minimise(last.joint.chosen.parameters, law, _STEPS))
         if not _explains(problem, fit):
             return None
-        known = _known(now_s, record, decay, problem, fit, last.decay.tail)
-        state = replace(
-            known.state,
-            narrowing=last.state.narrowing,
-            may_stop=last.state.may_stop,
-            is_enough=last.state.is_enough,
+        fitted = _with_other_laws(
+            joint_fit_uncertainty(record, decay, problem, fit, [fit]), last.joint.uncertainty
         )
-        return replace(known, state=state, anew_s=last.anew_s)
+        decay = refine_tail(decay, tail)
+        joint = JointFit(record, decay, problem, fit, [fit], fitted, last.joint.selection)
+        known = self._known(now_s, joint, last.plate)
+        return replace(known, state=_as_before(known.state, last.state), anew_s=last.anew_s)
 
     def _continue_search(self, now_s: float) -> LiveState | None:
         """Take a step of the search that is under way, and repeat what is known; None where there is none."""
@@ -142,18 +208,20 @@ class LiveIdentification:
         decay = extend_decay(last.decay, record)
         if decay is None:
             return None
-        decay = _with_tail(decay, last.decay.tail.start_s, last.decay.tail)
+        decay = refine_tail(decay, last.decay.tail)
         period, damping = _period_and_damping(constants_from_tail(record, decay))
         return replace(last.state, time_s=now_s, period_s=period, damping_n1_per_s=damping)
 
     def _analyse_by_plate(self, record: Record, decay: FreeDecay, now_s: float) -> LiveState:
         """What is known without an adequate law: friction from the plate alone, and the tail."""
-        friction = None
-        last = self._by_plate
+        friction, last = None, self._by_plate
+        if decay.slip_end_s is not None:
+            decay = decay.with_tail_from(decay.slip_end_s + 2.0 * ROUGH_END_PERIODS * decay.period_s)
         if last is not None and _have_same_slips(last.decay, decay):
             friction = last.state.friction_dynamic_plate
-        elif (plate := estimate_plate_friction(record, decay)) is not None:
-            friction = Quantity.normal(plate.friction_dynamic, plate.standard_uncertainty, "1")
+        elif (plate := estimate_plate_friction(record, decay)) is not None and plate.misfit < MISFIT_MAX:
+            deviation = float(np.hypot(plate.standard_uncertainty, _SPREAD_OF_PLATE * plate.friction_dynamic))
+            friction = Quantity.normal(plate.friction_dynamic, deviation, "1")
         to_record = decay.channels.to_record_time
         period, damping = None, None
         if decay.tail is not None:
@@ -184,24 +252,99 @@ class LiveIdentification:
         fits = self._fit_laws(record, decay, problem, since_s)
         if not fits:
             return self._analyse_by_plate(record, decay, now_s)
-        candidates = identifiable_fits(fits)
-        best = min(candidates, key=lambda fit: fit.bic)
-        chosen = fit_at_minimum(problem, best.law, problem.minimise(best.parameters, best.law, _STEPS))
-        self._minima[chosen.law] = chosen.parameters
-        judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
-        if not judged.adequate:
+        joint = self._choose_law(record, decay, problem, fits)
+        plate, self._is_doubted = None, not joint.selection.adequate
+        if joint.chosen.law is not self._checked:
+            self._checked, self._check_s, self._checks = (
+                joint.chosen.law,
+                now_s,
+                chain([_ALL], cycle(_CHECKS)),
+            )
+        elif now_s >= self._check_s + _ANEW_S and not self._is_doubted:  # updates are rare
+            self._test(joint, _ALL, now_s)
+        if self._is_doubted:
             by_plate = self._analyse_by_plate(record, decay, now_s)
-            if not (_explains(problem, chosen) and _agree(chosen, by_plate.friction_dynamic_plate)):
+            plate = by_plate.friction_dynamic_plate
+            if not (_explains(problem, joint.chosen) and _agree(joint.chosen, plate)):
                 return by_plate
-        known = _known(now_s, record, decay, problem, chosen, None)
-        narrowing = _narrowing(known, problem)
+        known = self._known(now_s, replace(joint, decay=self._with_tail_of(joint)), plate)
+        narrowing, adequate = self._narrowing(known), joint.selection.adequate
         state = replace(
             known.state,
             narrowing=narrowing,
-            may_stop=judged.adequate and FRICTION not in narrowing,
-            is_enough=judged.adequate and not narrowing,
+            may_stop=adequate and FRICTION not in narrowing,
+            is_enough=adequate and not narrowing,
         )
         return replace(known, state=state)
+
+    def _with_tail_of(self, joint: JointFit) -> FreeDecay:
+        """The decay with the stick tail, from its last begin on where the law is the same."""
+        last = self._last
+        is_same = last is not None and last.joint.chosen.law is joint.chosen.law
+        tail = last.joint.decay.tail if last is not None and is_same else None
+        if tail is None or _stuck_since(joint) is None:
+            return joint.decay.with_tail_from(_tail_start(joint))
+        return refine_tail(joint.decay, tail)
+
+    def _choose_law(self, record: Record, decay: FreeDecay, problem: FitProblem, fits: list[Fit]) -> JointFit:
+        """Fit the likely laws to all readings, and choose the likeliest."""
+        candidates = identifiable_fits(fits)
+        best = min(fit.bic for fit in candidates)
+        likely = [
+            fit_at_minimum(problem, fit.law, problem.minimise(fit.parameters, fit.law, _STEPS))
+            for fit in candidates
+            if fit.bic <= best + _LIKELY
+        ]
+        self._minima.update({fit.law: fit.parameters for fit in likely})
+        return choose_law(record, decay, problem, likely)
+
+    def _known(self, now_s: float, joint: JointFit, plate: Quantity | None) -> "_LiveFit":
+        """Results of the fitted law, period and damping from the tail where there is one.
+
+        `plate` is f_d of the plate alone where the law is not adequate: its period and damping do not count.
+        """
+        constants, period, damping = None, None, None
+        if joint.decay.tail is not None:
+            constants = constants_from_tail(joint.record, joint.decay)
+        elif joint.selection.adequate:
+            constants = constants_from_joint_fit(joint.chosen, joint.uncertainty)
+        if constants is not None:
+            period, damping = _period_and_damping(constants)
+        to_record, stuck_s = joint.decay.channels.to_record_time, _stuck_since(joint)
+        state = LiveState(
+            now_s,
+            to_record(joint.chosen.value(Parameter.RELEASE)),
+            None if stuck_s is None else to_record(stuck_s),
+            joint.chosen.law.name,
+            self._friction(joint, plate),
+            period,
+            damping,
+        )
+        return _LiveFit(state, joint, constants, plate, now_s)
+
+    def _friction(self, joint: JointFit, plate: Quantity | None) -> Quantity:
+        """f_d; that of a law that is not adequate and of the `plate` together."""
+        shares, _ = parameter_contributions(joint, Parameter.FRICTION_DYNAMIC)
+        deviation = float(np.hypot.reduce(list(shares.values())))
+        own = Quantity.normal(joint.chosen.value(Parameter.FRICTION_DYNAMIC), deviation, "1")
+        if plate is not None:
+            value, together = combine_estimates(own, plate, joint.selection.residual_share or 0.0)
+            return Quantity.normal(value, float(np.hypot.reduce(list(together.values()))), "1")
+        if self._missed > NEGLIGIBLE * deviation:
+            own = Quantity.normal(own.value, float(np.hypot(deviation, self._missed)), "1")
+        return own
+
+    def _narrowing(self, known: "_LiveFit") -> tuple[str, ...]:
+        """Names of what readings until the latest end would still narrow."""
+        joint = known.joint
+        if joint.decay.tail is None or known.constants is None:
+            return FRICTION, PERIOD, DAMPING
+        end_s, place = joint.decay.release.time_s + LATEST_END_S, Parameter.FRICTION_DYNAMIC
+        noise = float(joint.uncertainty.noise_covariance[place, place])
+        removed = friction_variance_reduction(joint.problem, joint.chosen, noise, end_s)
+        deviation = float(np.hypot(_beside_clock(joint.uncertainty, _FRICTION_WEIGHTS), self._missed))
+        worth = is_worth_waiting(deviation, removed)
+        return (FRICTION,) * worth + _narrowing_tail(joint.decay, known.constants, end_s)
 
     def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:
         """Refine every law; search where there is none yet, and again where none explains the readings.
@@ -211,13 +354,15 @@ class LiveIdentification:
         """
         some = problem.decimated(_READINGS, decay.dense_until_s)
         fits = self._refined(some)
-        if fits and (any(_explains(some, fit) for fit in fits) or since_s < _AGAIN * self._searched_s):
+        is_lost = not any(_explains(some, fit) for fit in fits)
+        again = _AGAIN if is_lost else _AFTER_FAILURE
+        if fits and not ((is_lost or self._is_doubted) and since_s >= again * self._searched_s):
             return fits
+        few = problem.decimated(_READINGS_SEARCHED, decay.dense_until_s)
         if self._failed_s:
-            few = problem.decimated(_READINGS_SEARCHED, decay.dense_until_s)
             self._search = self._search_minima(record, decay, few, since_s)
             return []
-        for _ in self._search_minima(record, decay, some if fits else problem, since_s):
+        for _ in self._search_minima(record, decay, few if fits else problem, since_s):
             pass
         return self._refined(some)
 
@@ -250,10 +395,9 @@ class _LiveFit:
     """What the next update begins with; `anew_s` is the time of the last full analysis."""
 
     state: LiveState
-    decay: FreeDecay
-    fit: Fit
-    fitted: ParameterUncertainty
-    constants: DecayConstants
+    joint: JointFit
+    constants: DecayConstants | None
+    plate: Quantity | None  # f_d of the plate alone, where the law is not adequate
     anew_s: float
 
 
@@ -266,39 +410,10 @@ class _PlateFit:
     anew_s: float
 
 
-def _known(
-    now_s: float, record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, before: DampedCosine | None
-) -> _LiveFit:
-    """Results of the fitted law; `before` is the tail as last fitted."""
-    fitted = joint_fit_uncertainty(record, decay, problem, fit, [fit])
-    stuck_s = _stuck_since(fit, decay)
-    decay = _with_tail(decay, stuck_s, before)
-    is_tail = decay.tail is not None and decay.tail.periods > _TAIL_PERIODS
-    constants = constants_from_tail(record, decay) if is_tail else constants_from_joint_fit(fit, fitted)
-    period, damping = _period_and_damping(constants)
-    to_record = decay.channels.to_record_time
-    state = LiveState(
-        now_s,
-        to_record(fit.value(Parameter.RELEASE)),
-        None if stuck_s is None else to_record(stuck_s),
-        fit.law.name,
-        _friction(fit, fitted),
-        period,
-        damping,
-    )
-    return _LiveFit(state, decay, fit, fitted, constants, now_s)
-
-
-def _narrowing(known: _LiveFit, problem: FitProblem) -> tuple[str, ...]:
-    """Names of what readings until the latest end would still narrow."""
-    decay = known.decay
-    if decay.tail is None:
-        return FRICTION, PERIOD, DAMPING
-    end_s = decay.release.time_s + LATEST_END_S
-    noise = float(known.fitted.noise_covariance[Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_DYNAMIC])
-    removed = friction_variance_reduction(problem, known.fit, noise, end_s)
-    worth = is_worth_waiting(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
-    return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
+def _with_other_laws(own: ParameterUncertainty, rough: ParameterUncertainty) -> ParameterUncertainty:
+    """The uncertainty of a fit with the doubt about its law from that of a rougher fit."""
+    doubt = [(source, shift) for source, shift in rough.shifts.items() if isinstance(source, OtherLaw)]
+    return replace(own, shifts=dict([*own.shifts.items(), *doubt]))
 
 
 def _have_same_slips(before: FreeDecay, now: FreeDecay) -> bool:
@@ -308,46 +423,9 @@ def _have_same_slips(before: FreeDecay, now: FreeDecay) -> bool:
     return abs(now.slip_end_s - before.slip_end_s) < _SAME_START * now.period_s
 
 
-def extend_decay(decay: FreeDecay, record: Record) -> FreeDecay | None:
-    """`decay` extended by the later readings of the record, with the same signs.
-
-    None where its motion had ended before, or the clock is now known to go otherwise.
-    """
-    if decay.channels.clock_scale != record.clock_scale:
-        return None
-    table = _newer(decay.table, record, record.table_displacement_m, record.table_gauge)
-    table = remove_drift(table.scaled(decay.sign), decay.table_drift_m_per_s, decay.release.time_s)
-    grown = replace(decay, table=_joined(decay.table, table))
-    if decay.channels.table.time_s[-1] > decay.table.time_s[-1]:
-        return None
-    if decay.relative is None or record.relative_displacement_m is None:
-        return grown
-    relative = _newer(decay.relative, record, record.relative_displacement_m, record.relative_gauge)
-    relative = remove_drift(relative.scaled(decay.relative_sign), decay.drift_m_per_s, decay.release.time_s)
-    return replace(grown, relative=_joined(decay.relative, relative))
-
-
-def _newer(channel: Channel, record: Record, value_m: Floats, gauge: GaugeUncertainty) -> Channel:
-    """Readings after the last one of `channel`, on its time."""
-    time_s = (record.time_s - record.time_s[0]) * record.clock_scale - gauge.lateness_s
-    within = np.isfinite(value_m) & (time_s > channel.time_s[-1])
-    if gauge.range_m is not None:
-        within &= ~(np.abs(value_m) >= gauge.range_m)
-    return Channel(time_s[within], value_m[within])
-
-
-def _joined(before: Channel, after: Channel) -> Channel:
-    return Channel(
-        np.concatenate((before.time_s, after.time_s)), np.concatenate((before.value_m, after.value_m))
-    )
-
-
-def _with_tail(decay: FreeDecay, stuck_s: float | None, before: DampedCosine | None) -> FreeDecay:
-    """The stick tail from the fitted slip end, as refined from the last one where that began there."""
-    if stuck_s is None or before is None or abs(before.start_s - stuck_s) > _SAME_START * decay.period_s:
-        return decay.with_tail_from(stuck_s)
-    tail = refit_damped_cosine(decay.table.between(before.start_s, np.inf), before)
-    return replace(decay, tail=tail, period_s=tail.period_s)
+def _as_before(state: LiveState, last: LiveState) -> LiveState:
+    """The state with what was last said of waiting."""
+    return replace(state, narrowing=last.narrowing, may_stop=last.may_stop, is_enough=last.is_enough)
 
 
 def _without_slip(now_s: float, release_s: float, record: Record, decay: FreeDecay) -> LiveState:
@@ -385,11 +463,6 @@ def _beside_clock(known: ParameterUncertainty, weights: Floats) -> float:
     )
 
 
-def _friction(chosen: Fit, fitted: ParameterUncertainty) -> Quantity:
-    value = chosen.value(Parameter.FRICTION_DYNAMIC)
-    return Quantity.normal(value, fitted.standard_uncertainty(_FRICTION_WEIGHTS), "1")
-
-
 def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:
     deviations = [constants.uncertainty.standard_uncertainty(weights) for weights in np.eye(4)[:2]]
     return (
@@ -403,79 +476,24 @@ def _explains(problem: FitProblem, fit: Fit) -> bool:
 
 
 def _agree(fit: Fit, plate: Quantity | None) -> bool:
-    """Whether the plate alone does not contradict a fit."""
+    """Whether the plate alone confirms a fit."""
     if plate is None:
-        return True
+        return False
     difference = fit.value(Parameter.FRICTION_DYNAMIC) - plate.value
     return abs(difference) < _AGREE_SIGMAS * plate.standard_uncertainty
 
 
-def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:
-    """Fitted slip end, once the plate has stuck for a period."""
-    release_s, now_s = chosen.value(Parameter.RELEASE), float(decay.table.time_s[-1])
-    last = motion_phases(chosen.parameters, chosen.law, now_s - release_s)[-1]
-    end_s = float(last[0]) + release_s
-    return end_s if last[1] == 0.0 and now_s - end_s > decay.period_s else None
-
-
-RELATIVE_REDUCTION_MIN = 0.05
-"""Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
-LATEST_END_S = 20.0  # after the release no record goes on for longer
-_LATER_READINGS = 400  # later readings a channel that stand for all of them, with the noise of their mean
-
-
-def is_worth_waiting(deviation: float, removed_variance: float) -> bool:
-    """Whether taking `removed_variance` away narrows a standard uncertainty by more than a twentieth."""
-    return removed_variance > (1.0 - (1.0 - RELATIVE_REDUCTION_MIN) ** 2) * deviation**2
-
-
-def friction_variance_reduction(problem: FitProblem, fit: Fit, noise_variance: float, end_s: float) -> float:
-    """Variance of f_d that readings until `end_s` would take away.
-
-    `noise_variance` is the part of the variance of f_d that comes from noise, as the residuals show it.
-    """
-    now, _ = covariance(fit.normal_matrix)
-    later = _later(problem, end_s)
-    if later is None:
-        return 0.0
-    then, _ = covariance(fit.normal_matrix + _information(later, fit))
-    place = int(np.flatnonzero(fit.free == Parameter.FRICTION_DYNAMIC)[0])
-    white = float((now @ _information(problem, fit) @ now)[place, place])
-    factor = noise_variance / white if white > 0.0 else 1.0
-    return float(now[place, place] - then[place, place]) * factor
-
-
-def tail_variance_reduction(tail: DampedCosine, end_s: float) -> Floats:
-    """Shares (2,) of the noise variance of T and of n1 that a tail until `end_s` would take away."""
-    if end_s <= tail.end_s:
-        return np.zeros(2)
-    density_hz = len(tail.residual_m) / (tail.end_s - tail.start_s)
-    times_s = np.linspace(tail.end_s, end_s, _LATER_READINGS)
-    _, columns = damped_cosine(tail.parameters, times_s - tail.start_s)
-    weight = density_hz * (end_s - tail.end_s) / _LATER_READINGS
-    variance = float(np.mean(tail.residual_m**2))
-    now = tail.covariance
-    then = np.linalg.inv(np.linalg.inv(now) + weight * columns @ columns.T / variance)
-    shares = 1.0 - np.diag(then)[:2] / np.diag(now)[:2]
-    return np.asarray(shares[::-1])
-
-
-def _later(problem: FitProblem, end_s: float) -> FitProblem | None:
-    """The same gauges after their last reading, with the noise of the mean of as many as one stands for."""
-    start_s = float(problem.table.time_s[-1])
-    if end_s <= start_s:
+def _tail_start(joint: JointFit) -> float | None:
+    """When slip has ended for certain; None until it has for a period."""
+    if _stuck_since(joint) is None:
         return None
-    times_s = np.linspace(start_s, end_s, _LATER_READINGS)
-    empty = Channel(times_s, np.zeros(_LATER_READINGS))
-    table = problem.table
-    density_hz = len(table) / float(table.time_s[-1] - table.time_s[0])
-    stands_for = max(density_hz * (end_s - start_s) / _LATER_READINGS, 1e-9)
-    noise = problem.noise_m[0] / stands_for**0.5, problem.noise_m[1] / stands_for**0.5
-    relative = None if problem.relative is None else empty
-    return replace(problem, table=empty, relative=relative, noise_m=noise)
+    slip_end = find_slip_end(joint, range_of_tied_static_friction(joint))
+    return None if slip_end is None else slip_end.upper_limit_s
 
 
-def _information(problem: FitProblem, fit: Fit) -> Floats:
-    """Curvature (k, k) of half of chi-square that the readings of `problem` bring, without priors."""
-    systems = problem.normal_equations(fit.parameters, fit.law, fit.free)
-    return np.asarray(np.sum(systems, axis=0)[:-1, :-1])
+def _stuck_since(joint: JointFit) -> float | None:
+    """Fitted slip end, once the plate has stuck for a period."""
+    release_s, now_s = joint.chosen.value(Parameter.RELEASE), joint.end_s
+    last = motion_phases(joint.chosen.parameters, joint.chosen.law, now_s - release_s)[-1]
+    end_s = float(last[0]) + release_s
+    return end_s if last[1] == 0.0 and now_s - end_s > joint.decay.period_s else None

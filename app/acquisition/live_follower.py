@@ -23,6 +23,8 @@ _IDLE_S = 1.0
 _FOLLOWED_S = 30.0
 """After the release. No test needs more than 20 s; a run of fixed duration may last for hours."""
 
+_KINDS_OF_UPDATES = 3  # a search, a test of its law, a refinement
+
 
 def serve(commands: CommandReader[LiveCommand], events: EventSender[LiveAnswer]) -> None:
     """Follow one run after another until the commands end."""
@@ -57,7 +59,9 @@ def _follow(
 def warm_up() -> None:
     """Compile, or load from the cache, what an identification needs."""
     synthetic = simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
-    LiveIdentification().update(synthetic)
+    live = LiveIdentification()
+    for _ in range(_KINDS_OF_UPDATES):
+        live.update(synthetic)
 
 
 class RunFollower:

@@ -6,7 +6,7 @@ from scipy.stats import binom, chi2
 
 from analysis.fitting.problem import GaussNewton
 from analysis.laws.catalogue import FALLBACK_LAWS
-from benchmarks import study_coverage, study_garbage, study_one_mass, study_wrong_models
+from benchmarks import study_coverage, study_garbage, study_live, study_one_mass, study_wrong_models
 
 SLOW_RATE_HZ = 450.0
 RECORDS = 36
@@ -122,3 +122,16 @@ def test_one_mass_study_runs():
     cases = [study_one_mass.run(seed) for seed in range(20)]
     assert not [case.failure for case in cases if case.failure]
     assert np.abs([case.deviation for case in cases]).max() < 4.5
+
+
+@pytest.mark.parametrize("make", [study_live.exactly_known, study_live.off_its_stated_values])
+def test_what_is_shown_while_a_test_runs_is_as_uncertain_as_what_is_found_then(make):
+    """T and n1 were shown with a tenth to a half of their uncertainty, and off by up to 7 u."""
+    stopped = [study_live.run(seed, make) for seed in slow_seeds(8)]
+    told = [value for each in stopped for name, value in each.told.items() if name != "plate"]
+    shown = np.array([(each.live_u / each.final_u, each.off) for each in told if np.isfinite(each.live)])
+
+    assert len(shown) >= 0.8 * len(told)
+    assert (shown[:, 0] > 0.7).all(), shown
+    assert (shown[:, 0] < 1.5).all(), shown
+    assert (np.abs(shown[:, 1]) < 3.9).all(), shown

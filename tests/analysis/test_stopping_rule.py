@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.live import is_worth_waiting, tail_variance_reduction
 from analysis.preparation.channels import Channel
 from analysis.preparation.oscillation import damped_cosine, fit_damped_cosine
+from analysis.stopping_rule import is_worth_waiting, tail_variance_reduction
 
 
 def tail_until(end_s, seed=0):
